@@ -11,9 +11,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use eframe::egui;
-use jointplay::app::{
-    App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, Stretch, Voice, clicks,
-};
+use jointplay::app::{App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, Stretch, Voice, clicks};
 use jointplay::render::Offscreen;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Impact, Simulation};
@@ -38,37 +36,23 @@ fn frames(c: &mut Criterion) {
         app.present(ctx, true);
     });
     frame(c, "frame of the longest chain", longest_chain(), |_, _| {});
-    frame(
-        c,
-        "frame with all instruments",
-        default_scene(),
-        |app, _| {
-            app.microscope_mut().set_open(true);
-            let player = app.player_mut();
-            player.set_ideal(true);
-            player.run_to(1.0);
-            player.set_twin(true);
-            player.go_to(0.5);
-            player.set("contact.friction", "0.2").expect("in range");
-            player.run_to(0.6);
-            player.go_to(0.55);
-        },
-    );
+    frame(c, "frame with all instruments", default_scene(), |app, _| {
+        app.microscope_mut().set_open(true);
+        let player = app.player_mut();
+        player.set_ideal(true);
+        player.run_to(1.0);
+        player.set_twin(true);
+        player.go_to(0.5);
+        player.set("contact.friction", "0.2").expect("in range");
+        player.run_to(0.6);
+        player.go_to(0.55);
+    });
 }
 
-fn frame(
-    c: &mut Criterion,
-    name: &str,
-    scene: Scene,
-    prepare: impl FnOnce(&mut App, &egui::Context),
-) {
+fn frame(c: &mut Criterion, name: &str, scene: Scene, prepare: impl FnOnce(&mut App, &egui::Context)) {
     let mut headless = Headless::new().expect("a graphics adapter");
     let mut options = AppOptions::new(scene);
-    options.view.wear = if name.contains("all") {
-        WearMap::Impulse
-    } else {
-        WearMap::Off
-    };
+    options.view.wear = if name.contains("all") { WearMap::Impulse } else { WearMap::Off };
     let mut app = headless.app(options).expect("starts");
     prepare(&mut app, headless.context());
     headless.app_frame(&mut app, SIZE, 1.0).expect("drawn");
@@ -102,23 +86,14 @@ impl Stage {
         simulation.sample(time, &mut frame);
         let mut marks = PeakMarks::new();
         marks.update(&frame, &[], f64::INFINITY);
-        Self {
-            view: SceneView::new(&scene, &frame),
-            scene,
-            frame,
-            marks,
-        }
+        Self { view: SceneView::new(&scene, &frame), scene, frame, marks }
     }
 
     /// What a picture of `size` asks for, passed to `then` to be built.
     fn shot(&self, size: [u32; 2], then: impl FnOnce(&Shot<'_>)) {
-        let options = ViewOptions {
-            magnification: 20.0,
-            ..ViewOptions::default()
-        };
+        let options = ViewOptions { magnification: 20.0, ..ViewOptions::default() };
         let mut camera = self.view.camera();
-        self.view
-            .fit(&mut camera, &self.scene, &self.frame, &options, size);
+        self.view.fit(&mut camera, &self.scene, &self.frame, &options, size);
         then(&Shot {
             scene: &self.scene,
             frame: &self.frame,
@@ -142,16 +117,11 @@ fn draw_list(c: &mut Criterion) {
     let mut bench = |name: &str, stage: &Stage| {
         let mut list = DrawList::default();
         stage.shot(SIZE, |shot| {
-            c.bench_function(name, |b| {
-                b.iter(|| stage.view.build(black_box(shot), &mut list))
-            });
+            c.bench_function(name, |b| b.iter(|| stage.view.build(black_box(shot), &mut list)));
         });
     };
     bench("draw list alone", &Stage::new(default_scene(), TIME));
-    bench(
-        "draw list of the longest chain",
-        &Stage::new(longest_chain(), 0.0),
-    );
+    bench("draw list of the longest chain", &Stage::new(longest_chain(), 0.0));
 }
 
 /// As many links as a chain may have.
@@ -165,10 +135,7 @@ fn recording(c: &mut Criterion) {
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
     let stage = Stage::new(longest_chain(), 0.0);
     let list = stage.list(SIZE);
-    println!(
-        "the longest chain: {} triangles",
-        offscreen.triangles(&list)
-    );
+    println!("the longest chain: {} triangles", offscreen.triangles(&list));
     c.bench_function("recording the longest chain", |b| {
         b.iter_custom(|times| {
             let time = |_| offscreen.time_to_record(&list).expect("drawn");
@@ -191,11 +158,7 @@ fn sound(c: &mut Criterion) {
             ..Impact::default()
         })
         .collect();
-    let stretch = Stretch {
-        from: TIME,
-        to: 2.0 * TIME,
-        lasts: 1.0 / 60.0,
-    };
+    let stretch = Stretch { from: TIME, to: 2.0 * TIME, lasts: 1.0 / 60.0 };
     let mut heard: Vec<Click> = Vec::new();
     c.bench_function("clicks of a frame", |b| {
         b.iter(|| clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));

@@ -19,10 +19,7 @@ mod large;
 type Changes = [(&'static str, &'static str)];
 
 fn load(name: &str, changes: &[(&str, &str)]) -> Scene {
-    let changes: Vec<_> = changes
-        .iter()
-        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
-        .collect();
+    let changes: Vec<_> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     Scene::load(name, &changes).expect("a built-in scene loads")
 }
 
@@ -52,32 +49,16 @@ fn evaluation(c: &mut Criterion, label: &str, scene: &Scene, time: f64) {
 fn evaluations(c: &mut Criterion) {
     // Settled: all three contacts carry load.
     evaluation(c, "spcmm, tree, three contacts", &load("spcmm", &[]), 0.4);
-    evaluation(
-        c,
-        "spcmm, lagrange, three contacts",
-        &load("spcmm", &[("formulation", "lagrange")]),
-        0.4,
-    );
-    evaluation(
-        c,
-        "spcmm, tree, all ideal",
-        &load("spcmm", &[("contact.clearance", "0")]),
-        0.4,
-    );
+    evaluation(c, "spcmm, lagrange, three contacts", &load("spcmm", &[("formulation", "lagrange")]), 0.4);
+    evaluation(c, "spcmm, tree, all ideal", &load("spcmm", &[("contact.clearance", "0")]), 0.4);
 }
 
 fn real_time(c: &mut Criterion) {
     let mut group = c.benchmark_group("10 ms simulated (spcmm, over the first impacts)");
     group.sample_size(20);
     for (label, changes) in [
-        (
-            "rk4 at 10 us",
-            vec![("solver.method", "rk4"), ("solver.step", "10 us")],
-        ),
-        (
-            "dopri5 at 1e-6",
-            vec![("solver.method", "dopri5"), ("solver.tolerance", "1e-6")],
-        ),
+        ("rk4 at 10 us", vec![("solver.method", "rk4"), ("solver.step", "10 us")]),
+        ("dopri5 at 1e-6", vec![("solver.method", "dopri5"), ("solver.tolerance", "1e-6")]),
     ] {
         let scene = load("spcmm", &changes);
         let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
@@ -117,53 +98,36 @@ fn snapshots(c: &mut Criterion) {
 
 /// Simulated spans with the methods that are meant for them, beside Runge-Kutta 4 at 10 us, which runs a tenth of each.
 fn spans(c: &mut Criterion) {
-    let span =
-        |c: &mut Criterion, name: &str, changes: &Changes, from: f64, to: f64, rk4_to: f64| {
-            let mut group = c.benchmark_group(name);
-            group.sample_size(10);
-            let methods: [(&str, &Changes, f64); 2] = [
-                (
-                    "automatic at 1e-5",
-                    &[("solver.method", "automatic"), ("solver.tolerance", "1e-5")],
-                    to,
-                ),
-                (
-                    "rk4 at 10 us, a tenth of the span",
-                    &[("solver.method", "rk4"), ("solver.step", "10 us")],
-                    rk4_to,
-                ),
-            ];
-            for (label, method, end) in methods {
-                let all: Vec<(&str, &str)> = changes.iter().chain(method).copied().collect();
-                let scene = load("spcmm", &all);
-                let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
-                simulation.advance_to(from).expect("a built-in scene runs");
-                let start = simulation.snapshot();
-                group.bench_function(label, |b| {
-                    b.iter_batched(
-                        || {
-                            let mut simulation =
-                                Simulation::new(&scene).expect("a built-in scene starts");
-                            simulation.restore(&start);
-                            simulation
-                        },
-                        |mut simulation| simulation.advance_to(end).expect("a built-in scene runs"),
-                        criterion::BatchSize::LargeInput,
-                    );
-                });
-            }
-            group.finish();
-        };
+    let span = |c: &mut Criterion, name: &str, changes: &Changes, from: f64, to: f64, rk4_to: f64| {
+        let mut group = c.benchmark_group(name);
+        group.sample_size(10);
+        let methods: [(&str, &Changes, f64); 2] = [
+            ("automatic at 1e-5", &[("solver.method", "automatic"), ("solver.tolerance", "1e-5")], to),
+            ("rk4 at 10 us, a tenth of the span", &[("solver.method", "rk4"), ("solver.step", "10 us")], rk4_to),
+        ];
+        for (label, method, end) in methods {
+            let all: Vec<(&str, &str)> = changes.iter().chain(method).copied().collect();
+            let scene = load("spcmm", &all);
+            let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+            simulation.advance_to(from).expect("a built-in scene runs");
+            let start = simulation.snapshot();
+            group.bench_function(label, |b| {
+                b.iter_batched(
+                    || {
+                        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+                        simulation.restore(&start);
+                        simulation
+                    },
+                    |mut simulation| simulation.advance_to(end).expect("a built-in scene runs"),
+                    criterion::BatchSize::LargeInput,
+                );
+            });
+        }
+        group.finish();
+    };
     span(c, "first second, impacts included", &[], 0.0, 1.0, 0.1);
     span(c, "settled, 1 s to 4 s", &[], 1.0, 4.0, 1.3);
-    span(
-        c,
-        "all joints ideal, 10 s",
-        &[("contact.clearance", "0")],
-        0.0,
-        10.0,
-        1.0,
-    );
+    span(c, "all joints ideal, 10 s", &[("contact.clearance", "0")], 0.0, 10.0, 1.0);
 }
 
 fn chain(c: &mut Criterion) {
@@ -217,13 +181,5 @@ fn set_up(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(
-    benches,
-    evaluations,
-    real_time,
-    snapshots,
-    spans,
-    chain,
-    set_up
-);
+criterion_group!(benches, evaluations, real_time, snapshots, spans, chain, set_up);
 criterion_main!(benches);

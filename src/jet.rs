@@ -18,29 +18,17 @@ pub struct Jet {
 impl Jet {
     /// A constant.
     pub const fn constant(value: f64) -> Self {
-        Self {
-            value,
-            rate: 0.0,
-            acceleration: 0.0,
-        }
+        Self { value, rate: 0.0, acceleration: 0.0 }
     }
 
     /// A value with its derivatives.
     pub const fn new(value: f64, rate: f64, acceleration: f64) -> Self {
-        Self {
-            value,
-            rate,
-            acceleration,
-        }
+        Self { value, rate, acceleration }
     }
 
     /// g(self) from g, g', g'' at the value.
     pub fn chain(self, g: f64, g1: f64, g2: f64) -> Self {
-        Self {
-            value: g,
-            rate: g1 * self.rate,
-            acceleration: g1 * self.acceleration + g2 * self.rate * self.rate,
-        }
+        Self { value: g, rate: g1 * self.rate, acceleration: g1 * self.acceleration + g2 * self.rate * self.rate }
     }
 
     /// Sine and cosine.
@@ -66,22 +54,14 @@ impl Jet {
 impl Add for Jet {
     type Output = Self;
     fn add(self, o: Self) -> Self {
-        Self::new(
-            self.value + o.value,
-            self.rate + o.rate,
-            self.acceleration + o.acceleration,
-        )
+        Self::new(self.value + o.value, self.rate + o.rate, self.acceleration + o.acceleration)
     }
 }
 
 impl Sub for Jet {
     type Output = Self;
     fn sub(self, o: Self) -> Self {
-        Self::new(
-            self.value - o.value,
-            self.rate - o.rate,
-            self.acceleration - o.acceleration,
-        )
+        Self::new(self.value - o.value, self.rate - o.rate, self.acceleration - o.acceleration)
     }
 }
 
@@ -108,8 +88,7 @@ impl Div for Jet {
     fn div(self, o: Self) -> Self {
         let value = self.value / o.value;
         let rate = (self.rate - value * o.rate) / o.value;
-        let acceleration =
-            (self.acceleration - 2.0 * rate * o.rate - value * o.acceleration) / o.value;
+        let acceleration = (self.acceleration - 2.0 * rate * o.rate - value * o.acceleration) / o.value;
         Self::new(value, rate, acceleration)
     }
 }
@@ -135,8 +114,7 @@ mod tests {
         let (a1, b1) = (0.5 * c / a, 1.4);
         let a2 = -0.5 * s / a - 0.25 * c * c / (a * a * a);
         let f1 = a1 / b - a * b1 / (b * b);
-        let f2 =
-            a2 / b - 2.0 * a1 * b1 / (b * b) - a * 2.0 / (b * b) + 2.0 * a * b1 * b1 / (b * b * b);
+        let f2 = a2 / b - 2.0 * a1 * b1 / (b * b) - a * 2.0 / (b * b) + 2.0 * a * b1 * b1 / (b * b * b);
         assert!((f.rate - f1).abs() < 1e-15 && (f.acceleration - f2).abs() < 1e-14);
     }
 }

@@ -18,8 +18,7 @@ fn main() -> std::process::ExitCode {
     }
     explain_panics();
     // Unwinding first lets scratch files be removed.
-    let code = std::panic::catch_unwind(jointplay::cli::main)
-        .unwrap_or(jointplay::cli::Failure::INPUT_OUTPUT);
+    let code = std::panic::catch_unwind(jointplay::cli::main).unwrap_or(jointplay::cli::Failure::INPUT_OUTPUT);
     std::process::ExitCode::from(code)
 }
 
@@ -38,10 +37,7 @@ fn explain_panics() {
             trace(info);
         }
         let what = info.payload_as_str().unwrap_or("unknown cause");
-        let place = info
-            .location()
-            .map(|place| format!(" ({}:{})", place.file(), place.line()))
-            .unwrap_or_default();
+        let place = info.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
         let _ = writeln!(
             std::io::stderr(),
             "error: jointplay {} failed inside: {}{place}. This is a mistake in the program; please report this line \

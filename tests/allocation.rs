@@ -1,8 +1,5 @@
 //! Nothing is allocated in the stepping loop.
-#![allow(
-    unsafe_code,
-    reason = "a global allocator that counts can only be written with it"
-)]
+#![allow(unsafe_code, reason = "a global allocator that counts can only be written with it")]
 
 mod common;
 #[path = "common/large.rs"]
@@ -80,18 +77,12 @@ fn laws_of_drives_allocate_nothing() {
 
 #[test]
 fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
-    for text in [
-        include_str!("fuzz/corpus/good-spring-curves.toml"),
-        include_str!("fuzz/corpus/good-tyre.toml"),
-    ] {
+    for text in [include_str!("fuzz/corpus/good-spring-curves.toml"), include_str!("fuzz/corpus/good-tyre.toml")] {
         for form in ["tree", "lagrange"] {
             let changes = [("formulation".to_owned(), form.to_owned())];
             let scene = Scene::parse(text, None, &changes).unwrap();
             let mut simulation = Simulation::new(&scene).unwrap();
-            let mut frame = Frame {
-                reactions: Some(Vec::new()),
-                ..Frame::default()
-            };
+            let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
             simulation.step().unwrap();
             simulation.sample(simulation.time(), &mut frame);
             let found = allocations(|| {
@@ -108,10 +99,7 @@ fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
 
 #[test]
 fn joints_of_two_degrees_and_those_that_close_loops_allocate_nothing() {
-    for text in [
-        include_str!("fuzz/corpus/good-universal.toml"),
-        include_str!("fuzz/corpus/good-loop-joints.toml"),
-    ] {
+    for text in [include_str!("fuzz/corpus/good-universal.toml"), include_str!("fuzz/corpus/good-loop-joints.toml")] {
         for method in METHODS {
             for form in ["tree", "lagrange"] {
                 let changes = [("formulation", form), ("solver.method", method)];
@@ -138,11 +126,8 @@ fn steps_samples_and_peaks_allocate_nothing() {
         for method in METHODS {
             for form in ["tree", "lagrange"] {
                 for clearance in ["as given", "0"] {
-                    let mut changes = vec![
-                        ("solver.method", method),
-                        ("solver.tolerance", "1e-5"),
-                        ("formulation", form),
-                    ];
+                    let mut changes =
+                        vec![("solver.method", method), ("solver.tolerance", "1e-5"), ("formulation", form)];
                     if clearance == "0" {
                         changes.push(("contact.clearance", "0"));
                     }

@@ -28,46 +28,22 @@ pub struct CostCase {
 }
 
 const fn spcmm(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> CostCase {
-    CostCase {
-        scene: "spcmm",
-        label,
-        changes,
-        loaded: 0.4,
-        span: 0.4,
-    }
+    CostCase { scene: "spcmm", label, changes, loaded: 0.4, span: 0.4 }
 }
 
 const fn chain(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> CostCase {
-    CostCase {
-        scene: "chain",
-        label,
-        changes,
-        loaded: 2e-3,
-        span: 10e-3,
-    }
+    CostCase { scene: "chain", label, changes, loaded: 2e-3, span: 10e-3 }
 }
 
 /// The variations; the others are compared with the first.
 const PARTS: [CostCase; 11] = [
     spcmm("3 joints with clearance, with friction, tree", &[]),
-    spcmm(
-        "the same without the energy ledger",
-        &[("solver.energy_ledger", "off")],
-    ),
+    spcmm("the same without the energy ledger", &[("solver.energy_ledger", "off")]),
     spcmm("2 joints with clearance", &[("joint.S3.clearance", "0")]),
-    spcmm(
-        "1 joint with clearance",
-        &[("joint.S2.clearance", "0"), ("joint.S3.clearance", "0")],
-    ),
+    spcmm("1 joint with clearance", &[("joint.S2.clearance", "0"), ("joint.S3.clearance", "0")]),
     spcmm("all joints ideal", &[("contact.clearance", "0")]),
-    spcmm(
-        "3 joints with clearance, without friction",
-        &[("contact.friction", "0")],
-    ),
-    spcmm(
-        "3 joints with clearance, lagrange",
-        &[("formulation", "lagrange")],
-    ),
+    spcmm("3 joints with clearance, without friction", &[("contact.friction", "0")]),
+    spcmm("3 joints with clearance, lagrange", &[("formulation", "lagrange")]),
     chain("4 links", &[("chain.links", "4")]),
     chain("16 links", &[("chain.links", "16")]),
     chain("64 links", &[("chain.links", "64")]),
@@ -91,21 +67,12 @@ pub struct CaseCost {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn model_costs(
-    budget: &WorkBudget,
-    context: &mut RunContext,
-) -> Result<Vec<CaseCost>, AnalysisError> {
+pub fn model_costs(budget: &WorkBudget, context: &mut RunContext) -> Result<Vec<CaseCost>, AnalysisError> {
     let parts = PARTS.iter().enumerate();
-    parts
-        .map(|(n, part)| one(part, budget, &mut context.part(n, PARTS.len())))
-        .collect()
+    parts.map(|(n, part)| one(part, budget, &mut context.part(n, PARTS.len()))).collect()
 }
 
-fn one(
-    part: &CostCase,
-    budget: &WorkBudget,
-    context: &mut RunContext,
-) -> Result<CaseCost, AnalysisError> {
+fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result<CaseCost, AnalysisError> {
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
     let scene = Scene::load(part.scene, &changes)?;
@@ -119,11 +86,7 @@ fn one(
     let evaluations = simulation.statistics().evaluations;
     let seconds = time_to(
         part.span,
-        &WorkBudget {
-            evaluations: u64::MAX / 2,
-            seconds: f64::INFINITY,
-            ..*budget
-        },
+        &WorkBudget { evaluations: u64::MAX / 2, seconds: f64::INFINITY, ..*budget },
         context,
         |_| setting.start(&scene),
     )?;
@@ -136,17 +99,11 @@ fn one(
 }
 
 /// Seconds per evaluation at a new instant: the shortest average over several batches.
-fn evaluation(
-    setting: &Setting,
-    scene: &Scene,
-    loaded: f64,
-    context: &mut RunContext,
-) -> Result<f64, AnalysisError> {
+fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunContext) -> Result<f64, AnalysisError> {
     let mut simulation = setting.start(scene)?;
     simulation.advance_to(loaded)?;
     let (t, y) = (simulation.time(), simulation.state());
-    let mut mechanism =
-        Mechanism::new(simulation.running_scene()).map_err(crate::simulate::StartError)?;
+    let mut mechanism = Mechanism::new(simulation.running_scene()).map_err(crate::simulate::StartError)?;
     // Starting it determines its rank.
     mechanism.start().map_err(crate::simulate::StartError)?;
     let joints = 0..mechanism.contacts.len();

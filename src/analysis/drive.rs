@@ -9,9 +9,7 @@ use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPeriod {
     /// No drive repeats.
-    #[error(
-        "the scene `{scene}` has no drive that repeats, so there is no drive phase to take sections at"
-    )]
+    #[error("the scene `{scene}` has no drive that repeats, so there is no drive phase to take sections at")]
     None {
         /// Name of the scene.
         scene: String,
@@ -43,18 +41,12 @@ pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
         }
         match period {
             Some(first) if (first / own - 1.0).abs() > 1e-12 => {
-                return Err(NoPeriod::Different {
-                    scene: scene.name.clone(),
-                    first,
-                    second: own,
-                });
+                return Err(NoPeriod::Different { scene: scene.name.clone(), first, second: own });
             }
             _ => period = Some(own),
         }
     }
-    period.ok_or_else(|| NoPeriod::None {
-        scene: scene.name.clone(),
-    })
+    period.ok_or_else(|| NoPeriod::None { scene: scene.name.clone() })
 }
 
 /// What a section of a scene records: pose and rates of the output body, named as in the rows of a run.
@@ -96,10 +88,7 @@ impl Machine {
 
     /// Continues a running simulation.
     pub fn resume(simulation: Simulation) -> Self {
-        Self {
-            simulation,
-            frame: Frame::default(),
-        }
+        Self { simulation, frame: Frame::default() }
     }
 
     /// The simulation.

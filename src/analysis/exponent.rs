@@ -161,9 +161,7 @@ impl Benettin {
         Some(Exponent {
             value: last / (n as f64 * self.interval),
             standard_error: standard_error(&self.at_sections) / self.interval,
-            running: running
-                .map(|(k, growth)| growth / ((k + 1) as f64 * self.interval))
-                .collect(),
+            running: running.map(|(k, growth)| growth / ((k + 1) as f64 * self.interval)).collect(),
         })
     }
 

@@ -4,23 +4,15 @@
 /// without being worse in the other. Errors below `floor` count as equal to it. A pair that is not finite is never on the
 /// front.
 pub fn front(pairs: &[(f64, f64)], floor: f64) -> Vec<bool> {
-    let known: Vec<(f64, f64)> = pairs
-        .iter()
-        .map(|&(cost, error)| (cost, error.max(floor)))
-        .collect();
+    let known: Vec<(f64, f64)> = pairs.iter().map(|&(cost, error)| (cost, error.max(floor))).collect();
     let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
-    let finite = |pair: (f64, f64), index: usize| {
-        pair.0.is_finite() && pair.1.is_finite() && pairs[index].1.is_finite()
-    };
+    let finite =
+        |pair: (f64, f64), index: usize| pair.0.is_finite() && pair.1.is_finite() && pairs[index].1.is_finite();
     known
         .iter()
         .enumerate()
         .map(|(i, &own)| {
-            finite(own, i)
-                && !known
-                    .iter()
-                    .enumerate()
-                    .any(|(j, &other)| finite(other, j) && beats(other, own))
+            finite(own, i) && !known.iter().enumerate().any(|(j, &other)| finite(other, j) && beats(other, own))
         })
         .collect()
 }
@@ -45,10 +37,7 @@ mod tests {
             (f64::INFINITY, 0.0),
         ];
         let marked = front(&pairs, 1e-8);
-        assert_eq!(
-            marked,
-            [true, true, false, false, true, false, false, false]
-        );
+        assert_eq!(marked, [true, true, false, false, true, false, false, false]);
         assert!(front(&pairs, 0.0)[5]);
         // Equal pairs do not beat each other.
         assert_eq!(front(&[(1.0, 1.0), (1.0, 1.0)], 0.0), [true, true]);

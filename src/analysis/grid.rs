@@ -51,9 +51,7 @@ pub enum RangeError {
         key: String,
     },
     /// A whole-number parameter whose equal steps are not whole.
-    #[error(
-        "--vary {text}: {key} takes whole numbers, and {count} equal steps from {from} to {to} are none"
-    )]
+    #[error("--vary {text}: {key} takes whole numbers, and {count} equal steps from {from} to {to} are none")]
     NotWhole {
         /// As written.
         text: String,
@@ -118,59 +116,37 @@ impl ParameterRange {
         let Some((key, from, to, count)) = parts() else {
             return Err(RangeError::Form { text: own() });
         };
-        let wrong = |error| RangeError::Scene {
-            text: own(),
-            error: Box::new(error),
-        };
+        let wrong = |error| RangeError::Scene { text: own(), error: Box::new(error) };
         let parameter = scene.parameter(key).map_err(wrong)?;
-        let count: usize = count
-            .parse()
-            .map_err(|_| RangeError::Form { text: own() })?;
+        let count: usize = count.parse().map_err(|_| RangeError::Form { text: own() })?;
         if count == 0 {
             let what = "0 values".to_owned();
             return Err(RangeError::Empty { text: own(), what });
         }
         let read = |end: &str| match parameter.read(end) {
             Ok(value) => Ok(value),
-            Err(error) => Err(RangeError::End {
-                text: own(),
-                end: end.to_owned(),
-                error,
-            }),
+            Err(error) => Err(RangeError::End { text: own(), end: end.to_owned(), error }),
         };
         let (first, last, whole) = match (parameter.kind, read(from)?, read(to)?) {
             (_, Value::Number(first), Value::Number(last)) => (first, last, false),
-            (Kind::Count { .. }, Value::Count(first), Value::Count(last)) => {
-                (first as f64, last as f64, true)
-            }
+            (Kind::Count { .. }, Value::Count(first), Value::Count(last)) => (first as f64, last as f64, true),
             _ => {
                 let key = key.to_owned();
                 return Err(RangeError::Words { text: own(), key });
             }
         };
         if first > last {
-            return Err(RangeError::Reversed {
-                text: own(),
-                from: from.to_owned(),
-                to: to.to_owned(),
-            });
+            return Err(RangeError::Reversed { text: own(), from: from.to_owned(), to: to.to_owned() });
         }
         if (first == last) != (count == 1) {
             let what = if count == 1 {
-                "1 value between two different ends; give both ends the same value, or more values"
-                    .to_owned()
+                "1 value between two different ends; give both ends the same value, or more values".to_owned()
             } else {
                 format!("both ends are {from}, so there is 1 value and not {count}")
             };
             return Err(RangeError::Empty { text: own(), what });
         }
-        let axis = Self {
-            key: key.to_owned(),
-            from: first,
-            to: last,
-            count,
-            whole,
-        };
+        let axis = Self { key: key.to_owned(), from: first, to: last, count, whole };
         if whole && axis.values().any(|value| value.fract() != 0.0) {
             return Err(RangeError::NotWhole {
                 text: own(),
@@ -182,9 +158,7 @@ impl ParameterRange {
         }
         for end in [0, count - 1] {
             let mut trial = scene.clone();
-            trial
-                .set_value(key, &axis.parameter_value(end))
-                .map_err(wrong)?;
+            trial.set_value(key, &axis.parameter_value(end)).map_err(wrong)?;
         }
         Ok(axis)
     }
@@ -216,9 +190,7 @@ impl ParameterRange {
             Some((parameter.at_reset, scene))
         };
         let ends = at(0).zip(at(self.count - 1));
-        ends.is_some_and(|((waits, first), (_, last))| {
-            waits && !differs_in_conditions_alone(&first, &last)
-        })
+        ends.is_some_and(|((waits, first), (_, last))| waits && !differs_in_conditions_alone(&first, &last))
     }
 
     /// All values in order, SI.
@@ -229,11 +201,7 @@ impl ParameterRange {
     /// Value `i` in the form that the scene accepts.
     pub fn parameter_value(&self, i: usize) -> Value {
         let value = self.value(i);
-        if self.whole {
-            Value::Count(value as u64)
-        } else {
-            Value::Number(value)
-        }
+        if self.whole { Value::Count(value as u64) } else { Value::Number(value) }
     }
 }
 
@@ -275,26 +243,17 @@ impl Grid {
     pub fn new(scene: &Scene, axes: Vec<ParameterRange>, start: Start) -> Result<Self, RangeError> {
         let wrong = |message: String| Err(RangeError::Together(message));
         let Some(last) = axes.last() else {
-            return wrong(
-                "a sweep varies at least one parameter: add --vary KEY=A..B:N".to_owned(),
-            );
+            return wrong("a sweep varies at least one parameter: add --vary KEY=A..B:N".to_owned());
         };
         if axes.len() > MOST_AXES {
-            return wrong(format!(
-                "{} --vary: a sweep varies at most {MOST_AXES} parameters",
-                axes.len()
-            ));
+            return wrong(format!("{} --vary: a sweep varies at most {MOST_AXES} parameters", axes.len()));
         }
         if axes.len() == 2 && axes[0].key == axes[1].key {
             return wrong(format!("--vary {} is there twice", last.key));
         }
-        let points = axes
-            .iter()
-            .try_fold(1_usize, |n, axis| n.checked_mul(axis.count));
+        let points = axes.iter().try_fold(1_usize, |n, axis| n.checked_mul(axis.count));
         if points.is_none_or(|points| points > MOST_POINTS) {
-            return wrong(format!(
-                "the ranges have more than {MOST_POINTS} points together"
-            ));
+            return wrong(format!("the ranges have more than {MOST_POINTS} points together"));
         }
         if start != Start::Cold && last.waits(scene) {
             return wrong(format!(
@@ -302,11 +261,7 @@ impl Grid {
                  --start cold{}",
                 start.word(),
                 last.key,
-                if axes.len() == 2 {
-                    ", or name the other range last"
-                } else {
-                    ""
-                },
+                if axes.len() == 2 { ", or name the other range last" } else { "" },
             ));
         }
         Ok(Self { axes, start })
@@ -348,9 +303,7 @@ impl Grid {
     pub fn settings(&self, point: usize) -> Vec<(&str, Value)> {
         let indices = self.indices(point).into_iter();
         let pairs = self.axes.iter().zip(indices);
-        pairs
-            .map(|(axis, i)| (axis.key(), axis.parameter_value(i)))
-            .collect()
+        pairs.map(|(axis, i)| (axis.key(), axis.parameter_value(i))).collect()
     }
 
     /// The scene of a point.
@@ -381,19 +334,11 @@ impl Grid {
     /// Points of block `b` in the order in which they are computed.
     pub fn order(&self, b: usize) -> Vec<usize> {
         let points = self.block(b);
-        if self.start == Start::FollowDown {
-            points.rev().collect()
-        } else {
-            points.collect()
-        }
+        if self.start == Start::FollowDown { points.rev().collect() } else { points.collect() }
     }
 
     fn block_length(&self) -> usize {
-        if self.start == Start::Cold {
-            1
-        } else {
-            FOLLOW_BLOCK
-        }
+        if self.start == Start::Cold { 1 } else { FOLLOW_BLOCK }
     }
 
     fn row_length(&self) -> usize {
@@ -430,11 +375,7 @@ mod tests {
         for pair in steps.windows(2) {
             assert!((pair[1] - pair[0] - 0.99e-3 / 199.0).abs() < 1e-15);
         }
-        assert_eq!(
-            super::ParameterRange::parse(&spcmm(), "contact.friction=0.2..0.2:1")
-                .map(|a| a.value(0)),
-            Ok(0.2)
-        );
+        assert_eq!(super::ParameterRange::parse(&spcmm(), "contact.friction=0.2..0.2:1").map(|a| a.value(0)), Ok(0.2));
     }
 
     #[test]
@@ -449,10 +390,7 @@ mod tests {
             ("contact.clearance=0.1mm..1mm:1", "empty: 1 value"),
             ("contact.clearance=0.1..1mm:5", "0.1: needs a unit"),
             ("contact.clearance=0.1mm..20mm:5", "below the ball radius"),
-            (
-                "contact.clearence=0.1mm..1mm:5",
-                "did you mean `contact.clearance`?",
-            ),
+            ("contact.clearence=0.1mm..1mm:5", "did you mean `contact.clearance`?"),
             ("contact.normal_law=hertz..flores:2", "only numbers"),
             ("chain.links=2..4:3", "has no such key"),
             ("contact.friction=-1..1:3", "-1: out of range"),
@@ -464,10 +402,7 @@ mod tests {
         let chain = Scene::load("chain", &[]).expect("built in");
         let links = ParameterRange::parse(&chain, "chain.links=2..6:3").expect("whole numbers");
         assert_eq!(links.parameter_value(1), Value::Count(4));
-        assert!(matches!(
-            ParameterRange::parse(&chain, "chain.links=2..6:4"),
-            Err(RangeError::NotWhole { .. })
-        ));
+        assert!(matches!(ParameterRange::parse(&chain, "chain.links=2..6:4"), Err(RangeError::NotWhole { .. })));
     }
 
     #[test]
@@ -507,20 +442,10 @@ mod tests {
         for (axes, start, fragment) in [
             (vec![], Start::Cold, "at least one"),
             (vec![friction(), friction()], Start::Cold, "twice"),
-            (
-                vec![friction(), frequency(), friction()],
-                Start::Cold,
-                "at most 2",
-            ),
-            (
-                vec![frequency()],
-                Start::FollowUp,
-                "takes effect at the next reset",
-            ),
+            (vec![friction(), frequency(), friction()], Start::Cold, "at most 2"),
+            (vec![frequency()], Start::FollowUp, "takes effect at the next reset"),
         ] {
-            let error = Grid::new(&scene, axes, start)
-                .expect_err(fragment)
-                .to_string();
+            let error = Grid::new(&scene, axes, start).expect_err(fragment).to_string();
             assert!(error.contains(fragment), "{error}");
         }
         assert!(Grid::new(&scene, vec![frequency(), friction()], Start::FollowUp).is_ok());

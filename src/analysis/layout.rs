@@ -59,18 +59,12 @@ const POINT: [OfPoint; 10] = [
         Status::Diverged | Status::NoStart => -1.0,
     }),
     ("period", true, |r, _| r.regime.period() as f64),
-    ("return_distance", false, |r, status| {
-        known(status, r.evidence.return_distance)
-    }),
+    ("return_distance", false, |r, status| known(status, r.evidence.return_distance)),
     ("distinct_sections", true, |r, _| r.evidence.distinct as f64),
     ("zero_one", false, |r, _| r.evidence.zero_one),
     ("exponent_per_s", false, |r, _| exponent(r, |e| e.value)),
-    ("exponent_standard_error_per_s", false, |r, _| {
-        exponent(r, |e| e.standard_error)
-    }),
-    ("exponent_bound_per_s", false, |r, status| {
-        known(status, r.evidence.exponent_bound)
-    }),
+    ("exponent_standard_error_per_s", false, |r, _| exponent(r, |e| e.standard_error)),
+    ("exponent_bound_per_s", false, |r, status| known(status, r.evidence.exponent_bound)),
 ];
 
 /// The same per ball joint, prefixed with the joint's name.
@@ -82,18 +76,12 @@ const JOINT: [OfJoint; 6] = [
     ("mean_N", false, |joint| joint.mean),
     ("impacts", true, |joint| joint.impacts as f64),
     ("impacts_kept", true, |joint| joint.impacts_kept as f64),
-    ("last_separation_s", false, |joint| {
-        joint.last_separation.unwrap_or(f64::NAN)
-    }),
+    ("last_separation_s", false, |joint| joint.last_separation.unwrap_or(f64::NAN)),
 ];
 
 /// A value that only a point that reached its end has.
 fn known(status: Status, value: f64) -> f64 {
-    if status == Status::Done {
-        value
-    } else {
-        f64::NAN
-    }
+    if status == Status::Done { value } else { f64::NAN }
 }
 
 fn exponent(result: &PointResult, of: fn(&Exponent) -> f64) -> f64 {
@@ -105,11 +93,7 @@ impl Layout {
     pub fn new(scene: &Scene, plan: &Plan) -> Self {
         let mut columns = Vec::new();
         let mut add = |name: &str, whole: bool, per_section: bool| {
-            columns.push(Column {
-                name: name.to_owned(),
-                whole,
-                per_section,
-            });
+            columns.push(Column { name: name.to_owned(), whole, per_section });
         };
         for (name, whole, _) in POINT {
             add(name, whole, false);
@@ -128,12 +112,7 @@ impl Layout {
         for observable in OBSERVABLES {
             add(&format!("section_{observable}"), false, true);
         }
-        Self {
-            columns,
-            joints: scene.ball_joints.len(),
-            probe,
-            kept: plan.periods - plan.discard,
-        }
+        Self { columns, joints: scene.ball_joints.len(), probe, kept: plan.periods - plan.discard }
     }
 
     /// Arrays in order.
@@ -158,10 +137,7 @@ impl Layout {
 
     /// Offset of array `column` in a record.
     pub fn offset(&self, column: usize) -> usize {
-        self.columns[..column]
-            .iter()
-            .map(|c| self.values_in(c))
-            .sum()
+        self.columns[..column].iter().map(|c| self.values_in(c)).sum()
     }
 
     /// Appends the record of a point; `None` is a point that could not start.

@@ -7,14 +7,9 @@ use crate::scene::Scene;
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-9;
 /// Tolerances tried, from the loosest that raises no doubt; and the relative error of the peaks that is good enough.
-const TOLERANCES: [f64; 13] = [
-    1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6, 5e-7, 2e-7, 1e-7,
-];
+const TOLERANCES: [f64; 13] = [1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6, 5e-7, 2e-7, 1e-7];
 const ALLOWED: f64 = 0.01;
-const BUDGET: WorkBudget = WorkBudget {
-    measured: 0.1,
-    ..WorkBudget::REFERENCE
-};
+const BUDGET: WorkBudget = WorkBudget { measured: 0.1, ..WorkBudget::REFERENCE };
 
 /// A machine and the speed required of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,13 +31,7 @@ const fn goal(
     span: f64,
     asked: f64,
 ) -> SpeedGoal {
-    SpeedGoal {
-        label,
-        scene,
-        changes,
-        span,
-        asked,
-    }
+    SpeedGoal { label, scene, changes, span, asked }
 }
 
 /// All of them.
@@ -50,21 +39,9 @@ pub const SPEED_GOALS: [SpeedGoal; 7] = [
     goal("chain of 8", "chain", &[("chain.links", "8")], 0.1, 5.0),
     goal("chain of 32", "chain", &[("chain.links", "32")], 0.1, 1.0),
     goal("hexapod, 12 loose", "hexapod", &[], 1.0, 12.0),
-    goal(
-        "hexapod, 1 loose",
-        "hexapod",
-        &[("contact.clearance", "0"), ("joint.A6.clearance", "0.1 mm")],
-        1.0,
-        40.0,
-    ),
+    goal("hexapod, 1 loose", "hexapod", &[("contact.clearance", "0"), ("joint.A6.clearance", "0.1 mm")], 1.0, 40.0),
     // The rods held by nothing but their balls.
-    goal(
-        "delta, 12 loose",
-        "delta",
-        &[("parameter.grip", "0.001 N")],
-        0.5,
-        6.0,
-    ),
+    goal("delta, 12 loose", "delta", &[("parameter.grip", "0.001 N")], 0.5, 6.0),
     goal("four-bar, 2 loose", "four-bar", &[], 1.0, 120.0),
     goal("suspension, 4 loose", "suspension", &[], 1.0, 40.0),
 ];
@@ -123,12 +100,7 @@ pub fn speed(goal: SpeedGoal, context: &mut RunContext) -> Result<Speed, Analysi
     }
     let setting = Setting::automatic(tolerance);
     let seconds = time_to(goal.span, &BUDGET, &mut context, |_| setting.start(&scene))?;
-    Ok(Speed {
-        goal,
-        tolerance,
-        error,
-        speed: goal.span / seconds,
-    })
+    Ok(Speed { goal, tolerance, error, speed: goal.span / seconds })
 }
 
 /// Clock seconds per link and simulated second of the longer chain of [`GROWTH`] over those of the shorter, at `tolerance`.
@@ -155,19 +127,10 @@ mod tests {
     #[test]
     fn each_machine_has_the_loose_joints_that_it_is_named_for() {
         for goal in SPEED_GOALS {
-            let scene = goal
-                .load()
-                .unwrap_or_else(|e| panic!("{}: {e}", goal.label));
-            let loose = scene
-                .ball_joints
-                .iter()
-                .filter(|joint| joint.contact.clearance > 0.0);
+            let scene = goal.load().unwrap_or_else(|e| panic!("{}: {e}", goal.label));
+            let loose = scene.ball_joints.iter().filter(|joint| joint.contact.clearance > 0.0);
             let count = loose.count().to_string();
-            assert!(
-                goal.label.split([' ', ',']).any(|word| word == count),
-                "{}: {count}",
-                goal.label
-            );
+            assert!(goal.label.split([' ', ',']).any(|word| word == count), "{}: {count}", goal.label);
         }
     }
 }

@@ -24,10 +24,7 @@ pub struct Case {
 
 impl From<(f64, f64)> for Case {
     fn from((clearance, friction): (f64, f64)) -> Self {
-        Self {
-            clearance,
-            friction,
-        }
+        Self { clearance, friction }
     }
 }
 
@@ -297,25 +294,13 @@ pub enum Test {
     /// All quantities said to grow do grow.
     AllGrow(Series),
     /// One quantity exceeds another in every run.
-    Exceeds {
-        of: FigureValue,
-        that: FigureValue,
-        over: Series,
-    },
+    Exceeds { of: FigureValue, that: FigureValue, over: Series },
     /// A quantity has its extreme in the middle run.
     NoRule { of: FigureValue, with: Series },
     /// One quantity varies by a larger fraction of its mean than another.
-    DiffersMore {
-        of: FigureValue,
-        than: FigureValue,
-        with: Series,
-    },
+    DiffersMore { of: FigureValue, than: FigureValue, with: Series },
     /// A quantity varies more over one series than over the other.
-    ChangesMoreWith {
-        of: FigureValue,
-        with: Series,
-        than: Series,
-    },
+    ChangesMoreWith { of: FigureValue, with: Series, than: Series },
     /// No ball leaves its socket after a given instant, s.
     Steady { after: f64, over: Series },
     /// A joint, counted from 1, has the largest peak force in a run.
@@ -433,10 +418,7 @@ mod tests {
             let [a, b, c] = runs.map(|run| series.of(run));
             assert!(a < b && (a + c - 2.0 * b).abs() < 1e-12, "{series}");
         }
-        assert_eq!(
-            Series::Clearance.vary([0.01, 1.0], 100),
-            "contact.clearance=0.01mm..1mm:100"
-        );
+        assert_eq!(Series::Clearance.vary([0.01, 1.0], 100), "contact.clearance=0.01mm..1mm:100");
         assert_eq!(Series::Friction.run_name(PAPER.runs[0]), "friction 0.2");
     }
 

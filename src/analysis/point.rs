@@ -91,22 +91,12 @@ impl PointRun {
     pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, MachineError> {
         // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
         let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
-        Ok(Self::begin(
-            Machine::new(scene)?,
-            plan,
-            period,
-            part * period,
-        ))
+        Ok(Self::begin(Machine::new(scene)?, plan, period, part * period))
     }
 
     /// Continues from the latest section of another point with some parameters changed; `None` if a change takes effect
     /// only on reset, or the scene does not accept it.
-    pub fn follow(
-        mut machine: Machine,
-        changes: &[(&str, Value)],
-        plan: Plan,
-        period: f64,
-    ) -> Option<Self> {
+    pub fn follow(mut machine: Machine, changes: &[(&str, Value)], plan: Plan, period: f64) -> Option<Self> {
         for (key, value) in changes {
             if machine.simulation_mut().set_value(key, value) != Ok(Effect::Now) {
                 return None;
@@ -118,21 +108,11 @@ impl PointRun {
 
     fn begin(mut machine: Machine, plan: Plan, period: f64, first: f64) -> Self {
         let solver = machine.simulation().running_scene().solver;
-        let tolerance = if solver.method.is_adaptive() {
-            solver.tolerance
-        } else {
-            FIXED_STEP
-        };
-        let schedule = Schedule {
-            first,
-            interval: period,
-            sections: plan.periods,
-            discard: plan.discard,
-        };
+        let tolerance = if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP };
+        let schedule = Schedule { first, interval: period, sections: plan.periods, discard: plan.discard };
         // The motion of a purely kinematic scene has no neighbours.
         let twin = plan.exponent && !machine.simulation().mechanism().is_kinematic();
-        let separation =
-            twin.then(|| (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1));
+        let separation = twin.then(|| (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1));
         let mut peaks = Vec::new();
         let simulation = machine.simulation_mut();
         if simulation.time() > 0.0 {
@@ -214,8 +194,7 @@ impl PointRun {
         for (largest, peak) in self.transient_peaks.iter_mut().zip(&self.peaks) {
             *largest = peak.normal;
         }
-        self.impacts_at_discard
-            .clone_from(&simulation.statistics().impacts);
+        self.impacts_at_discard.clone_from(&simulation.statistics().impacts);
         self.means.begin(machine);
     }
 
@@ -238,23 +217,11 @@ impl PointRun {
             })
             .collect();
         let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
-        let probe = known.map(|_| {
-            (
-                self.means.probe_largest,
-                (self.means.probe_square / span).sqrt(),
-            )
-        });
+        let probe = known.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
         let exponent = self.watch.exponent().and_then(|benettin| benettin.result());
         let sections = self.watch.sections().to_vec();
         let (regime, evidence) = classify(&sections, &self.resolution, self.period, exponent);
-        let result = PointResult {
-            stopped: None,
-            joints,
-            probe,
-            regime,
-            evidence,
-            sections,
-        };
+        let result = PointResult { stopped: None, joints, probe, regime, evidence, sections };
         (result, self.watch.into_orbit())
     }
 
@@ -270,21 +237,9 @@ impl PointRun {
 impl PointResult {
     /// A result in which nothing is known.
     pub fn empty(joints: usize) -> Self {
-        let unknown = JointResult {
-            peak: f64::NAN,
-            peak_kept: f64::NAN,
-            mean: f64::NAN,
-            ..JointResult::default()
-        };
+        let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
         let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
-        Self {
-            stopped: None,
-            joints: vec![unknown; joints],
-            probe: None,
-            regime,
-            evidence,
-            sections: Vec::new(),
-        }
+        Self { stopped: None, joints: vec![unknown; joints], probe: None, regime, evidence, sections: Vec::new() }
     }
 }
 
@@ -294,9 +249,7 @@ pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
     let radii = scene.ball_joints.iter().map(|j| j.contact.ball_radius);
     let length = radii.fold(1.0, f64::min);
     let of_group = [length, 0.1, length / 0.1, 1.0];
-    (0..OBSERVABLES.len())
-        .map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3])
-        .collect()
+    (0..OBSERVABLES.len()).map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3]).collect()
 }
 
 /// Time averages by the trapezoidal rule.

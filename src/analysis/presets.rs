@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::stretch::time_to;
 use super::work_precision::{Baseline, measure as measure_point};
-use super::{
-    AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision,
-};
+use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision};
 use crate::scene::{Preset, Scene};
 
 /// What `jointplay tradeoff --all --write` measured.
@@ -94,16 +92,9 @@ pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn pace(
-    scene: &Scene,
-    budget: &WorkBudget,
-    context: &mut RunContext,
-) -> Result<f64, AnalysisError> {
+pub fn pace(scene: &Scene, budget: &WorkBudget, context: &mut RunContext) -> Result<f64, AnalysisError> {
     let setting = Setting::of_preset(Preset::RealTime);
-    let budget = WorkBudget {
-        measured: budget.measured,
-        ..WorkBudget::REFERENCE
-    };
+    let budget = WorkBudget { measured: budget.measured, ..WorkBudget::REFERENCE };
     let seconds = time_to(PACED, &budget, context, |_| setting.start(scene))?;
     Ok(PACED / seconds)
 }
@@ -157,11 +148,7 @@ pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn measure(
-    scene: &Scene,
-    presets: &[Preset],
-    context: &mut RunContext,
-) -> Result<Vec<Point>, AnalysisError> {
+pub fn measure(scene: &Scene, presets: &[Preset], context: &mut RunContext) -> Result<Vec<Point>, AnalysisError> {
     let budget = WorkBudget::QUICK;
     let parts = presets.len() + 2;
     let reference = ReferenceSolution::new(scene, &mut context.part(0, parts))?;
@@ -169,12 +156,7 @@ pub fn measure(
     let mut points = Vec::with_capacity(presets.len());
     for (n, preset) in presets.iter().enumerate() {
         let setting = Setting::of_preset(*preset);
-        let mut point = measure_point(
-            &reference,
-            setting,
-            &budget,
-            &mut context.part(n + 2, parts),
-        )?;
+        let mut point = measure_point(&reference, setting, &budget, &mut context.part(n + 2, parts))?;
         point.preset = Some(*preset);
         baseline.divide(&mut point);
         points.push(point);
@@ -200,10 +182,7 @@ mod tests {
                 panic!("{name}: run `jointplay tradeoff --all --write .`");
             });
             let said = slow(name, &[ASKED]);
-            assert_eq!(
-                said.as_ref().map(|slow| slow.pace),
-                (pace < 1.0).then_some(pace)
-            );
+            assert_eq!(said.as_ref().map(|slow| slow.pace), (pace < 1.0).then_some(pace));
             if let Some(said) = said {
                 assert!(said.to_string().contains(name), "{said}");
             }

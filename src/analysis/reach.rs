@@ -110,10 +110,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     let setting = Setting::automatic(TOLERANCE);
     let baseline = Setting::baseline();
     let integrates = !setting.start(scene)?.mechanism().is_kinematic();
-    let budget = WorkBudget {
-        measured: 0.5,
-        ..WorkBudget::REFERENCE
-    };
+    let budget = WorkBudget { measured: 0.5, ..WorkBudget::REFERENCE };
     let (from, to) = goal.span();
     let speed = |setting: &Setting, context: &mut RunContext| {
         let start = run_to(setting, scene, from, context, |_| {})?.snapshot();
@@ -122,11 +119,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     };
     // Timed before and after the baseline, so that a load that sets in between slows both.
     let first = speed(&setting, &mut context.part(0, 4))?;
-    let baseline = if integrates {
-        Some(speed(&baseline, &mut context.part(1, 4))?)
-    } else {
-        None
-    };
+    let baseline = if integrates { Some(speed(&baseline, &mut context.part(1, 4))?) } else { None };
     let second = speed(&setting, &mut context.part(2, 4))?;
     let mut last = context.part(3, 4);
     let error = match goal {
@@ -140,19 +133,11 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
             let expected = mean_forces(&converged, scene, (from, to), &mut last)?;
             let means = mean_forces(&setting, scene, (from, to), &mut last)?;
             let pairs = means.iter().zip(&expected);
-            pairs
-                .map(|(mean, expected)| (mean / expected - 1.0).abs())
-                .reduce(f64::max)
+            pairs.map(|(mean, expected)| (mean / expected - 1.0).abs()).reduce(f64::max)
         }
         Goal::Ideal => None,
     };
-    Ok(Reach {
-        goal,
-        setting,
-        speed: first.max(second),
-        baseline,
-        error,
-    })
+    Ok(Reach { goal, setting, speed: first.max(second), baseline, error })
 }
 
 /// Runs from the start to `end`; `seen` is called after every step.
@@ -180,8 +165,6 @@ fn mean_forces(
     context: &mut RunContext,
 ) -> Result<Vec<f64>, AnalysisError> {
     let mut forces = MeanForces::new(scene, span, SAMPLES);
-    run_to(setting, scene, span.1, context, |simulation| {
-        forces.see(simulation)
-    })?;
+    run_to(setting, scene, span.1, context, |simulation| forces.see(simulation))?;
     Ok(forces.means)
 }

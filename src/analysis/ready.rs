@@ -86,13 +86,7 @@ impl ReadySweep {
 
     /// The sweep over `scene`, with its sections at the start of the drive period.
     pub fn task(&self, scene: &Scene) -> SweepTask {
-        let Self {
-            key,
-            from,
-            to,
-            values,
-            ..
-        } = self;
+        let Self { key, from, to, values, .. } = self;
         SweepTask {
             scene: SceneSource::of(scene),
             vary: vec![format!("{key}={from}..{to}:{values}")],

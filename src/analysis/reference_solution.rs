@@ -121,9 +121,7 @@ impl Contact {
     /// Its end, or the time after which it counts as ended for its length; `None` while neither is known at `now`.
     fn over(&self, now: f64) -> Option<f64> {
         let long = self.begin + LONG_CONTACT;
-        self.end
-            .filter(|end| *end <= long)
-            .or((now >= long).then_some(long))
+        self.end.filter(|end| *end <= long).or((now >= long).then_some(long))
     }
 }
 
@@ -136,10 +134,7 @@ impl ReferenceSolution {
     pub fn new(scene: &Scene, context: &mut RunContext) -> Result<Self, AnalysisError> {
         let mut reference = Self::of_impacts(scene, REFERENCE, &mut context.part(0, 2))?;
         let setting = reference.setting;
-        let tighter = Setting {
-            tolerance: 0.5 * REFERENCE,
-            ..setting
-        };
+        let tighter = Setting { tolerance: 0.5 * REFERENCE, ..setting };
         let (peaks, position) = reference.reference_impacts(&tighter, &mut context.part(2, 4))?;
         reference.floor.peak = reference.peak_error(&peaks);
         reference.floor.position_m = Some((position - reference.position).norm());
@@ -151,11 +146,7 @@ impl ReferenceSolution {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(super) fn of_impacts(
-        scene: &Scene,
-        tolerance: f64,
-        context: &mut RunContext,
-    ) -> Result<Self, AnalysisError> {
+    pub(super) fn of_impacts(scene: &Scene, tolerance: f64, context: &mut RunContext) -> Result<Self, AnalysisError> {
         let setting = Setting::reference(tolerance);
         let (contacts, impacts) = first_contacts(&setting, scene, &mut context.part(0, 2))?;
         let mut reference = Self {
@@ -183,13 +174,7 @@ impl ReferenceSolution {
     fn lay_slots(&mut self, contacts: &[Contact], joints: usize) {
         let first = &contacts[..self.impacts];
         if first.is_empty() {
-            let whole = |joint| Slot {
-                joint,
-                begin_s: 0.0,
-                from_s: 0.0,
-                to_s: WITHOUT_IMPACTS,
-                peak_n: 0.0,
-            };
+            let whole = |joint| Slot { joint, begin_s: 0.0, from_s: 0.0, to_s: WITHOUT_IMPACTS, peak_n: 0.0 };
             self.slots = (0..joints).map(whole).collect();
             return;
         }
@@ -206,9 +191,7 @@ impl ReferenceSolution {
                 joint: contact.joint,
                 begin_s: contact.begin,
                 from_s: before.map_or(0.0, |other| 0.5 * (over(other) + contact.begin)),
-                to_s: after.map_or(self.span, |other| {
-                    self.span.min(0.5 * (over(contact) + other.begin))
-                }),
+                to_s: after.map_or(self.span, |other| self.span.min(0.5 * (over(contact) + other.begin))),
                 peak_n: 0.0,
             });
         }
@@ -281,22 +264,13 @@ impl ReferenceSolution {
     }
 
     /// Finds settled motion and averages its forces.
-    fn settle(
-        &mut self,
-        setting: &Setting,
-        tighter: &Setting,
-        context: &mut RunContext,
-    ) -> Result<(), AnalysisError> {
+    fn settle(&mut self, setting: &Setting, tighter: &Setting, context: &mut RunContext) -> Result<(), AnalysisError> {
         let Some((start, started)) = settled_state(&self.scene, &mut context.part(0, 3))? else {
             return Ok(());
         };
         let from = started + WARM_UP;
-        self.settled = Some(SettledSpan {
-            from,
-            to: from + SETTLED_SPAN,
-            means: vec![0.0; self.scene.ball_joints.len()],
-            start,
-        });
+        self.settled =
+            Some(SettledSpan { from, to: from + SETTLED_SPAN, means: vec![0.0; self.scene.ball_joints.len()], start });
         let budget = WorkBudget::REFERENCE;
         let mut means = [Vec::new(), Vec::new()];
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
@@ -335,10 +309,7 @@ impl ReferenceSolution {
         budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, PhaseCost), AnalysisError> {
-        let span = self
-            .settled
-            .as_ref()
-            .expect("asked only of a scene that settles");
+        let span = self.settled.as_ref().expect("asked only of a scene that settles");
         let (end, mut simulation) = self.resume(span, setting, budget, context)?;
         let before = work(&simulation, &PhaseCost::default());
         let mut forces = MeanForces::new(&self.scene, (span.from, span.to), SAMPLES);
@@ -410,13 +381,7 @@ pub(super) struct MeanForces {
 
 impl MeanForces {
     pub(super) fn new(scene: &Scene, span: (f64, f64), samples: u32) -> Self {
-        Self {
-            span,
-            samples,
-            next: 0,
-            frame: Frame::default(),
-            means: vec![0.0; scene.ball_joints.len()],
-        }
+        Self { span, samples, next: 0, frame: Frame::default(), means: vec![0.0; scene.ball_joints.len()] }
     }
 
     /// Samples the instants that lie in the latest step.
@@ -442,9 +407,7 @@ impl MeanForces {
 pub(super) fn done(end: End) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
-        End::Capped => Err(AnalysisError::TooLong {
-            evaluations: WorkBudget::REFERENCE.evaluations,
-        }),
+        End::Capped => Err(AnalysisError::TooLong { evaluations: WorkBudget::REFERENCE.evaluations }),
         End::Stopped(stopped) => Err(stopped.into()),
         End::Refused(refused) => Err(refused.into()),
     }
@@ -462,47 +425,29 @@ fn first_contacts(
         return Ok((Vec::new(), 0));
     }
     let begun_before = |j: &usize| simulation.contact_memory(*j).active;
-    let mut contacts: Vec<Contact> = (0..joints)
-        .filter(begun_before)
-        .map(|joint| Contact {
-            joint,
-            begin: 0.0,
-            end: None,
-        })
-        .collect();
+    let mut contacts: Vec<Contact> =
+        (0..joints).filter(begun_before).map(|joint| Contact { joint, begin: 0.0, end: None }).collect();
     let mut peaks: Vec<Peak> = Vec::new();
     simulation.take_peaks(&mut peaks);
     let budget = WorkBudget::REFERENCE;
-    let end = advance_capped(
-        &mut simulation,
-        IMPACTS_WITHIN,
-        &budget,
-        context,
-        |simulation| {
-            let now = simulation.time();
-            simulation.take_peaks(&mut peaks);
-            for (joint, peak) in peaks.iter().enumerate() {
-                let open = contacts
-                    .iter_mut()
-                    .rfind(|c| c.joint == joint && c.end.is_none());
-                let active = simulation.contact_memory(joint).active;
-                if let Some(contact) = open
-                    && (!active || peak.impacts > 0)
-                {
-                    contact.end = Some(now);
-                }
-                if peak.impacts > 0 {
-                    contacts.push(Contact {
-                        joint,
-                        begin: now,
-                        end: (!active).then_some(now),
-                    });
-                }
+    let end = advance_capped(&mut simulation, IMPACTS_WITHIN, &budget, context, |simulation| {
+        let now = simulation.time();
+        simulation.take_peaks(&mut peaks);
+        for (joint, peak) in peaks.iter().enumerate() {
+            let open = contacts.iter_mut().rfind(|c| c.joint == joint && c.end.is_none());
+            let active = simulation.contact_memory(joint).active;
+            if let Some(contact) = open
+                && (!active || peak.impacts > 0)
+            {
+                contact.end = Some(now);
             }
-            let over = |contact: &Contact| contact.over(now).is_some_and(|t| now > t + AFTERWARDS);
-            contacts.len() >= IMPACTS && contacts[..IMPACTS].iter().all(over)
-        },
-    )?;
+            if peak.impacts > 0 {
+                contacts.push(Contact { joint, begin: now, end: (!active).then_some(now) });
+            }
+        }
+        let over = |contact: &Contact| contact.over(now).is_some_and(|t| now > t + AFTERWARDS);
+        contacts.len() >= IMPACTS && contacts[..IMPACTS].iter().all(over)
+    })?;
     match end {
         // A large scene may be capped before its sixth impact: those until then are compared.
         End::Capped if !contacts.is_empty() => {}
@@ -510,47 +455,30 @@ fn first_contacts(
     }
     let last = simulation.time();
     // A contact that has not ended by then cannot be compared to its end.
-    let over = |contact: &&Contact| {
-        contact
-            .over(last)
-            .is_some_and(|end| end + AFTERWARDS <= last)
-    };
+    let over = |contact: &&Contact| contact.over(last).is_some_and(|end| end + AFTERWARDS <= last);
     let compared = contacts.iter().take(IMPACTS).take_while(over).count();
     Ok((contacts, compared))
 }
 
 /// The state in which every joint with clearance has been in contact, without a new impact, for a while.
-fn settled_state(
-    scene: &Scene,
-    context: &mut RunContext,
-) -> Result<Option<(Snapshot, f64)>, AnalysisError> {
+fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<(Snapshot, f64)>, AnalysisError> {
     let setting = Setting::automatic(SETTLING);
     let mut simulation = setting.start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
     let mut since = 0.0;
-    let clearance: Vec<usize> = (0..scene.ball_joints.len())
-        .filter(|&j| scene.ball_joints[j].contact.clearance > 0.0)
-        .collect();
+    let clearance: Vec<usize> =
+        (0..scene.ball_joints.len()).filter(|&j| scene.ball_joints[j].contact.clearance > 0.0).collect();
     let mut settled = false;
-    let budget = WorkBudget {
-        seconds: f64::INFINITY,
-        ..WorkBudget::FULL
-    };
-    advance_capped(
-        &mut simulation,
-        SETTLED_WITHIN,
-        &budget,
-        context,
-        |simulation| {
-            simulation.take_peaks(&mut peaks);
-            let open = |&j: &usize| !simulation.contact_memory(j).active || peaks[j].impacts > 0;
-            if clearance.iter().any(open) {
-                since = simulation.time();
-            }
-            settled = simulation.time() - since >= QUIET;
-            settled
-        },
-    )?;
+    let budget = WorkBudget { seconds: f64::INFINITY, ..WorkBudget::FULL };
+    advance_capped(&mut simulation, SETTLED_WITHIN, &budget, context, |simulation| {
+        simulation.take_peaks(&mut peaks);
+        let open = |&j: &usize| !simulation.contact_memory(j).active || peaks[j].impacts > 0;
+        if clearance.iter().any(open) {
+            since = simulation.time();
+        }
+        settled = simulation.time() - since >= QUIET;
+        settled
+    })?;
     Ok(settled.then(|| (simulation.snapshot(), simulation.time())))
 }
 
@@ -561,15 +489,11 @@ mod tests {
     use super::*;
 
     fn reference(name: &str, changes: &[(&str, &str)]) -> ReferenceSolution {
-        let changes: Vec<_> = changes
-            .iter()
-            .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
-            .collect();
+        let changes: Vec<_> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load(name, &changes).expect("built in");
         let mut clock = || 0.0;
         let mut go_on = |_: f64| ControlFlow::Continue(());
-        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut go_on))
-            .expect("measures")
+        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut go_on)).expect("measures")
     }
 
     #[test]

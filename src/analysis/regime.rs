@@ -24,13 +24,7 @@ pub enum Regime {
 
 impl Regime {
     /// Every regime in the order of its code; what is periodic has period 1.
-    pub const ALL: [Self; 5] = [
-        Self::Unclear,
-        Self::Periodic(1),
-        Self::QuasiPeriodic,
-        Self::Chaotic,
-        Self::NotSettled,
-    ];
+    pub const ALL: [Self; 5] = [Self::Unclear, Self::Periodic(1), Self::QuasiPeriodic, Self::Chaotic, Self::NotSettled];
 
     /// Its word for people and files.
     pub fn word(self) -> &'static str {
@@ -116,12 +110,7 @@ const REGULAR: f64 = 0.2;
 
 /// Classifies `sections` (concatenated, each as long as `resolution`), taken every `interval` seconds; `resolution` is
 /// the smallest difference that distinguishes two values.
-pub fn classify(
-    sections: &[f64],
-    resolution: &[f64],
-    interval: f64,
-    exponent: Option<Exponent>,
-) -> (Regime, Evidence) {
+pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: Option<Exponent>) -> (Regime, Evidence) {
     let width = resolution.len();
     let all: Vec<&[f64]> = sections.chunks_exact(width).collect();
     let from = all.len() - (all.len() / 2).max(LOOKED_AT).min(all.len());
@@ -218,9 +207,7 @@ fn distinct(sections: &[&[f64]], resolution: &[f64]) -> usize {
 fn most_varying(sections: &[&[f64]], resolution: &[f64]) -> usize {
     let extent = |i: usize| {
         let values = sections.iter().map(|section| section[i]);
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         (high - low) / resolution[i]
     };
     let by_extent = |&a: &usize, &b: &usize| extent(a).total_cmp(&extent(b));
@@ -286,11 +273,7 @@ mod tests {
     use super::*;
 
     fn exponent(value: f64) -> Option<Exponent> {
-        Some(Exponent {
-            value,
-            standard_error: 0.01,
-            running: vec![value],
-        })
+        Some(Exponent { value, standard_error: 0.01, running: vec![value] })
     }
 
     #[test]
@@ -330,12 +313,7 @@ mod tests {
             .collect();
         assert_eq!(classify(&chaos, &[1e-9], 1.0, None).0, Regime::Chaotic);
         let turn = 0.618_033_988_749_894_9;
-        let torus: Vec<f64> = (0..400)
-            .map(|k| libm::cos(std::f64::consts::TAU * turn * f64::from(k)))
-            .collect();
-        assert_eq!(
-            classify(&torus, &[1e-9], 1.0, None).0,
-            Regime::QuasiPeriodic
-        );
+        let torus: Vec<f64> = (0..400).map(|k| libm::cos(std::f64::consts::TAU * turn * f64::from(k))).collect();
+        assert_eq!(classify(&torus, &[1e-9], 1.0, None).0, Regime::QuasiPeriodic);
     }
 }

@@ -7,8 +7,7 @@ mod statements;
 pub use findings::{Combination, Findings, Report};
 use record::row;
 pub use record::{
-    COLUMNS, Column, RecordedRow, RecordedRun, SettledCurve, SettledPoint, SweepData, column_of,
-    derivative, exponents,
+    COLUMNS, Column, RecordedRow, RecordedRun, SettledCurve, SettledPoint, SweepData, column_of, derivative, exponents,
 };
 pub use statements::{Grounds, LITTLE, Statement};
 
@@ -42,23 +41,11 @@ pub struct Extent {
 
 impl Extent {
     /// The full report.
-    pub const FULL: Self = Self {
-        settle: 30,
-        runs: (200, 50),
-        values: [100, 40],
-        sweep: (100, 40),
-        map: [16, 16],
-        map_periods: (40, 16),
-    };
+    pub const FULL: Self =
+        Self { settle: 30, runs: (200, 50), values: [100, 40], sweep: (100, 40), map: [16, 16], map_periods: (40, 16) };
     /// A shortened report that shows the layout within a minute.
-    pub const QUICK: Self = Self {
-        settle: 1,
-        runs: (4, 1),
-        values: [2, 2],
-        sweep: (3, 1),
-        map: [2, 2],
-        map_periods: (2, 1),
-    };
+    pub const QUICK: Self =
+        Self { settle: 1, runs: (4, 1), values: [2, 2], sweep: (3, 1), map: [2, 2], map_periods: (2, 1) };
 }
 
 /// Why there is no report.
@@ -137,19 +124,8 @@ fn sweep_data(
     let scene = scene(variant, case, &[])?;
     let axes = vary.iter().map(|text| ParameterRange::parse(&scene, text));
     let grid = Grid::new(&scene, axes.collect::<Result<Vec<_>, _>>()?, start)?;
-    let plan = Plan {
-        periods,
-        discard,
-        phase: 0.0,
-        exponent,
-    };
-    Ok(SweepData {
-        variant,
-        name,
-        sweep: Sweep::new(scene, grid, plan)?,
-        records: Vec::new(),
-        points: Vec::new(),
-    })
+    let plan = Plan { periods, discard, phase: 0.0, exponent };
+    Ok(SweepData { variant, name, sweep: Sweep::new(scene, grid, plan)?, records: Vec::new(), points: Vec::new() })
 }
 
 impl Agenda {
@@ -186,10 +162,7 @@ impl Agenda {
         let over = |series: Series, count: usize| series.vary(series.row().range, count);
         let [c, f] = Series::ALL.map(|series| vec![over(series, extent.values[series as usize])]);
         let [map_f, map_c] = extent.map;
-        let map = vec![
-            over(Series::Friction, map_f),
-            over(Series::Clearance, map_c),
-        ];
+        let map = vec![over(Series::Friction, map_f), over(Series::Clearance, map_c)];
         let cases = Series::ALL.map(|series| {
             let [first, _, last] = series.cases().map(|case| series.of(case));
             vec![series.vary([first, last], 3)]
@@ -214,9 +187,7 @@ impl Agenda {
         let all = all.flat_map(|variant| sweeps.iter().map(move |s| (variant, s)));
         let combinations = variants.combinations.iter();
         let all = all.chain(combinations.map(|variant| (variant, &sweeps[0])));
-        let sweeps = all
-            .map(|(variant, s)| of(variant, s))
-            .collect::<Result<Vec<_>, ReproductionError>>()?;
+        let sweeps = all.map(|(variant, s)| of(variant, s)).collect::<Result<Vec<_>, ReproductionError>>()?;
         // Blocks take longest and come first, so that no thread is left with one at the end.
         let mut jobs: Vec<ReportJob> = Vec::new();
         for (s, data) in sweeps.iter().enumerate() {
@@ -224,13 +195,7 @@ impl Agenda {
         }
         jobs.extend((0..curves.len()).map(ReportJob::Curve));
         jobs.extend((0..runs.len()).map(ReportJob::Run));
-        Ok(Self {
-            extent,
-            runs,
-            curves,
-            sweeps,
-            jobs,
-        })
+        Ok(Self { extent, runs, curves, sweeps, jobs })
     }
 
     /// Number of jobs.
@@ -269,15 +234,8 @@ impl Agenda {
     ///
     /// # Errors
     /// A run stopped by the divergence guard; cancellation by `go_on`. Points of a sweep that diverge are no error.
-    pub fn run(
-        &self,
-        job: usize,
-        mut go_on: impl FnMut(f64) -> bool,
-    ) -> Result<Outcome, ReproductionError> {
-        let failed = |name: &str, error| ReproductionError::Run {
-            name: name.to_owned(),
-            error: Box::new(error),
-        };
+    pub fn run(&self, job: usize, mut go_on: impl FnMut(f64) -> bool) -> Result<Outcome, ReproductionError> {
+        let failed = |name: &str, error| ReproductionError::Run { name: name.to_owned(), error: Box::new(error) };
         match self.jobs[job] {
             ReportJob::Run(n) => {
                 let (name, _, scene) = &self.runs[n];
@@ -290,9 +248,7 @@ impl Agenda {
             ReportJob::Curve(n) => {
                 let (case, scene) = &self.curves[n];
                 let curve = curve(*case, scene, self.extent.settle, go_on);
-                Ok(Outcome::Curve(
-                    curve.map_err(|e| failed("settled curve", e))?,
-                ))
+                Ok(Outcome::Curve(curve.map_err(|e| failed("settled curve", e))?))
             }
             ReportJob::Block(s, b) => {
                 let sweep = &self.sweeps[s].sweep;
@@ -303,10 +259,7 @@ impl Agenda {
                     block.advance(2048);
                     let now = block.current().map_or(0.0, |run| run.taken() as f64 / all);
                     if !go_on(share * (block.finished().len() as f64 + now)) {
-                        return Err(failed(
-                            &self.sweeps[s].file_name(),
-                            ResponseError::Cancelled,
-                        ));
+                        return Err(failed(&self.sweeps[s].file_name(), ResponseError::Cancelled));
                     }
                 }
                 Ok(Outcome::Block(block.records()))
@@ -327,12 +280,7 @@ impl Agenda {
                 (ReportJob::Run(n), Outcome::Run(found)) => {
                     let (name, case, _) = &self.runs[*n];
                     let (response, rows) = *found;
-                    runs.push(RecordedRun {
-                        name: name.clone(),
-                        case: *case,
-                        response,
-                        rows,
-                    });
+                    runs.push(RecordedRun { name: name.clone(), case: *case, response, rows });
                 }
                 (ReportJob::Curve(_), Outcome::Curve(curve)) => curves.push(curve),
                 // Blocks of a sweep come in the order of their points.
@@ -366,11 +314,7 @@ impl Agenda {
             runs: runs.by_ref().take(3).collect(),
             sections: sweeps.next().expect("one a combination"),
         };
-        Report {
-            corrected,
-            printed,
-            combinations: variants.combinations.iter().map(combination).collect(),
-        }
+        Report { corrected, printed, combinations: variants.combinations.iter().map(combination).collect() }
     }
 }
 
@@ -388,12 +332,8 @@ fn curve(
 ) -> Result<SettledCurve, ResponseError> {
     let mut simulation = Simulation::new(scene)?;
     let mut frame = Frame::default();
-    let mut found = SettledCurve {
-        case,
-        coordinates: [Vec::new(), Vec::new()],
-        rates: [Vec::new(), Vec::new()],
-        width: [0.0; 2],
-    };
+    let mut found =
+        SettledCurve { case, coordinates: [Vec::new(), Vec::new()], rates: [Vec::new(), Vec::new()], width: [0.0; 2] };
     for n in 0..=2 * CURVE_POINTS {
         let time = PAPER.period * (settle as f64 + n as f64 / CURVE_POINTS as f64);
         while simulation.time() < time {

@@ -64,11 +64,7 @@ fn deviation(pose: &Pose, ideal: &Pose) -> [f64; COORDINATES] {
     let turn = std::f64::consts::TAU;
     std::array::from_fn(|i| {
         let d = is[i] - should[i];
-        if i < 3 {
-            d
-        } else {
-            d - turn * (d / turn).round()
-        }
+        if i < 3 { d } else { d - turn * (d / turn).round() }
     })
 }
 
@@ -156,9 +152,7 @@ impl Observation<'_> {
 
     /// Coordinates less those of the ideal motion, m and rad; NaN without one.
     pub fn deviation(&self) -> [f64; COORDINATES] {
-        self.ideal.map_or([f64::NAN; COORDINATES], |ideal| {
-            deviation(&self.frame.pose, ideal)
-        })
+        self.ideal.map_or([f64::NAN; COORDINATES], |ideal| deviation(&self.frame.pose, ideal))
     }
 }
 
@@ -176,10 +170,7 @@ pub fn respond(
     mut go_on: impl FnMut(f64) -> bool,
 ) -> Result<Response, ResponseError> {
     let mut simulation = Simulation::new(scene)?;
-    let mut ideal = Ideal {
-        simulation: ideal_of(scene),
-        frame: Frame::default(),
-    };
+    let mut ideal = Ideal { simulation: ideal_of(scene), frame: Frame::default() };
     let joints = scene.ball_joints.len();
     let mut full = Extremes::new(joints, ideal.simulation.is_some());
     let mut sampled = full.clone();
@@ -190,18 +181,13 @@ pub fn respond(
         // Examined instants and samples of the step, in order of time: the ideal motion only goes forward.
         let mut look = 0;
         loop {
-            let look_at =
-                start + (end - start) * f64::from(look) / f64::from(OBSERVATIONS_PER_STEP);
+            let look_at = start + (end - start) * f64::from(look) / f64::from(OBSERVATIONS_PER_STEP);
             let sample_at = next_sample as f64 * every;
             let is_sample = sample_at <= end.min(duration) && sample_at <= look_at;
             if !is_sample && look > OBSERVATIONS_PER_STEP {
                 break;
             }
-            let time = if is_sample {
-                sample_at
-            } else {
-                look_at.min(end)
-            };
+            let time = if is_sample { sample_at } else { look_at.min(end) };
             simulation.sample(time, &mut frame);
             let pose = ideal.at(time);
             if time <= duration {

@@ -17,16 +17,8 @@ pub struct RunContext<'a> {
 impl<'a> RunContext<'a> {
     /// `clock` returns seconds from any origin; `progress` receives the fraction done, 0 to 1, some thousand times, and
     /// may cancel.
-    pub fn new(
-        clock: &'a mut dyn FnMut() -> f64,
-        progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Self {
-        Self {
-            clock,
-            progress,
-            from: 0.0,
-            to: 1.0,
-        }
+    pub fn new(clock: &'a mut dyn FnMut() -> f64, progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>) -> Self {
+        Self { clock, progress, from: 0.0, to: 1.0 }
     }
 
     /// Seconds on the clock.
@@ -50,12 +42,7 @@ impl<'a> RunContext<'a> {
     pub fn part(&mut self, index: usize, parts: usize) -> RunContext<'_> {
         let share = (self.to - self.from) / parts.max(1) as f64;
         let from = self.from + share * index as f64;
-        RunContext {
-            clock: &mut *self.clock,
-            progress: &mut *self.progress,
-            from,
-            to: from + share,
-        }
+        RunContext { clock: &mut *self.clock, progress: &mut *self.progress, from, to: from + share }
     }
 }
 

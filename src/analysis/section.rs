@@ -139,12 +139,8 @@ impl<O: Orbit> SectionRun<O> {
         let start = self.schedule.discard.saturating_sub(ALIGNMENT);
         if self.taken == start {
             let mut twin = self.orbit.twin();
-            let mut benettin = Benettin::new(
-                separation,
-                self.schedule.interval,
-                self.orbit.time(),
-                self.schedule.kept(),
-            );
+            let mut benettin =
+                Benettin::new(separation, self.schedule.interval, self.orbit.time(), self.schedule.kept());
             benettin.start(&self.orbit, &mut twin);
             self.twin = Twin::Running(Box::new(twin), Box::new(benettin));
         }

@@ -39,12 +39,7 @@ impl Setting {
     /// The setting of a preset.
     pub fn of_preset(preset: Preset) -> Self {
         let (method, step_s, tolerance) = preset.point();
-        Self {
-            method,
-            adaptive: method.is_adaptive(),
-            step_s,
-            tolerance,
-        }
+        Self { method, adaptive: method.is_adaptive(), step_s, tolerance }
     }
 
     /// Runge-Kutta 4 at 10 microseconds, relative to which speeds are given.
@@ -64,11 +59,7 @@ impl Setting {
 
     /// The step size of a fixed-step method, s, or the tolerance of an adaptive one.
     pub fn value(&self) -> f64 {
-        if self.adaptive {
-            self.tolerance
-        } else {
-            self.step_s
-        }
+        if self.adaptive { self.tolerance } else { self.step_s }
     }
 
     /// Starts `scene` with this setting.

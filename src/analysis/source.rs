@@ -30,9 +30,7 @@ impl SceneSource {
             text: scene.source.text.clone(),
             file: scene.source.file.clone(),
             changes: scene.changes.clone(),
-            beside: texts
-                .map(|(name, text)| (name.clone(), text.to_string()))
-                .collect(),
+            beside: texts.map(|(name, text)| (name.clone(), text.to_string())).collect(),
         }
     }
 
@@ -42,9 +40,7 @@ impl SceneSource {
     /// As [`Scene::parse`].
     pub fn scene(&self) -> Result<Scene, SceneError> {
         let texts = self.beside.iter();
-        let beside = texts
-            .map(|(name, text)| (name.clone(), text.as_str().into()))
-            .collect();
+        let beside = texts.map(|(name, text)| (name.clone(), text.as_str().into())).collect();
         Scene::parse_with(&self.text, self.file.as_deref(), &beside, &self.changes)
     }
 }
@@ -68,11 +64,7 @@ pub(super) enum TaskFault {
         "{points} points with {kept} kept sections each are more than the window draws ({most} sections): take fewer values or \
          periods, or run `jointplay sweep`"
     )]
-    TooManySections {
-        points: usize,
-        kept: usize,
-        most: usize,
-    },
+    TooManySections { points: usize, kept: usize, most: usize },
     #[error("no preset is called {0}")]
     NoPreset(String),
 }

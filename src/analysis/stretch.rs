@@ -44,9 +44,7 @@ impl WorkBudget {
         evaluations: 4_000_000,
         seconds: 2.0,
         measured: 0.1,
-        steps: &[
-            1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6,
-        ],
+        steps: &[1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6],
         tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
     };
     /// More loose joints than these make runs long.
@@ -68,11 +66,7 @@ impl WorkBudget {
     }
 
     /// Cap for the reference, on which everything else depends.
-    pub(super) const REFERENCE: Self = Self {
-        evaluations: 40_000_000,
-        seconds: f64::INFINITY,
-        ..Self::FULL
-    };
+    pub(super) const REFERENCE: Self = Self { evaluations: 40_000_000, seconds: f64::INFINITY, ..Self::FULL };
 }
 
 /// How a run ended.
@@ -180,14 +174,7 @@ pub(super) fn time_to(
     for run in 0..MOST_RUNS {
         let mut simulation = start(context)?;
         let before = context.now();
-        run_until_timed(
-            &mut simulation,
-            end,
-            budget,
-            context,
-            &mut pieces,
-            &mut |_| false,
-        )?;
+        run_until_timed(&mut simulation, end, budget, context, &mut pieces, &mut |_| false)?;
         measured += context.now() - before;
         let long = measured >= LONG * budget.measured && run > 0;
         if long || (measured >= budget.measured && run + 1 >= FEWEST_RUNS) {
@@ -207,10 +194,7 @@ mod tests {
     #[test]
     fn work_is_capped_and_can_be_broken_off() {
         let scene = Scene::load("spcmm", &[]).expect("built in");
-        let small = WorkBudget {
-            evaluations: 500,
-            ..WorkBudget::QUICK
-        };
+        let small = WorkBudget { evaluations: 500, ..WorkBudget::QUICK };
         let mut clock = || 0.0;
         let mut simulation = Simulation::new(&scene).expect("starts");
         let mut go_on = |_: f64| ControlFlow::Continue(());
@@ -223,20 +207,10 @@ mod tests {
         let mut looks = 0;
         let mut stop = |_: f64| {
             looks += 1;
-            if looks > 2 {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
+            if looks > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let mut context = RunContext::new(&mut clock, &mut stop);
-        let end = advance_capped(
-            &mut simulation,
-            1.0,
-            &WorkBudget::FULL,
-            &mut context,
-            |_| false,
-        );
+        let end = advance_capped(&mut simulation, 1.0, &WorkBudget::FULL, &mut context, |_| false);
         assert_eq!(end, Err(AnalysisError::Cancelled));
     }
 
@@ -252,11 +226,7 @@ mod tests {
         };
         let mut go_on = |_: f64| ControlFlow::Continue(());
         let mut context = RunContext::new(&mut clock, &mut go_on);
-        let budget = WorkBudget {
-            measured: 1e6,
-            seconds: 1e9,
-            ..WorkBudget::QUICK
-        };
+        let budget = WorkBudget { measured: 1e6, seconds: 1e9, ..WorkBudget::QUICK };
         let mut steps = 0;
         let seconds = time_to(5e-3, &budget, &mut context, |_| {
             let mut simulation = Simulation::new(&scene)?;

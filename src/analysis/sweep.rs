@@ -41,9 +41,7 @@ pub enum SweepError {
         most: usize,
     },
     /// Longer than a run may be.
-    #[error(
-        "--periods {periods}: at {point} the longest run, {LONGEST_RUN:e} s, has {most} periods of {period} s"
-    )]
+    #[error("--periods {periods}: at {point} the longest run, {LONGEST_RUN:e} s, has {most} periods of {period} s")]
     TooLong {
         /// Periods.
         periods: usize,
@@ -84,26 +82,14 @@ impl Sweep {
     /// Nothing to keep, no drive phase, a value at which the scene cannot start.
     pub fn new(scene: Scene, grid: Grid, plan: Plan) -> Result<Self, SweepError> {
         if plan.discard >= plan.periods {
-            return Err(SweepError::NothingKept {
-                periods: plan.periods,
-                discard: plan.discard,
-            });
+            return Err(SweepError::NothingKept { periods: plan.periods, discard: plan.discard });
         }
         let (points, kept) = (grid.points(), plan.periods - plan.discard);
         if kept > MOST_SECTIONS / points {
-            return Err(SweepError::TooLarge {
-                points,
-                kept,
-                most: MOST_SECTIONS,
-            });
+            return Err(SweepError::TooLarge { points, kept, most: MOST_SECTIONS });
         }
         let layout = Layout::new(&scene, &plan);
-        let sweep = Self {
-            scene,
-            grid,
-            plan,
-            layout,
-        };
+        let sweep = Self { scene, grid, plan, layout };
         for point in sweep.tried() {
             let scene = sweep.grid.scene(&sweep.scene, point);
             let started = scene.and_then(|scene| {
@@ -124,10 +110,7 @@ impl Sweep {
                     }
                 }
                 Err(error) => {
-                    return Err(SweepError::Infeasible {
-                        point: sweep.describe(point),
-                        error: Box::new(error),
-                    });
+                    return Err(SweepError::Infeasible { point: sweep.describe(point), error: Box::new(error) });
                 }
             }
         }
@@ -142,8 +125,7 @@ impl Sweep {
             let along = || self.grid.axes().iter().zip(&indices);
             let is_end = |(axis, i): (&ParameterRange, &usize)| *i == 0 || *i + 1 == axis.count();
             let ends = along().filter(|&of| is_end(of)).count();
-            ends + 1 >= indices.len()
-                || along().all(|(axis, i)| i % axis.count().div_ceil(MOST_WITHIN) == 0)
+            ends + 1 >= indices.len() || along().all(|(axis, i)| i % axis.count().div_ceil(MOST_WITHIN) == 0)
         };
         (0..self.grid.points()).filter(tried).collect()
     }
@@ -151,10 +133,7 @@ impl Sweep {
     /// Parameters of a point as people write them.
     pub fn describe(&self, point: usize) -> String {
         let written = |(key, value): (&str, Value)| {
-            let shown = self
-                .scene
-                .parameter(key)
-                .map(|parameter| parameter.show(&value));
+            let shown = self.scene.parameter(key).map(|parameter| parameter.show(&value));
             format!("{key} = {}", shown.unwrap_or_default())
         };
         let settings = self.grid.settings(point).into_iter();
@@ -183,14 +162,7 @@ impl Sweep {
 
     /// Block `b`, not yet started.
     pub fn begin(&self, b: usize) -> BlockRun<'_> {
-        BlockRun {
-            sweep: self,
-            order: self.grid.order(b),
-            at: 0,
-            run: None,
-            machine: None,
-            done: Vec::new(),
-        }
+        BlockRun { sweep: self, order: self.grid.order(b), at: 0, run: None, machine: None, done: Vec::new() }
     }
 }
 
@@ -283,38 +255,19 @@ mod tests {
     fn maps_are_tried_within() {
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let tried = |rows: usize, columns: usize| {
-            let ranges = [
-                format!("contact.clearance=0.2mm..0.5mm:{rows}"),
-                format!("contact.friction=0.1..0.2:{columns}"),
-            ];
+            let ranges =
+                [format!("contact.clearance=0.2mm..0.5mm:{rows}"), format!("contact.friction=0.1..0.2:{columns}")];
             let axes = ranges.map(|text| ParameterRange::parse(&scene, &text).expect("a range"));
             let grid = Grid::new(&scene, axes.to_vec(), Start::Cold).expect("a map");
-            let plan = Plan {
-                periods: 2,
-                discard: 1,
-                phase: 0.0,
-                exponent: false,
-            };
+            let plan = Plan { periods: 2, discard: 1, phase: 0.0, exponent: false };
             let layout = Layout::new(&scene, &plan);
-            let sweep = Sweep {
-                scene: scene.clone(),
-                grid,
-                plan,
-                layout,
-            };
+            let sweep = Sweep { scene: scene.clone(), grid, plan, layout };
             sweep.tried()
         };
         assert_eq!(tried(3, 5), (0..15).collect::<Vec<_>>());
         // The border, and every second value of the first range and every third of the second.
         let large = tried(128, 130);
-        for (i, j, is) in [
-            (0, 1, true),
-            (127, 7, true),
-            (5, 129, true),
-            (2, 3, true),
-            (2, 4, false),
-            (3, 3, false),
-        ] {
+        for (i, j, is) in [(0, 1, true), (127, 7, true), (5, 129, true), (2, 3, true), (2, 4, false), (3, 3, false)] {
             assert_eq!(large.contains(&(i * 130 + j)), is, "{i} {j}");
         }
     }

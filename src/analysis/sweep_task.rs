@@ -117,10 +117,7 @@ pub(super) async fn run(
         ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
     let scene = task.scene.scene()?;
-    let axes = task
-        .vary
-        .iter()
-        .map(|text| ParameterRange::parse(&scene, text));
+    let axes = task.vary.iter().map(|text| ParameterRange::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>()?;
     let ranges = axes.iter().map(|axis| Range {
         key: axis.key().to_owned(),
@@ -132,20 +129,11 @@ pub(super) async fn run(
     if !(0.0..1.0).contains(&task.phase) {
         return Err(TaskFault::Phase(task.phase));
     }
-    let plan = Plan {
-        periods: task.periods,
-        discard: task.discard,
-        phase: task.phase,
-        exponent: task.exponent,
-    };
+    let plan = Plan { periods: task.periods, discard: task.discard, phase: task.phase, exponent: task.exponent };
     let grid = Grid::new(&scene, axes, task.start)?;
     let kept = task.periods.saturating_sub(task.discard);
     if kept.saturating_mul(grid.points()) > MOST_SECTIONS {
-        return Err(TaskFault::TooManySections {
-            points: grid.points(),
-            kept,
-            most: MOST_SECTIONS,
-        });
+        return Err(TaskFault::TooManySections { points: grid.points(), kept, most: MOST_SECTIONS });
     }
     let sweep = Sweep::new(scene, grid, plan)?;
     say(SweepMessage::Ranges(ranges))?;
@@ -161,13 +149,8 @@ pub(super) async fn run(
                 through += 1;
                 say(SweepMessage::Point(Box::new(point)))?;
             }
-            let part = block
-                .run
-                .current()
-                .map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
-            say(SweepMessage::Progress(
-                (through as f64 + part) / sweep.grid().points() as f64,
-            ))?;
+            let part = block.run.current().map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
+            say(SweepMessage::Progress((through as f64 + part) / sweep.grid().points() as f64))?;
         }
     }
     Ok(())
@@ -205,13 +188,7 @@ struct Block<'a> {
 
 impl<'a> Block<'a> {
     fn new(sweep: &'a Sweep, b: usize) -> Self {
-        Self {
-            run: sweep.begin(b),
-            sweep,
-            told: 0,
-            first: None,
-            before: None,
-        }
+        Self { run: sweep.begin(b), sweep, told: 0, first: None, before: None }
     }
 
     fn advance(&mut self) {
@@ -241,10 +218,7 @@ impl<'a> Block<'a> {
         let mut point = SweptPoint {
             index: *index,
             values: Vec::new(),
-            settings: settings
-                .iter()
-                .map(|(key, value)| ((*key).to_owned(), write(key, value)))
-                .collect(),
+            settings: settings.iter().map(|(key, value)| ((*key).to_owned(), write(key, value))).collect(),
             after: before.filter(|_| !cold).map(|(index, _)| index),
             first,
             interval,
@@ -261,10 +235,7 @@ impl<'a> Block<'a> {
         point.values.extend(axes.map(|(axis, i)| axis.value(i)));
         match result {
             None => point.diverged = Some(0.0),
-            Some(PointResult {
-                stopped: Some(time),
-                ..
-            }) => point.diverged = Some(*time),
+            Some(PointResult { stopped: Some(time), .. }) => point.diverged = Some(*time),
             Some(result) => {
                 tell_result(&mut point, result);
                 let periods = self.sweep.plan().periods;
@@ -284,9 +255,7 @@ fn tell_result(point: &mut SweptPoint, result: &PointResult) {
         .exponent
         .as_ref()
         .and_then(|exponent| Some((finite(exponent.value)?, finite(exponent.standard_error))));
-    let rows = result
-        .sections
-        .chunks_exact(super::drive::OBSERVABLES.len());
+    let rows = result.sections.chunks_exact(super::drive::OBSERVABLES.len());
     point.sections = rows.map(|row| std::array::from_fn(|i| row[i])).collect();
     let peaks = result.joints.iter().map(|joint| joint.peak_kept);
     point.peak = finite(peaks.fold(f64::NEG_INFINITY, f64::max));
@@ -325,11 +294,7 @@ mod tests {
         perform(&job, &mut || 0.0, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
             said.push(serde_json::from_str(&text).expect("its own text"));
-            if said.len() < most {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
+            if said.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         said
     }
@@ -461,10 +426,7 @@ mod tests {
         for (vary, words) in [
             ("contact.friction=0.3..0.1:3", "reversed"),
             ("contact.friction=0.3", "expected KEY=A..B:N"),
-            (
-                "contact.friction=0.1..0.3:900000",
-                "more than the window draws",
-            ),
+            ("contact.friction=0.1..0.3:900000", "more than the window draws"),
             ("contact.clearance=0.1mm..20mm:3", "below the ball radius"),
         ] {
             let said = told(task(&[vary]), usize::MAX);

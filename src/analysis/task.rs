@@ -55,11 +55,7 @@ impl From<SweepMessage> for Message {
 
 /// Runs `job`. `clock` returns seconds from any origin; `tell` receives each message and may cancel. The last message is
 /// [`Message::Done`] or [`Message::Failed`], unless cancelled.
-pub fn perform(
-    job: &Job,
-    clock: &mut dyn FnMut() -> f64,
-    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
-) {
+pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, tell: &mut dyn FnMut(Message) -> ControlFlow<()>) {
     let mut rest = async || {};
     let performed = pin!(perform_with_rests(job, clock, tell, &mut rest));
     let end = performed.poll(&mut Context::from_waker(Waker::noop()));
@@ -75,9 +71,7 @@ pub async fn perform_with_rests(
 ) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
-        Job::Sweep(task, share) => {
-            sweep_task::run(task, *share, &mut |message| tell(message.into()), rest).await
-        }
+        Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
     };
     let last = match outcome {
         Ok(()) => Message::Done,
@@ -125,10 +119,7 @@ mod tests {
         let own = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());
         let changes: Vec<_> = changes.iter().map(own).collect();
         let scene = Scene::load("pendulum", &changes).expect("built in");
-        Job::Presets {
-            scene: SceneSource::of(&scene),
-            presets: presets.iter().map(|&word| word.to_owned()).collect(),
-        }
+        Job::Presets { scene: SceneSource::of(&scene), presets: presets.iter().map(|&word| word.to_owned()).collect() }
     }
 
     fn messages(job: &Job, most: usize) -> Vec<Message> {
@@ -140,11 +131,7 @@ mod tests {
         let mut said = Vec::new();
         perform(job, &mut clock, &mut |message| {
             said.push(message);
-            if said.len() < most {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
+            if said.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
         said
     }
@@ -162,10 +149,7 @@ mod tests {
         };
         let error = found[0].1.peak_error.expect("the pendulum has impacts");
         assert!(error > 0.0 && error < 0.2, "{error}");
-        assert!(
-            said.iter()
-                .any(|m| matches!(m, Message::Progress(p) if *p > 0.5))
-        );
+        assert!(said.iter().any(|m| matches!(m, Message::Progress(p) if *p > 0.5)));
     }
 
     #[test]

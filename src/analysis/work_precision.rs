@@ -4,9 +4,7 @@ use serde::Serialize;
 
 use super::reference_solution::PhaseCost;
 use super::stretch::time_to;
-use super::{
-    AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front,
-};
+use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
 use crate::integrate::Method;
 use crate::scene::{Preset, Scene};
 
@@ -34,9 +32,7 @@ pub struct Phase {
 impl Phase {
     /// Simulated seconds per clock second.
     pub fn speed(&self) -> Option<f64> {
-        self.wall_s
-            .filter(|wall| *wall > 0.0)
-            .map(|wall| self.simulated_s / wall)
+        self.wall_s.filter(|wall| *wall > 0.0).map(|wall| self.simulated_s / wall)
     }
 
     /// Clock seconds per simulated second.
@@ -149,22 +145,14 @@ fn grid(budget: &WorkBudget) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisE
     let mut settings = Vec::new();
     for method in Method::ALL {
         let probe = Setting::new(method, budget.tolerances[0]);
-        let mut values = if probe.adaptive {
-            budget.tolerances.to_vec()
-        } else {
-            budget.steps.to_vec()
-        };
-        let own = presets
-            .iter()
-            .filter(|(setting, _)| setting.method == method);
+        let mut values = if probe.adaptive { budget.tolerances.to_vec() } else { budget.steps.to_vec() };
+        let own = presets.iter().filter(|(setting, _)| setting.method == method);
         values.extend(own.map(|(setting, _)| setting.value()));
         values.sort_by(|a, b| b.total_cmp(a));
         values.dedup();
         for value in values {
             let setting = Setting::new(method, value);
-            let same = presets
-                .iter()
-                .find(|(own, _)| own.method == method && own.value() == value);
+            let same = presets.iter().find(|(own, _)| own.method == method && own.value() == value);
             settings.push((setting, same.map(|(_, preset)| *preset)));
         }
     }
@@ -193,9 +181,7 @@ pub(super) fn measure(
         Err(error) => return Err(error),
     };
     let wall = match end {
-        End::Reached => Some(time_to(reference.span, budget, context, |_| {
-            setting.start(reference.scene())
-        })?),
+        End::Reached => Some(time_to(reference.span, budget, context, |_| setting.start(reference.scene()))?),
         _ => None,
     };
     let impacts = phase(end, reference.span, wall, &work);
@@ -212,13 +198,7 @@ pub(super) fn measure(
         };
         settled = Some(phase(end, span.to - span.from, wall, &work));
     }
-    Ok(Point {
-        setting,
-        preset: None,
-        impacts,
-        settled,
-        errors,
-    })
+    Ok(Point { setting, preset: None, impacts, settled, errors })
 }
 
 fn phase(end: End, simulated_s: f64, wall_s: Option<f64>, work: &PhaseCost) -> Phase {
@@ -247,11 +227,7 @@ impl Baseline {
         budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<Self, AnalysisError> {
-        let mut baseline = Self {
-            setting: Setting::baseline(),
-            impacts: None,
-            settled: None,
-        };
+        let mut baseline = Self { setting: Setting::baseline(), impacts: None, settled: None };
         baseline.again(reference, budget, context)?;
         Ok(baseline)
     }
@@ -285,9 +261,7 @@ fn mark_fronts(points: &mut [Point], floor: &Errors) {
     let on_front = |view: View, floor: Option<f64>| {
         let pair = |point| {
             let seen = view(point);
-            seen.map_or((f64::INFINITY, f64::NAN), |(phase, error)| {
-                (phase.wall_s.unwrap_or(f64::INFINITY), error)
-            })
+            seen.map_or((f64::INFINITY, f64::NAN), |(phase, error)| (phase.wall_s.unwrap_or(f64::INFINITY), error))
         };
         let pairs: Vec<_> = points.iter().map(pair).collect();
         front(&pairs, floor.unwrap_or(0.0))

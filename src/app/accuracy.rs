@@ -50,8 +50,7 @@ impl AccuracyLine {
             if self.doubtful {
                 text = text.color(ui.visuals().warn_fg_color).strong();
             }
-            ui.add(Label::new(text).truncate())
-                .on_hover_text(&self.help);
+            ui.add(Label::new(text).truncate()).on_hover_text(&self.help);
         });
     }
 }
@@ -161,14 +160,11 @@ impl Accuracy {
             let clicked = ui
                 .add_enabled(running || preset.is_some(), button)
                 .on_hover_text(help)
-                .on_disabled_hover_text(
-                    "Presets are measured; the present method and tolerance are none",
-                )
+                .on_disabled_hover_text("Presets are measured; the present method and tolerance are none")
                 .clicked();
             if running {
                 let bar = ProgressBar::new(self.progress as f32).show_percentage();
-                ui.add(bar.desired_width(ui.available_width()))
-                    .accessible_name("Measured so far");
+                ui.add(bar.desired_width(ui.available_width())).accessible_name("Measured so far");
             }
             match preset {
                 _ if !clicked => {}
@@ -176,10 +172,7 @@ impl Accuracy {
                 None => {}
                 Some(preset) => {
                     let scene = model_of(player);
-                    let job = Job::Presets {
-                        scene: scene.clone(),
-                        presets: vec![preset.word().to_owned()],
-                    };
+                    let job = Job::Presets { scene: scene.clone(), presets: vec![preset.word().to_owned()] };
                     self.asked = Some((job, scene, preset));
                 }
             }
@@ -192,17 +185,9 @@ impl Accuracy {
         let own = self.found.as_ref();
         let here = own.filter(|found| Some(found.preset) == preset && found.scene == scene);
         let (measured, place) = match (here, preset) {
-            (Some(found), _) => (
-                Some(found.measured),
-                "on this scene with its present values",
-            ),
-            (None, Some(preset))
-                if scene.changes.is_empty() && player.wanted().source.file.is_none() =>
-            {
-                (
-                    presets::measured(&player.wanted().name, preset),
-                    "on this scene as it comes with the program",
-                )
+            (Some(found), _) => (Some(found.measured), "on this scene with its present values"),
+            (None, Some(preset)) if scene.changes.is_empty() && player.wanted().source.file.is_none() => {
+                (presets::measured(&player.wanted().name, preset), "on this scene as it comes with the program")
             }
             _ => (None, ""),
         };
@@ -245,11 +230,7 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     let is = |preset: &Preset| {
         let (method, step, tolerance) = preset.point();
         method == solver.method
-            && if method.is_adaptive() {
-                tolerance == solver.tolerance
-            } else {
-                step == solver.step
-            }
+            && if method.is_adaptive() { tolerance == solver.tolerance } else { step == solver.step }
     };
     let chosen = solver.preset.filter(|preset| is(preset));
     chosen.or_else(|| Preset::ALL.into_iter().find(is))
@@ -270,10 +251,7 @@ fn joint(player: &Player, index: usize) -> &str {
 }
 
 fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
-    let name = preset.map_or_else(
-        || "no preset".to_owned(),
-        |preset| format!("what the preset {} has", preset.word()),
-    );
+    let name = preset.map_or_else(|| "no preset".to_owned(), |preset| format!("what the preset {} has", preset.word()));
     AccuracyLine {
         label: "Runs with",
         value: value::solver(player.wanted()),
@@ -287,10 +265,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
 
 fn capacity(player: &Player) -> AccuracyLine {
     let (value, doubtful) = match player.capacity() {
-        Some(ratio) => (
-            format!("{} × real time", value::number(ratio, 2)),
-            ratio < player.pacer.scale(),
-        ),
+        Some(ratio) => (format!("{} × real time", value::number(ratio, 2)), ratio < player.pacer.scale()),
         None => ("not measured yet".to_owned(), false),
     };
     AccuracyLine {
@@ -312,19 +287,14 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         doubtful,
         help,
     };
-    let what = impact.map_or_else(
-        || "none yet".to_owned(),
-        |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)),
-    );
+    let what = impact
+        .map_or_else(|| "none yet".to_owned(), |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)));
     let ratio = |impact: &Impact| {
         let [given, asked] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
         format!("{given}, asked {asked}")
     };
     let law = impact.map_or_else(String::new, |impact| {
-        format!(
-            " An undisturbed impact under its normal-force law gives {}.",
-            value::number(impact.law, 3)
-        )
+        format!(" An undisturbed impact under its normal-force law gives {}.", value::number(impact.law, 3))
     });
     [
         row(
@@ -382,10 +352,7 @@ fn residual(player: &Player) -> AccuracyLine {
     );
     AccuracyLine {
         label: "Energy residual",
-        value: share.map_or_else(
-            || NONE.to_owned(),
-            |share| format!("{}, relative", value::power_of_ten(share)),
-        ),
+        value: share.map_or_else(|| NONE.to_owned(), |share| format!("{}, relative", value::power_of_ten(share))),
         doubtful: share.is_some_and(|share| share > BALANCED),
         help: format!(
             "Energy that the ledger cannot account for since the start, over the energy exchanged. {exchanged} Amber beyond {}.",

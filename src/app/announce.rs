@@ -48,12 +48,7 @@ impl Announcer {
     /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did and, if one is due later, after how long to
     /// ask again. `news` is what the application itself has to say.
     pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
-        let occasion = format!(
-            "{} {} {} {news}",
-            player.scene().name,
-            player.is_playing(),
-            player.stopped().is_some()
-        );
+        let occasion = format!("{} {} {} {news}", player.scene().name, player.is_playing(), player.stopped().is_some());
         let event = occasion != self.occasion;
         let standing = sentences(player, news, None);
         if standing == self.standing && self.strongest.is_none() {
@@ -110,9 +105,7 @@ fn joints(player: &Player) -> Option<String> {
         return None;
     }
     if reports.len() > MOST_JOINTS {
-        let free = reports
-            .iter()
-            .filter(|joint| joint.state == ContactState::Free);
+        let free = reports.iter().filter(|joint| joint.state == ContactState::Free);
         let free = free.count();
         return Some(format!(
             "Of {} ball joints {free} are free and {} in contact.",
@@ -169,10 +162,7 @@ mod tests {
         let mut player = player("pendulum");
         let mut announcer = Announcer::default();
         assert_eq!(announcer.update(0.0, &player, ""), (true, None));
-        assert_eq!(
-            announcer.text(),
-            "Pendulum on a ball joint. Paused at the start. S1 free."
-        );
+        assert_eq!(announcer.text(), "Pendulum on a ball joint. Paused at the start. S1 free.");
         player.pacer.set_scale(0.02);
         player.set_playing(true);
         assert!(announcer.update(0.1, &player, "").0, "at once");
@@ -217,10 +207,7 @@ mod tests {
         let mut announcer = Announcer::default();
         announcer.update(0.0, &rests, "");
         let text = announcer.text();
-        assert!(
-            text.contains("S1 settled, ") && text.contains(" newtons"),
-            "{text}"
-        );
+        assert!(text.contains("S1 settled, ") && text.contains(" newtons"), "{text}");
         let mut announcer = Announcer::default();
         announcer.update(0.0, &player("chain"), "");
         let all_free = "Of 8 ball joints 8 are free and 0 in contact.";

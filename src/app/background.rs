@@ -50,11 +50,7 @@ impl Thread {
         };
         let builder = std::thread::Builder::new().name("computation".to_owned());
         builder.spawn(work).ok()?;
-        Some(Self {
-            messages: Some(messages),
-            cancelled,
-            rest,
-        })
+        Some(Self { messages: Some(messages), cancelled, rest })
     }
 }
 

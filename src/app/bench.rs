@@ -75,11 +75,7 @@ impl Bench {
             ui.label("Coordinate");
             self.coordinate.ui(ui);
         });
-        let Self {
-            coordinate,
-            portrait,
-            sweep,
-        } = self;
+        let Self { coordinate, portrait, sweep } = self;
         let help = "How fast neighbouring motions of the running scene part";
         part(ui, "Neighbouring motion", help, |ui| {
             divergence::ui(ui, player);

@@ -30,24 +30,15 @@ impl Canvas {
         render::install(&state);
         let ctx = egui::Context::default();
         ctx.set_fonts(theme::fonts());
-        Self {
-            ctx,
-            time: 0.0,
-            state,
-        }
+        Self { ctx, time: 0.0, state }
     }
 
     /// A canvas on the device of a window; it shares none of the window's textures and pipelines.
     pub fn beside(window: &RenderState) -> Self {
         // Pixels are read back as red, green, blue, whatever the order in the window.
         let target_format = wgpu::TextureFormat::Rgba8Unorm;
-        let renderer =
-            egui_wgpu::Renderer::new(&window.device, target_format, RendererOptions::PREDICTABLE);
-        Self::new(RenderState {
-            renderer: Arc::new(RwLock::new(renderer)),
-            target_format,
-            ..window.clone()
-        })
+        let renderer = egui_wgpu::Renderer::new(&window.device, target_format, RendererOptions::PREDICTABLE);
+        Self::new(RenderState { renderer: Arc::new(RwLock::new(renderer)), target_format, ..window.clone() })
     }
 
     /// The device.
@@ -75,11 +66,7 @@ impl Canvas {
             max_texture_side: Some(limit as usize),
             ..Default::default()
         };
-        input
-            .viewports
-            .entry(egui::ViewportId::ROOT)
-            .or_default()
-            .native_pixels_per_point = Some(scale);
+        input.viewports.entry(egui::ViewportId::ROOT).or_default().native_pixels_per_point = Some(scale);
         let mut output = self.ctx.run_ui(input, |ui| show(ui));
         self.upload(&mut output);
         Ok(output)
@@ -105,26 +92,16 @@ impl Canvas {
         scale: f32,
     ) -> (Vec<wgpu::CommandBuffer>, wgpu::Texture) {
         let (device, queue) = (&self.state.device, &self.state.queue);
-        let screen = ScreenDescriptor {
-            pixels_per_point: scale,
-            size_in_pixels: size,
-        };
+        let screen = ScreenDescriptor { pixels_per_point: scale, size_in_pixels: size };
         let primitives = self.ctx.tessellate(output.shapes, scale);
         let fill = self.ctx.global_style().visuals.panel_fill;
         let [r, g, b, a] = fill.to_normalized_gamma_f32().map(f64::from);
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("interface"),
-        });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("interface") });
         let mut renderer = self.state.renderer.write();
-        let mut commands =
-            renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
+        let mut commands = renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("interface"),
-            size: wgpu::Extent3d {
-                width: size[0],
-                height: size[1],
-                depth_or_array_layers: 1,
-            },
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -170,12 +147,7 @@ impl Canvas {
         let arrival = readback.request();
         let wrong = wrong.pop();
         let short = short.pop();
-        Pending {
-            device,
-            readback,
-            arrival,
-            faults: vec![Box::pin(short), Box::pin(wrong)],
-        }
+        Pending { device, readback, arrival, faults: vec![Box::pin(short), Box::pin(wrong)] }
     }
 }
 
@@ -230,9 +202,7 @@ impl Pending {
     /// The device fails.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn wait(mut self) -> Result<Image, RenderError> {
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(device_error)?;
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
         let never = || Err(device_error("the picture never came back"));
         self.take().unwrap_or_else(never)
     }

@@ -61,12 +61,7 @@ pub fn mass(scene: &Scene) -> f64 {
 }
 
 /// Writes the clicks of the `impacts` that ended within `stretch` to `out`, in their order; `mass` is that of all bodies, kg.
-pub fn clicks<'a>(
-    impacts: impl Iterator<Item = &'a Impact>,
-    stretch: &Stretch,
-    mass: f64,
-    out: &mut Vec<Click>,
-) {
+pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, stretch: &Stretch, mass: f64, out: &mut Vec<Click>) {
     out.clear();
     let within = |impact: &&Impact| stretch.from < impact.end && impact.end <= stretch.to;
     out.extend(impacts.filter(within).map(|impact| {
@@ -158,11 +153,7 @@ mod tests {
         out
     }
 
-    const SECOND: Stretch = Stretch {
-        from: 1.0,
-        to: 2.0,
-        lasts: 0.05,
-    };
+    const SECOND: Stretch = Stretch { from: 1.0, to: 2.0, lasts: 0.05 };
 
     #[test]
     fn a_stretch_has_the_impacts_that_ended_in_it_at_their_times() {
@@ -172,11 +163,7 @@ mod tests {
         let times: Vec<f64> = heard.iter().map(|click| click.after).collect();
         assert_eq!(times, [0.0125, 0.05]);
         // What one stretch leaves, the next has: none twice, none lost.
-        let next = Stretch {
-            from: 2.0,
-            to: 3.0,
-            ..SECOND
-        };
+        let next = Stretch { from: 2.0, to: 3.0, ..SECOND };
         assert_eq!(of(&impacts, next).len(), 1);
         let nothing = Stretch { to: 1.0, ..SECOND };
         assert!(of(&impacts, nothing).is_empty());
@@ -207,15 +194,8 @@ mod tests {
 
     #[test]
     fn of_many_impacts_the_loudest_are_heard_in_their_order() {
-        let impacts: Vec<Impact> = (1..=40)
-            .map(|k| {
-                impact(
-                    1.0 + f64::from(k) / 50.0,
-                    1e-4,
-                    1e-3 * f64::from(k * 7 % 41),
-                )
-            })
-            .collect();
+        let impacts: Vec<Impact> =
+            (1..=40).map(|k| impact(1.0 + f64::from(k) / 50.0, 1e-4, 1e-3 * f64::from(k * 7 % 41))).collect();
         let heard = of(&impacts, SECOND);
         assert_eq!(heard.len(), MOST_CLICKS);
         assert!(heard.is_sorted_by(|a, b| a.after < b.after));
@@ -252,10 +232,7 @@ mod tests {
             simulation.take_impacts(&mut impacts);
             for impact in impacts.drain(..) {
                 let estimate = impulse(&impact, mass(&scene));
-                assert!(
-                    (estimate / sum - 1.0).abs() < 0.2,
-                    "{estimate} N s for {sum} N s, {impact:?}"
-                );
+                assert!((estimate / sum - 1.0).abs() < 0.2, "{estimate} N s for {sum} N s, {impact:?}");
                 sum = 0.0;
                 compared += 1;
             }
@@ -290,11 +267,7 @@ mod tests {
     #[test]
     fn a_click_has_its_pitch_and_loudness_and_ends() {
         for pitch in [100.0, 440.0, 2600.0, 8000.0] {
-            let click = Click {
-                after: 0.0,
-                pitch,
-                loudness: 1.0,
-            };
+            let click = Click { after: 0.0, pitch, loudness: 1.0 };
             let samples: Vec<f32> = Voice::new(&click, RATE).collect();
             assert_eq!(samples, Voice::new(&click, RATE).collect::<Vec<f32>>());
             let (near, peak) = spectrum(&samples, pitch);
@@ -313,9 +286,7 @@ mod tests {
             // A quarter of the energy at half the loudness.
             let energy = |loudness| -> f64 {
                 let voice = Voice::new(&Click { loudness, ..click }, RATE);
-                voice
-                    .map(|sample| f64::from(sample) * f64::from(sample))
-                    .sum()
+                voice.map(|sample| f64::from(sample) * f64::from(sample)).sum()
             };
             let whole = 0.25 * AMPLITUDE * AMPLITUDE * decay;
             assert!((energy(1.0) / whole - 1.0).abs() < 0.05, "{pitch} Hz");
@@ -325,11 +296,7 @@ mod tests {
 
     #[test]
     fn a_slow_device_gets_what_it_can_sound() {
-        let click = Click {
-            after: 0.0,
-            pitch: 8000.0,
-            loudness: 1.0,
-        };
+        let click = Click { after: 0.0, pitch: 8000.0, loudness: 1.0 };
         let samples: Vec<f32> = Voice::new(&click, 8000.0).collect();
         assert!(samples.iter().any(|sample| sample.abs() > 0.1));
         assert!(samples.iter().all(|sample| sample.abs() <= 1.0));

@@ -4,27 +4,21 @@
 use std::collections::HashMap;
 
 use eframe::egui::{
-    self, ComboBox, DragValue, FontId, Frame, Rect, RectAlign, Response, RichText, Slider,
-    SliderClamping, TextEdit, Tooltip, Ui,
+    self, ComboBox, DragValue, FontId, Frame, Rect, RectAlign, Response, RichText, Slider, SliderClamping, TextEdit,
+    Tooltip, Ui,
 };
 
 use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{keys, theme, value};
-use crate::scene::{
-    Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
-};
+use crate::scene::{Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display};
 use crate::simulate::{ChangeError, Effect};
 
 /// Shown with the accuracy that it gives.
 const PRESET: &str = "solver.preset";
 /// Parameters shown first.
-const FIRST: [&str; 3] = [
-    "contact.clearance",
-    "contact.friction",
-    "contact.restitution",
-];
+const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
 
 /// Side of the undo button, points.
 const UNDO: f32 = 22.0;
@@ -70,8 +64,7 @@ impl Controls {
 
     /// All controls, one under the other.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
-        ui.label(RichText::new(&player.scene().title).small().weak())
-            .on_hover_text(&player.scene().description);
+        ui.label(RichText::new(&player.scene().title).small().weak()).on_hover_text(&player.scene().description);
         ui.add_space(2.0);
         self.few(ui, player);
         let table = player.wanted().parameters();
@@ -86,9 +79,7 @@ impl Controls {
         }
         for group in groups {
             let rest = || {
-                let apart = |p: &Parameter| {
-                    FIRST.contains(&p.key) || p.key == PRESET || p.scope == Scope::Own
-                };
+                let apart = |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || p.scope == Scope::Own;
                 table.iter().filter(move |p| p.group == group && !apart(p))
             };
             if rest().next().is_none() {
@@ -119,34 +110,22 @@ impl Controls {
     }
 
     /// The preset, and the accuracy of the running scene.
-    fn accuracy_ui(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        accuracy: &mut Accuracy,
-        table: &[&'static Parameter],
-    ) {
-        let header = egui::CollapsingHeader::new(RichText::new("Accuracy").strong())
-            .default_open(true)
-            .show(ui, |ui| {
+    fn accuracy_ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy, table: &[&'static Parameter]) {
+        let header =
+            egui::CollapsingHeader::new(RichText::new("Accuracy").strong()).default_open(true).show(ui, |ui| {
                 if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
                     self.control(ui, player, parameter, PRESET);
                 }
                 accuracy.ui(ui, player);
             });
-        header.header_response.on_hover_text(
-            "How far the numbers can be trusted. Method, step and tolerance are set under Solver.",
-        );
+        header
+            .header_response
+            .on_hover_text("How far the numbers can be trusted. Method, step and tolerance are set under Solver.");
     }
 
     /// Contact parameters of one ball joint, which override the scene's.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
-        let names: Vec<String> = player
-            .wanted()
-            .ball_joints
-            .iter()
-            .map(|j| j.name.clone())
-            .collect();
+        let names: Vec<String> = player.wanted().ball_joints.iter().map(|j| j.name.clone()).collect();
         if names.is_empty() {
             return;
         }
@@ -170,36 +149,20 @@ impl Controls {
                 self.control(ui, player, parameter, &format!("joint.{joint}.{last}"));
             }
         });
-        header.header_response.on_hover_text(
-            "Values of one ball joint only; they override those of the whole scene.",
-        );
+        header.header_response.on_hover_text("Values of one ball joint only; they override those of the whole scene.");
     }
 
     /// One parameter under `key`, which may be a joint's own.
-    fn control(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        parameter: &'static Parameter,
-        key: &str,
-    ) {
+    fn control(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str) {
         // A key that the scene no longer has (a shorter chain) has no control.
         let Ok(now) = player.wanted().get(key) else {
             return;
         };
-        let name = match key
-            .strip_prefix("joint.")
-            .and_then(|rest| rest.rsplit_once('.'))
-        {
+        let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
             Some((joint, _)) => format!("{} of {joint}", parameter.label),
             None => parameter.label.to_owned(),
         };
-        let row = Row {
-            parameter,
-            key,
-            name,
-            now,
-        };
+        let row = Row { parameter, key, name, now };
         ui.push_id(key, |ui| match &parameter.kind {
             Kind::Number { .. } => self.number(ui, player, &row),
             Kind::Choice(words) => self.choice(ui, player, &row, words),
@@ -211,10 +174,7 @@ impl Controls {
         let beats = player.keys_overriding_preset();
         if key == PRESET && !beats.is_empty() {
             let names: Vec<&str> = beats.iter().filter_map(|k| k.split('.').nth(1)).collect();
-            let words = format!(
-                "The scene's file gives {}: it wins over a preset",
-                names.join(", ")
-            );
+            let words = format!("The scene's file gives {}: it wins over a preset", names.join(", "));
             ui.label(RichText::new(words).small().weak());
         }
         if player.is_waiting(key) {
@@ -226,13 +186,7 @@ impl Controls {
     }
 
     fn number(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
-        let Kind::Number {
-            display,
-            slider,
-            logarithmic,
-            ..
-        } = row.parameter.kind
-        else {
+        let Kind::Number { display, slider, logarithmic, .. } = row.parameter.kind else {
             return;
         };
         let Value::Number(si) = row.now else {
@@ -255,11 +209,7 @@ impl Controls {
         let changed = response.changed();
         response.accessible_name(&row.name);
         if changed {
-            self.set(
-                player,
-                row.key,
-                &format_quantity_digits(from_display(shown, display), display, 4),
-            );
+            self.set(player, row.key, &format_quantity_digits(from_display(shown, display), display, 4));
         }
     }
 
@@ -281,10 +231,7 @@ impl Controls {
                 .selected_text(text)
                 .show_ui(ui, |ui| {
                     for word in words {
-                        if ui
-                            .selectable_label(now == Value::Choice(word), *word)
-                            .clicked()
-                        {
+                        if ui.selectable_label(now == Value::Choice(word), *word).clicked() {
                             chosen = Some(*word);
                         }
                     }
@@ -305,11 +252,7 @@ impl Controls {
         let room = 78.0 + theme::side(ui, UNDO);
         self.heading(ui, player, room, row, |this, ui, player| {
             this.default_button(ui, player, row);
-            let response = ui.add(
-                DragValue::new(&mut count)
-                    .range(min..=max)
-                    .update_while_editing(false),
-            );
+            let response = ui.add(DragValue::new(&mut count).range(min..=max).update_while_editing(false));
             tooltip(ui, &response, player, row);
             let changed = response.changed();
             response.accessible_name(&row.name);
@@ -336,11 +279,7 @@ impl Controls {
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let mut rest = Some(rest);
         ui.horizontal(|ui| {
-            let text = if FIRST.contains(&row.key) {
-                RichText::new(name).strong()
-            } else {
-                RichText::new(name)
-            };
+            let text = if FIRST.contains(&row.key) { RichText::new(name).strong() } else { RichText::new(name) };
             let label = ui.label(text);
             tooltip(ui, &label, player, row);
             if !below && let Some(rest) = rest.take() {
@@ -356,10 +295,7 @@ impl Controls {
     /// Text field; unreadable input stays to be corrected.
     fn entry(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let shown = row.shown();
-        let mut text = self
-            .drafts
-            .get(row.key)
-            .map_or_else(|| shown.clone(), |draft| draft.text.clone());
+        let mut text = self.drafts.get(row.key).map_or_else(|| shown.clone(), |draft| draft.text.clone());
         let font = fitting(ui, &text, ENTRY - 2.0 * f32::from(MARGIN));
         let response = ui.add(
             TextEdit::singleline(&mut text)
@@ -371,23 +307,13 @@ impl Controls {
                 .margin(egui::Margin::symmetric(MARGIN, 3)),
         );
         if response.changed() {
-            self.drafts.insert(
-                row.key.to_owned(),
-                Draft {
-                    text: text.clone(),
-                    error: None,
-                },
-            );
+            self.drafts.insert(row.key.to_owned(), Draft { text: text.clone(), error: None });
         }
         if response.lost_focus() {
             if ui.input(|i| i.key_pressed(egui::Key::Escape)) {
                 self.drafts.remove(row.key);
             } else if text != shown {
-                self.set(
-                    player,
-                    row.key,
-                    &value::completed(&text, &row.parameter.kind),
-                );
+                self.set(player, row.key, &value::completed(&text, &row.parameter.kind));
                 if let Some(draft) = self.drafts.get_mut(row.key) {
                     draft.text = text;
                 }
@@ -400,10 +326,7 @@ impl Controls {
     fn default_button(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let size = theme::side(ui, UNDO);
         // Keep the space where there is nothing to undo, so that rows stay aligned.
-        let Some(original) = player
-            .original(row.key)
-            .filter(|original| *original != row.now)
-        else {
+        let Some(original) = player.original(row.key).filter(|original| *original != row.now) else {
             ui.allocate_space(egui::Vec2::splat(size));
             return;
         };
@@ -429,23 +352,14 @@ impl Controls {
             Err(error) => {
                 // The control shows which key it is.
                 let reason = match error {
-                    ChangeError::Scene(SceneError {
-                        value: Some(value),
-                        message,
-                        ..
-                    }) => {
+                    ChangeError::Scene(SceneError { value: Some(value), message, .. }) => {
                         format!("{value}: {message}")
                     }
                     ChangeError::Scene(error) => error.message,
                     ChangeError::Method(error) => error.to_string(),
-                    pull @ (ChangeError::NoBody { .. } | ChangeError::TooFar { .. }) => {
-                        pull.to_string()
-                    }
+                    pull @ (ChangeError::NoBody { .. } | ChangeError::TooFar { .. }) => pull.to_string(),
                 };
-                let draft = Draft {
-                    text: text.to_owned(),
-                    error: Some(reason),
-                };
+                let draft = Draft { text: text.to_owned(), error: Some(reason) };
                 self.drafts.insert(key.to_owned(), draft);
             }
         }
@@ -456,11 +370,7 @@ impl Controls {
 fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
     let body = egui::TextStyle::Body.resolve(ui.style());
     let colour = ui.visuals().text_color();
-    let width = ui
-        .painter()
-        .layout_no_wrap(text.to_owned(), body.clone(), colour)
-        .size()
-        .x;
+    let width = ui.painter().layout_no_wrap(text.to_owned(), body.clone(), colour).size().x;
     // Rounded down to half a point, so that glyphs of few sizes are cached.
     let size = (2.0 * body.size * (room / width).clamp(0.7, 1.0)).floor() / 2.0;
     FontId::new(size, body.family)
@@ -474,11 +384,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     let row = Rect::from_x_y_ranges(panel, response.rect.y_range());
     let frame = Frame::popup(ui.style()).total_margin().sum().x;
     let mut tooltip = Tooltip::for_enabled(response).width(panel.span() - frame);
-    tooltip.popup = tooltip
-        .popup
-        .anchor(row)
-        .align(RectAlign::BOTTOM_START)
-        .align_alternatives(&ABOVE);
+    tooltip.popup = tooltip.popup.anchor(row).align(RectAlign::BOTTOM_START).align_alternatives(&ABOVE);
     tooltip.show(|ui| {
         ui.strong(parameter.label);
         ui.label(value::typeset(parameter.help));
@@ -491,9 +397,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         }
         let mut range = value::typeset(&parameter.range());
         if parameter.key == "contact.clearance"
-            && let Ok(Value::Number(radius)) = player
-                .wanted()
-                .get(&key.replace("clearance", "ball_radius"))
+            && let Ok(Value::Number(radius)) = player.wanted().get(&key.replace("clearance", "ball_radius"))
         {
             range = format!("{range} ({})", value::quantity(radius, "mm", 6));
         }
@@ -522,19 +426,12 @@ mod tests {
             let room = ENTRY - 2.0 * f32::from(MARGIN);
             let width = |text: &str| {
                 let font = fitting(ui, text, room);
-                let galley = ui.painter().layout_no_wrap(
-                    text.to_owned(),
-                    font.clone(),
-                    egui::Color32::BLACK,
-                );
+                let galley = ui.painter().layout_no_wrap(text.to_owned(), font.clone(), egui::Color32::BLACK);
                 (font.size, galley.size().x)
             };
             assert_eq!(width("0.3 mm").0, 14.0);
             let (size, across) = width("0.568462 mm");
-            assert!(
-                (10.0..14.0).contains(&size) && across <= room,
-                "{size} {across}"
-            );
+            assert!((10.0..14.0).contains(&size) && across <= room, "{size} {across}");
         });
         // Nothing is drawn.
         output.textures_delta.clear();

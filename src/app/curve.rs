@@ -49,13 +49,7 @@ pub struct Curves<'a> {
 impl<'a> Curves<'a> {
     /// Curves over axes with the given `units`: of time in s, and of the value in SI units.
     pub fn new(traces: &'a [Trace], units: [f64; 2]) -> Self {
-        Self {
-            base: PlotItemBase::new("curves".to_owned()),
-            traces,
-            units,
-            width: WIDTH,
-            dashed: false,
-        }
+        Self { base: PlotItemBase::new("curves".to_owned()), traces, units, width: WIDTH, dashed: false }
     }
 
     /// Thin and dashed, for a constant level rather than a motion.
@@ -67,9 +61,8 @@ impl<'a> Curves<'a> {
     fn mesh(&self, transform: &PlotTransform, scale: f32) -> Mesh {
         let frame = transform.frame();
         let bounds = transform.bounds();
-        let per = |d: usize, length: f32| {
-            f64::from(length * scale) / (bounds.max()[d] - bounds.min()[d]) / self.units[d]
-        };
+        let per =
+            |d: usize, length: f32| f64::from(length * scale) / (bounds.max()[d] - bounds.min()[d]) / self.units[d];
         let (across, up) = (per(0, frame.width()), per(1, frame.height()));
         let origin = [
             f64::from(frame.left() * scale) - bounds.min()[0] * self.units[0] * across,
@@ -78,31 +71,22 @@ impl<'a> Curves<'a> {
         let first = (frame.left() * scale).floor() as i64;
         let count = ((frame.right() * scale).ceil() as i64 - first).max(0) as usize;
         // Far outside is as good as outside.
-        let (top, bottom) = (
-            frame.top() - frame.height(),
-            frame.bottom() + frame.height(),
-        );
+        let (top, bottom) = (frame.top() - frame.height(), frame.bottom() + frame.height());
         let clip = (f64::from(top * scale), f64::from(bottom * scale));
         let place = |time: f64, value: f64| {
             let y = (origin[1] - value * up).clamp(clip.0, clip.1);
             [origin[0] + time * across, y]
         };
         let width = self.width * scale;
-        let all: Vec<Vec<Bar>> = self
-            .traces
-            .iter()
-            .map(|trace| bars(&spans(&trace.bins, place, first, count), width))
-            .collect();
+        let all: Vec<Vec<Bar>> =
+            self.traces.iter().map(|trace| bars(&spans(&trace.bins, place, first, count), width)).collect();
         let dash = (DASH * scale).round().max(1.0);
         let mut mesh = Mesh::default();
         let mut here: Vec<(usize, Bar)> = Vec::new();
         let mut groups: Vec<Vec<(usize, Bar)>> = Vec::new();
         for column in 0..count {
             here.clear();
-            let present = all
-                .iter()
-                .enumerate()
-                .map(|(index, bars)| (index, bars[column]));
+            let present = all.iter().enumerate().map(|(index, bars)| (index, bars[column]));
             here.extend(present.filter(|(_, bar)| bar.height() > 0.0));
             if self.dashed {
                 let gap = (column as f32 / dash) as usize % 2 == 1;
@@ -110,11 +94,7 @@ impl<'a> Curves<'a> {
             }
             // Curves that run side by side keep their order, whichever is steeper just here.
             let rank = |bar: &Bar| {
-                if bar.height() > 3.0 * width {
-                    bar.height()
-                } else {
-                    0.0
-                }
+                if bar.height() > 3.0 * width { bar.height() } else { 0.0 }
             };
             here.sort_by(|a, b| rank(&b.1).total_cmp(&rank(&a.1)));
             groups.clear();
@@ -126,9 +106,7 @@ impl<'a> Curves<'a> {
             }
             let x = (first + column as i64) as f32;
             for group in &groups {
-                paint(&mut mesh, x, scale, dash, group, |index| {
-                    self.traces[index].colour
-                });
+                paint(&mut mesh, x, scale, dash, group, |index| self.traces[index].colour);
             }
         }
         mesh
@@ -136,47 +114,21 @@ impl<'a> Curves<'a> {
 }
 
 /// Paints the pixel column at `x`: one bar, or several that coincide and alternate along it.
-fn paint(
-    mesh: &mut Mesh,
-    x: f32,
-    scale: f32,
-    dash: f32,
-    group: &[(usize, Bar)],
-    colour: impl Fn(usize) -> Color32,
-) {
+fn paint(mesh: &mut Mesh, x: f32, scale: f32, dash: f32, group: &[(usize, Bar)], colour: impl Fn(usize) -> Color32) {
     if let [(index, bar)] = group {
-        bar.paint(
-            mesh,
-            x,
-            scale,
-            (f32::NEG_INFINITY, f32::INFINITY),
-            colour(*index),
-        );
+        bar.paint(mesh, x, scale, (f32::NEG_INFINITY, f32::INFINITY), colour(*index));
         return;
     }
     // Alternate along the longer side, so that level and steep stretches look alike.
     let turn = |piece: i64| group[piece.rem_euclid(group.len() as i64) as usize];
-    let tallest = group
-        .iter()
-        .map(|(_, bar)| bar.height())
-        .fold(0.0, f32::max);
+    let tallest = group.iter().map(|(_, bar)| bar.height()).fold(0.0, f32::max);
     if tallest <= 0.5 * dash {
         let (index, bar) = turn((x / dash).floor() as i64);
-        bar.paint(
-            mesh,
-            x,
-            scale,
-            (f32::NEG_INFINITY, f32::INFINITY),
-            colour(index),
-        );
+        bar.paint(mesh, x, scale, (f32::NEG_INFINITY, f32::INFINITY), colour(index));
         return;
     }
-    let ends = group
-        .iter()
-        .map(|(_, bar)| (bar.top - bar.soft_top, bar.bottom + bar.soft_bottom));
-    let (low, high) = ends.fold((f32::INFINITY, f32::NEG_INFINITY), |a, b| {
-        (a.0.min(b.0), a.1.max(b.1))
-    });
+    let ends = group.iter().map(|(_, bar)| (bar.top - bar.soft_top, bar.bottom + bar.soft_bottom));
+    let (low, high) = ends.fold((f32::INFINITY, f32::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     for piece in (low / dash).floor() as i64..=(high / dash).floor() as i64 {
         let (index, bar) = turn(piece);
         let ends = (piece as f32 * dash, (piece + 1) as f32 * dash);
@@ -192,10 +144,7 @@ struct Span {
 }
 
 impl Span {
-    const NOTHING: Self = Self {
-        top: f32::INFINITY,
-        bottom: f32::NEG_INFINITY,
-    };
+    const NOTHING: Self = Self { top: f32::INFINITY, bottom: f32::NEG_INFINITY };
 
     fn reach(&mut self, y: f64) {
         self.top = self.top.min(y as f32);
@@ -203,20 +152,12 @@ impl Span {
     }
 
     fn join(self, other: Self) -> Self {
-        Self {
-            top: self.top.min(other.top),
-            bottom: self.bottom.max(other.bottom),
-        }
+        Self { top: self.top.min(other.top), bottom: self.bottom.max(other.bottom) }
     }
 }
 
 /// Spans of the pixel columns from `first` on for a curve through `bins`; `place` maps time and value to pixels.
-fn spans(
-    bins: &[Bin],
-    place: impl Fn(f64, f64) -> [f64; 2],
-    first: i64,
-    count: usize,
-) -> Vec<Span> {
+fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: usize) -> Vec<Span> {
     let mut spans = vec![Span::NOTHING; count];
     let column = |x: f64| {
         let at = x.floor() as i64 - first;
@@ -228,16 +169,8 @@ fn spans(
         for at in (xa.floor() as i64).max(first)..=(xb.floor() as i64).min(last - 1) {
             let span = &mut spans[(at - first) as usize];
             let (left, right) = (at as f64, (at + 1) as f64);
-            span.reach(if left <= xa {
-                ya
-            } else {
-                ya + (left - xa) * slope
-            });
-            span.reach(if right >= xb {
-                yb
-            } else {
-                ya + (right - xa) * slope
-            });
+            span.reach(if left <= xa { ya } else { ya + (left - xa) * slope });
+            span.reach(if right >= xb { yb } else { ya + (right - xa) * slope });
         }
     };
     // The pen passes through every bin: from its junction with the one before, over its middle, to its junction with the next.
@@ -264,10 +197,9 @@ fn spans(
         line(place(time, entry), place(middle, value));
         let end = exit.unwrap_or(value);
         line(place(middle, value), place(bin.to, end));
-        for (extreme, reached) in [
-            (bin.greatest, bin.greatest <= entry.max(end)),
-            (bin.least, bin.least >= entry.min(end)),
-        ] {
+        for (extreme, reached) in
+            [(bin.greatest, bin.greatest <= entry.max(end)), (bin.least, bin.least >= entry.min(end))]
+        {
             if !reached {
                 extremes.push((middle, extreme));
             }
@@ -293,12 +225,7 @@ struct Bar {
 }
 
 impl Bar {
-    const NOTHING: Self = Self {
-        top: 0.0,
-        bottom: 0.0,
-        soft_top: 0.0,
-        soft_bottom: 0.0,
-    };
+    const NOTHING: Self = Self { top: 0.0, bottom: 0.0, soft_top: 0.0, soft_bottom: 0.0 };
 
     fn height(&self) -> f32 {
         self.bottom - self.top
@@ -365,12 +292,7 @@ fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
             let middle = 0.5 * (top + bottom);
             (top, bottom) = (middle - 0.5 * width, middle + 0.5 * width);
         }
-        Bar {
-            top,
-            bottom,
-            soft_top: up.max(1.0),
-            soft_bottom: down.max(1.0),
-        }
+        Bar { top, bottom, soft_top: up.max(1.0), soft_bottom: down.max(1.0) }
     };
     (0..spans.len()).map(bar).collect()
 }
@@ -423,12 +345,7 @@ impl<'a> Path<'a> {
     /// A line of `width` points.
     pub fn line(name: &str, points: &'a [PlotPoint], colour: Color32, width: f32) -> Self {
         let base = PlotItemBase::new(name.to_owned());
-        Self {
-            base,
-            points,
-            colour,
-            width,
-        }
+        Self { base, points, colour, width }
     }
 }
 
@@ -439,11 +356,7 @@ impl PlotItem for Path<'_> {
         }
         let stroke = Stroke::new(self.width, self.colour);
         let places = self.points.iter().map(|p| transform.position_from_point(p));
-        shapes.extend(
-            parts(places)
-                .into_iter()
-                .map(|part| Shape::line(part, stroke)),
-        );
+        shapes.extend(parts(places).into_iter().map(|part| Shape::line(part, stroke)));
     }
 
     fn initialize(&mut self, _x_range: RangeInclusive<f64>) {}
@@ -458,9 +371,7 @@ impl PlotItem for Path<'_> {
 
     fn bounds(&self) -> PlotBounds {
         let mut bounds = PlotBounds::NOTHING;
-        self.points
-            .iter()
-            .for_each(|point| bounds.extend_with(point));
+        self.points.iter().for_each(|point| bounds.extend_with(point));
         bounds
     }
 
@@ -482,9 +393,7 @@ fn parts(points: impl Iterator<Item = Pos2>) -> Vec<Vec<Pos2>> {
         let Some(part) = parts.last_mut() else { break };
         let turn = match part[..] {
             [.., last] if last.distance_sq(point) < 0.01 => continue,
-            [.., before, last] => (last - before)
-                .normalized()
-                .dot((point - last).normalized()),
+            [.., before, last] => (last - before).normalized().dot((point - last).normalized()),
             _ => 1.0,
         };
         if turn < SMOOTH {

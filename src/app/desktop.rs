@@ -30,10 +30,7 @@ pub struct DesktopHost {
 impl DesktopHost {
     /// Links are appended to the address `page`; with "" they have none.
     pub fn new(page: String) -> Self {
-        Self {
-            page,
-            ..Self::default()
-        }
+        Self { page, ..Self::default() }
     }
 }
 
@@ -48,20 +45,15 @@ impl Host for DesktopHost {
 
     fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
         let cannot = |error: FileError| match error {
-            FileError::Exists(path) | FileError::NotEmpty(path) => format!(
-                "cannot write {}: it is already there; choose another name",
-                path.display()
-            ),
+            FileError::Exists(path) | FileError::NotEmpty(path) => {
+                format!("cannot write {}: it is already there; choose another name", path.display())
+            }
             error @ FileError::Cannot { .. } => error.to_string(),
         };
         let mut filled = Vec::new();
         for file in files {
             let target = OutputFile::claim(Path::new(&file.name), false).map_err(cannot)?;
-            filled.push(
-                target
-                    .fill(|out| out.write_all(&file.bytes))
-                    .map_err(cannot)?,
-            );
+            filled.push(target.fill(|out| out.write_all(&file.bytes)).map_err(cannot)?);
         }
         publish(filled).map_err(cannot)?;
         let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();

@@ -103,12 +103,7 @@ pub enum Answer {
 }
 
 /// Shows `dialog`.
-pub fn ui(
-    ctx: &egui::Context,
-    dialog: &mut Dialog,
-    player: &Player,
-    renderer: &str,
-) -> Option<Answer> {
+pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &str) -> Option<Answer> {
     let mut answer = None;
     // Title, buttons and frame stay visible on a low screen and in a dialog whose text grows.
     let most = (ctx.content_rect().height() - 140.0).max(80.0);
@@ -118,39 +113,35 @@ pub fn ui(
     };
     let widest = (ctx.content_rect().width() - 48.0).min(width);
     let frame = egui::Frame::window(&ctx.global_style());
-    let modal = Modal::new(Id::unique("dialog"))
-        .frame(frame)
-        .show(ctx, |ui| {
-            ui.set_width(widest);
-            ui.heading(dialog.title());
-            ui.add_space(6.0);
-            let scrolled = ScrollArea::vertical()
-                .max_height(most)
-                .min_scrolled_height(most);
-            let entered = scrolled
-                .show(ui, |ui| match dialog {
-                    Dialog::Help => help(ui),
-                    Dialog::About => about(ui, player, renderer),
-                    Dialog::Open { path, error } => open(ui, path, error.as_deref()),
-                    Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
-                    Dialog::Code { link, code } => code::ui(ui, link, code, most),
-                    Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
-                    Dialog::Load { changes, .. } => load(ui, changes),
-                })
-                .inner;
-            ui.add_space(8.0);
-            ui.horizontal(|ui| {
-                if let Some((verb, asked)) = dialog.answer() {
-                    let button = ui.add_enabled(asked.is_some(), egui::Button::new(verb));
-                    if button.clicked() || entered {
-                        answer = asked;
-                    }
+    let modal = Modal::new(Id::unique("dialog")).frame(frame).show(ctx, |ui| {
+        ui.set_width(widest);
+        ui.heading(dialog.title());
+        ui.add_space(6.0);
+        let scrolled = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+        let entered = scrolled
+            .show(ui, |ui| match dialog {
+                Dialog::Help => help(ui),
+                Dialog::About => about(ui, player, renderer),
+                Dialog::Open { path, error } => open(ui, path, error.as_deref()),
+                Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
+                Dialog::Code { link, code } => code::ui(ui, link, code, most),
+                Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
+                Dialog::Load { changes, .. } => load(ui, changes),
+            })
+            .inner;
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            if let Some((verb, asked)) = dialog.answer() {
+                let button = ui.add_enabled(asked.is_some(), egui::Button::new(verb));
+                if button.clicked() || entered {
+                    answer = asked;
                 }
-                if ui.button("Close").clicked() {
-                    answer = Some(Answer::Close);
-                }
-            });
+            }
+            if ui.button("Close").clicked() {
+                answer = Some(Answer::Close);
+            }
         });
+    });
     if modal.should_close() {
         answer = Some(Answer::Close);
     }
@@ -159,11 +150,7 @@ pub fn ui(
 
 fn help(ui: &mut Ui) -> bool {
     ui.spacing_mut().interact_size.y = 18.0;
-    let rows = BINDINGS
-        .iter()
-        .filter(|b| !b.written.is_empty())
-        .map(|b| (b.written, b.help))
-        .chain(POINTER);
+    let rows = BINDINGS.iter().filter(|b| !b.written.is_empty()).map(|b| (b.written, b.help)).chain(POINTER);
     if ui.available_width() < NARROW {
         // Stacked, since otherwise the longer half of each line would be cut off.
         for (key, help) in rows {
@@ -172,25 +159,20 @@ fn help(ui: &mut Ui) -> bool {
         }
         return false;
     }
-    Grid::new("keys")
-        .num_columns(2)
-        .spacing([18.0, 5.0])
-        .striped(true)
-        .show(ui, |ui| {
-            for (key, help) in rows {
-                ui.label(RichText::new(key).strong());
-                ui.label(help);
-                ui.end_row();
-            }
-        });
+    Grid::new("keys").num_columns(2).spacing([18.0, 5.0]).striped(true).show(ui, |ui| {
+        for (key, help) in rows {
+            ui.label(RichText::new(key).strong());
+            ui.label(help);
+            ui.end_row();
+        }
+    });
     false
 }
 
 fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
     ui.label(format!("Version {}", crate::VERSION));
     if !renderer.is_empty() {
-        ui.label(format!("Drawn with {renderer}"))
-            .on_hover_text("Graphics interface and adapter");
+        ui.label(format!("Drawn with {renderer}")).on_hover_text("Graphics interface and adapter");
     }
     ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
     ui.add_space(6.0);
@@ -203,9 +185,7 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
         ui.monospace(format!("{:016x}", player.simulation().state_hash()));
     })
     .response
-    .on_hover_text(
-        "Names the whole state at the latest step: equal hashes are equal states, bit for bit",
-    );
+    .on_hover_text("Names the whole state at the latest step: equal hashes are equal states, bit for bit");
     if !scene.changes.is_empty() {
         ui.label("Changed parameters");
         for (key, value) in &scene.changes {
@@ -244,11 +224,7 @@ fn load(ui: &mut Ui, changes: &[String]) -> bool {
 
 /// The text field, with its error below; returns whether Enter was pressed.
 fn path_field(ui: &mut Ui, path: &mut String, hint: &str, error: Option<&str>) -> bool {
-    let field = ui.add(
-        TextEdit::singleline(path)
-            .desired_width(f32::INFINITY)
-            .hint_text(hint),
-    );
+    let field = ui.add(TextEdit::singleline(path).desired_width(f32::INFINITY).hint_text(hint));
     let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
     if !entered && ui.memory(|memory| memory.focused().is_none()) {
         field.request_focus();

@@ -21,12 +21,8 @@ enum Part {
     Bench,
 }
 
-const PARTS: [(&str, Part); 4] = [
-    ("controls", Part::Controls),
-    ("timeline", Part::Timeline),
-    ("plots", Part::Plots),
-    ("bench", Part::Bench),
-];
+const PARTS: [(&str, Part); 4] =
+    [("controls", Part::Controls), ("timeline", Part::Timeline), ("plots", Part::Plots), ("bench", Part::Bench)];
 
 /// Which panels an embedded window has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -80,8 +76,7 @@ impl App {
                 if panels.has(Part::Timeline) {
                     ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 }
-                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
-                    .inner
+                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
             })
             .inner;
         if panels.has(Part::Controls) {
@@ -176,14 +171,8 @@ mod tests {
         for words in ["", "controls", "controls,timeline,plots,bench"] {
             assert_eq!(Embedded::read(words).expect("read").write(), words);
         }
-        assert_eq!(
-            Embedded::read("plots controls").expect("read").write(),
-            "controls,plots"
-        );
+        assert_eq!(Embedded::read("plots controls").expect("read").write(), "controls,plots");
         let error = Embedded::read("slider").expect_err("no panel");
-        assert!(
-            error.contains("`slider`") && error.contains("controls"),
-            "{error}"
-        );
+        assert!(error.contains("`slider`") && error.contains("controls"), "{error}");
     }
 }

@@ -32,12 +32,7 @@ impl App {
     pub fn link(&self) -> Link {
         if let Some(replay) = &self.replay {
             let (lesson, step) = self.course().and_then(Course::shared).unzip();
-            return Link {
-                lesson,
-                step,
-                embedded: self.embedded.clone(),
-                ..replay.link().clone()
-            };
+            return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
         let (plots, window) = shown::changed(&self.plots);
@@ -45,9 +40,7 @@ impl App {
         let joints = &player.scene().ball_joints;
         let under_microscope = joints.get(self.microscope.joint());
         let instruments = Instruments {
-            microscope: under_microscope
-                .filter(|_| self.microscope.is_open())
-                .map(|joint| joint.name.clone()),
+            microscope: under_microscope.filter(|_| self.microscope.is_open()).map(|joint| joint.name.clone()),
             ideal: player.ideal().is_some(),
             wear: self.viewport.options.wear,
         };
@@ -130,10 +123,7 @@ impl App {
     fn open_given(&mut self, name: &str, bytes: Vec<u8>, given: &Given) -> Result<(), String> {
         let opened = String::from_utf8(bytes)
             .map_err(|_| format!("{name}: not a text file"))
-            .and_then(|text| {
-                self.parse_file(name, &text, given, &[])
-                    .map_err(|error| error.to_string())
-            })
+            .and_then(|text| self.parse_file(name, &text, given, &[]).map_err(|error| error.to_string()))
             .and_then(|scene| self.show_scene(&scene));
         self.problem = opened.clone().err();
         opened
@@ -148,10 +138,7 @@ impl App {
 
     /// Asks for a link, a file or a built-in scene.
     pub(super) fn ask_what_to_open(&mut self) {
-        self.dialog = Some(Dialog::Open {
-            path: String::new(),
-            error: None,
-        });
+        self.dialog = Some(Dialog::Open { path: String::new(), error: None });
     }
 
     /// Opens a link pasted outside a text field; other text is ignored.
@@ -244,11 +231,7 @@ impl App {
                 self.notice = Some(Notice::new(done));
             }
             Err(reason) => {
-                self.dialog = Some(Dialog::Save {
-                    path,
-                    files,
-                    error: Some(reason),
-                });
+                self.dialog = Some(Dialog::Save { path, files, error: Some(reason) });
             }
         }
     }
@@ -259,11 +242,7 @@ impl App {
         match scene.to_toml() {
             Ok(text) => {
                 let name = format!("{}.toml", scene.name);
-                self.save(vec![SaveFile {
-                    name,
-                    mime: SCENE_TYPE,
-                    bytes: text.into_bytes(),
-                }]);
+                self.save(vec![SaveFile { name, mime: SCENE_TYPE, bytes: text.into_bytes() }]);
             }
             Err(error) => self.problem = Some(format!("The scene cannot be saved: {error}")),
         }
@@ -282,16 +261,8 @@ impl App {
         let name = format!("{}.csv", self.file_stem());
         let (rows, meta) = (record_csv(&self.player), meta(&self.player));
         self.save(vec![
-            SaveFile {
-                name: name.clone(),
-                mime: "text/csv",
-                bytes: rows.into_bytes(),
-            },
-            SaveFile {
-                name: format!("{name}.meta.json"),
-                mime: "application/json",
-                bytes: meta.into_bytes(),
-            },
+            SaveFile { name: name.clone(), mime: "text/csv", bytes: rows.into_bytes() },
+            SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
         ]);
     }
 
@@ -349,21 +320,14 @@ fn scene_among(files: &[(String, Vec<u8>)]) -> Option<usize> {
 
 /// A file's name without its folders.
 fn own_name(name: &str) -> &str {
-    Path::new(name)
-        .file_name()
-        .and_then(|own| own.to_str())
-        .unwrap_or(name)
+    Path::new(name).file_name().and_then(|own| own.to_str()).unwrap_or(name)
 }
 
 /// A verdict in a sentence.
 pub fn verdict_words(verdict: &Verdict) -> String {
     match verdict {
         Verdict::Agrees(hash) => format!("State reproduced: hash {hash:016x} agrees"),
-        Verdict::Differs {
-            expected,
-            found,
-            version,
-        } => {
+        Verdict::Differs { expected, found, version } => {
             let made = version.as_deref().unwrap_or("another version");
             format!(
                 "State differs: hash {found:016x}, the link says {expected:016x}. It was made by version {made}, this is {}",
@@ -412,11 +376,8 @@ fn record_csv(player: &Player) -> String {
 /// Metadata: what made the record.
 fn meta(player: &Player) -> String {
     let scene = player.scene();
-    let changed: Map<String, serde_json::Value> = scene
-        .changes
-        .iter()
-        .map(|(key, value)| (key.clone(), json!(value)))
-        .collect();
+    let changed: Map<String, serde_json::Value> =
+        scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
     let mut meta = json!({
         "program": "jointplay",
         "version": crate::VERSION,
@@ -490,30 +451,17 @@ mod tests {
         assert_eq!(header.len(), 1 + 2 * player.channels().len());
         let column = |name: &str| header.iter().position(|h| *h == name).expect("a column");
         let (peak, least) = (column("S1_normal_N_max"), column("S1_normal_N_min"));
-        let rows: Vec<Vec<f64>> = lines
-            .map(|line| {
-                line.split(',')
-                    .map(|v| v.parse().expect("a number"))
-                    .collect()
-            })
-            .collect();
+        let rows: Vec<Vec<f64>> =
+            lines.map(|line| line.split(',').map(|v| v.parse().expect("a number")).collect()).collect();
         assert!((50..=ROWS).contains(&rows.len()), "{}", rows.len());
         assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
-        assert!(
-            rows.iter()
-                .all(|row| row.len() == header.len() && row[least] <= row[peak])
-        );
+        assert!(rows.iter().all(|row| row.len() == header.len() && row[least] <= row[peak]));
         let strongest = rows.iter().map(|row| row[peak]).fold(0.0, f64::max);
         let in_record = player.simulation().statistics().peak_normal[0];
-        assert!(
-            (strongest / in_record - 1.0).abs() < 1e-6,
-            "{strongest} {in_record}"
-        );
+        assert!((strongest / in_record - 1.0).abs() < 1e-6, "{strongest} {in_record}");
         let last = rows.last().expect("rows");
         let channels = player.channels().list();
-        let x = channels
-            .iter()
-            .position(|c| c.quantity == Quantity::Position);
+        let x = channels.iter().position(|c| c.quantity == Quantity::Position);
         let shown = player.frame().pose.position.x;
         let x = last[2 + 2 * x.expect("recorded")];
         assert!((x / shown - 1.0).abs() < 1e-5, "{x} {shown}");

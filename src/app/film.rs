@@ -42,14 +42,7 @@ pub struct Wanted {
 impl Wanted {
     /// What was shown so far of a run that plays at `scale`.
     pub fn all(reached: f64, scale: f64) -> Self {
-        Self {
-            span: [0.0, reached],
-            scale,
-            rate: 30.0,
-            size: SIZES[1].0,
-            plots: false,
-            format: Format::Mp4,
-        }
+        Self { span: [0.0, reached], scale, rate: 30.0, size: SIZES[1].0, plots: false, format: Format::Mp4 }
     }
 
     /// Number of frames: both ends count, as with `render --duration`.
@@ -121,23 +114,11 @@ pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
         ui.label("Time scale");
         let scales = transport::SCALES.map(|scale| (scale, value::time_scale(scale)));
         let help = "Simulated seconds per second of film";
-        choice(
-            ui,
-            "Time scale of the film",
-            help,
-            &mut wanted.scale,
-            &scales,
-        );
+        choice(ui, "Time scale of the film", help, &mut wanted.scale, &scales);
         ui.end_row();
         ui.label("Frames");
         let rates = RATES.map(|rate| (rate, format!("{rate} a second")));
-        choice(
-            ui,
-            "Frames of the film",
-            "Per second of film",
-            &mut wanted.rate,
-            &rates,
-        );
+        choice(ui, "Frames of the film", "Per second of film", &mut wanted.rate, &rates);
         ui.end_row();
         ui.label("Size");
         let sizes = SIZES.map(|(size, name)| (size, name.to_owned()));
@@ -146,28 +127,18 @@ pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
         ui.label("Shows");
         ui.horizontal(|ui| {
             for (plots, name) in [(false, "View only"), (true, "View and plots")] {
-                ui.selectable_value(&mut wanted.plots, plots, name)
-                    .on_hover_text("The plots lie below the view");
+                ui.selectable_value(&mut wanted.plots, plots, name).on_hover_text("The plots lie below the view");
             }
         });
         ui.end_row();
         ui.label("File");
         ui.horizontal(|ui| {
             let formats = [
-                (
-                    Format::Mp4,
-                    "MP4",
-                    "H.264: plays everywhere, small, exact times",
-                ),
-                (
-                    Format::Gif,
-                    "GIF",
-                    "Plays by itself in slides; 256 colours, at most 50 frames a second",
-                ),
+                (Format::Mp4, "MP4", "H.264: plays everywhere, small, exact times"),
+                (Format::Gif, "GIF", "Plays by itself in slides; 256 colours, at most 50 frames a second"),
             ];
             for (format, name, help) in formats {
-                ui.selectable_value(&mut wanted.format, format, name)
-                    .on_hover_text(help);
+                ui.selectable_value(&mut wanted.format, format, name).on_hover_text(help);
             }
         });
         ui.end_row();
@@ -185,13 +156,7 @@ pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
 }
 
 /// A list of `options` for `value`.
-fn choice<T: Copy + PartialEq>(
-    ui: &mut Ui,
-    name: &str,
-    help: &str,
-    value: &mut T,
-    options: &[(T, String)],
-) {
+fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut T, options: &[(T, String)]) {
     let chosen = options.iter().find(|(option, _)| option == value);
     ComboBox::from_id_salt(name)
         .selected_text(chosen.map_or("own", |(_, text)| text.as_str()))
@@ -226,10 +191,7 @@ impl App {
         if let Some(objection) = wanted.objection() {
             return Err(format!("No film: {objection}"));
         }
-        let state = self
-            .graphics
-            .as_ref()
-            .ok_or("No film: there is no graphics adapter")?;
+        let state = self.graphics.as_ref().ok_or("No film: there is no graphics adapter")?;
         let film = Film::new(wanted.format, wanted.size, wanted.rate);
         let film = film.map_err(|error| format!("No film: {error}"))?;
         let pacer = &self.player.pacer;
@@ -240,14 +202,7 @@ impl App {
         self.player.go_to(wanted.span[0]);
         self.viewport.arrive(&self.player);
         self.film_wanted = Some(wanted.clone());
-        self.film = Some(Making {
-            wanted,
-            film,
-            canvas,
-            pending: None,
-            next: 0,
-            before,
-        });
+        self.film = Some(Making { wanted, film, canvas, pending: None, next: 0, before });
         Ok(())
     }
 
@@ -315,13 +270,8 @@ impl App {
         self.player.go_to(instant);
         // The peaks since the frame before.
         self.player.advance(0.0);
-        self.viewport
-            .advance(&self.player, (1.0 / making.wanted.rate) as f32);
-        let contents = if making.wanted.plots {
-            Contents::Plots
-        } else {
-            Contents::View
-        };
+        self.viewport.advance(&self.player, (1.0 / making.wanted.rate) as f32);
+        let contents = if making.wanted.plots { Contents::Plots } else { Contents::View };
         let first = making.next == 0;
         let size = making.wanted.size;
         making.pending = Some(self.draw_frame(ctx, &mut making.canvas, contents, size, first)?);

@@ -11,11 +11,7 @@ use crate::view::{DrawList, Ghost, SceneView, Shot};
 pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawList) -> Vec<String> {
     let mut notes = Vec::new();
     let mut note = |ghost: &str, apart: bool| {
-        let near = if apart {
-            ""
-        } else {
-            ", less than a pixel away"
-        };
+        let near = if apart { "" } else { ", less than a pixel away" };
         notes.push(format!("{ghost}{near}"));
     };
     let now = player.frame().time;
@@ -58,11 +54,7 @@ impl App {
         let help = "The same machine with every ball joint closed, at the same drives and gravity, drawn pale over the \
                     run, and an arrow from its tip to the run's: the error of the play (key G). The plot Tip error records it. The \
                     run itself does not change by a bit.";
-        if ui
-            .checkbox(&mut on, "Ideal ghost")
-            .on_hover_text(help)
-            .changed()
-        {
+        if ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed() {
             self.show_ideal(on);
         }
         if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
@@ -97,10 +89,7 @@ mod tests {
         let view = SceneView::new(&scene, player.frame());
         let (marks, camera) = (PeakMarks::new(), view.camera());
         for magnification in [1.0, 10.0] {
-            let options = ViewOptions {
-                magnification,
-                ..ViewOptions::default()
-            };
+            let options = ViewOptions { magnification, ..ViewOptions::default() };
             let shot = Shot {
                 scene: &scene,
                 frame: player.frame(),
@@ -115,17 +104,10 @@ mod tests {
             view.build(&shot, &mut list);
             let notes = add(&view, &shot, &player, &mut list);
             let length = value::number(error.norm() * 1e6, 4);
-            assert!(
-                notes.contains(&format!("tip error {length} µm")),
-                "{notes:?}"
-            );
+            assert!(notes.contains(&format!("tip error {length} µm")), "{notes:?}");
             let label = list.labels.iter().find(|l| l.kind == LabelKind::Error);
             let label = label.expect("in the picture");
-            let drawn = if magnification > 1.0 {
-                ", drawn ×10"
-            } else {
-                ""
-            };
+            let drawn = if magnification > 1.0 { ", drawn ×10" } else { "" };
             assert_eq!(*label.text, *format!("tip error {length} µm{drawn}"));
             let head = to_f32(&ideal) + to_f32(&error) * magnification;
             assert!(label.anchor.distance(head) < 1e-6, "{head}");

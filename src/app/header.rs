@@ -19,8 +19,7 @@ impl App {
             self.scene_box(ui, compact);
             if compact {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    layout::menu(ui, "Menu", true, |ui| self.menu(ui))
-                        .on_hover_text("Open, save, share, theme, keys");
+                    layout::menu(ui, "Menu", true, |ui| self.menu(ui)).on_hover_text("Open, save, share, theme, keys");
                 });
                 return;
             }
@@ -29,8 +28,7 @@ impl App {
                 self.save_menu(ui);
                 self.code_button(ui);
             };
-            layout::menu(ui, "Save", true, save)
-                .on_hover_text("Save a picture, the record or the scene");
+            layout::menu(ui, "Save", true, save).on_hover_text("Save a picture, the record or the scene");
             self.link_button(ui);
             layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
                 .on_hover_text("Ten lessons on play in joints, step by step");
@@ -40,12 +38,7 @@ impl App {
                 self.show_bench = !self.show_bench;
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui
-                    .button("?")
-                    .on_hover_text("Keys (?)")
-                    .accessible_name("Keys")
-                    .clicked()
-                {
+                if ui.button("?").on_hover_text("Keys (?)").accessible_name("Keys").clicked() {
                     self.dialog = Some(Dialog::Help);
                 }
                 // What does not fit is left out rather than laid over the rest; the theme also has a key.
@@ -92,8 +85,7 @@ impl App {
     }
 
     fn open_button(&mut self, ui: &mut Ui) {
-        let help =
-            "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
+        let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
         if ui.button("Open…").on_hover_text(help).clicked() {
             self.choose_file();
             layout::close_menu(ui);
@@ -101,11 +93,10 @@ impl App {
     }
 
     fn link_button(&mut self, ui: &mut Ui) {
-        let mut help = "Copies a link that opens this scene in this state and view, with every change made on the way"
-            .to_owned();
+        let mut help =
+            "Copies a link that opens this scene in this state and view, with every change made on the way".to_owned();
         if self.host.address().is_empty() {
-            help +=
-                ". It has no address in front: --page or JOINTPLAY_PAGE gives it that of a page";
+            help += ". It has no address in front: --page or JOINTPLAY_PAGE gives it that of a page";
         }
         if ui.button("Copy link").on_hover_text(help).clicked() {
             self.copy_link(ui.ctx());
@@ -179,24 +170,15 @@ impl App {
         }
         let replay = self.replay.as_ref();
         let ways = [
-            (
-                "Reproducing the state of the link…",
-                replay.map(|replay| replay.fraction(&self.player)),
-            ),
+            ("Reproducing the state of the link…", replay.map(|replay| replay.fraction(&self.player))),
             ("Running to the chosen section…", self.loading()),
             ("Making the film…", self.filming()),
         ];
         for (words, fraction) in ways {
             let stop = if self.filming().is_some() {
-                (
-                    "Give up",
-                    "No film; the run goes back to where it was (Esc)",
-                )
+                ("Give up", "No film; the run goes back to where it was (Esc)")
             } else {
-                (
-                    "Stop here",
-                    "Stay at the time that the run has reached (Esc)",
-                )
+                ("Stop here", "Stay at the time that the run has reached (Esc)")
             };
             if fraction.is_some_and(|fraction| under_way(ui, words, fraction, stop)) {
                 self.cancel_replay();
@@ -219,10 +201,7 @@ impl App {
 /// The plate behind a message, opaque.
 fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
     let fill = ui.visuals().panel_fill.lerp_to_gamma(colour, 0.14);
-    Frame::new()
-        .fill(fill)
-        .corner_radius(6.0)
-        .inner_margin(egui::Margin::symmetric(12, 8))
+    Frame::new().fill(fill).corner_radius(6.0).inner_margin(egui::Margin::symmetric(12, 8))
 }
 
 /// Progress of a run to its target; returns whether it is to stop: label and tooltip of that button.
@@ -232,8 +211,7 @@ fn under_way(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)
         ui.horizontal_wrapped(|ui| {
             let percent = (fraction * 100.0).floor();
             ui.label(format!("{words} {percent} %"));
-            ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
-                .accessible_name("Run so far");
+            ui.add(egui::ProgressBar::new(fraction).desired_width(120.0)).accessible_name("Run so far");
             ui.button(stop).on_hover_text(help).clicked()
         })
         .inner
@@ -277,11 +255,7 @@ fn theme_box(ui: &mut Ui) {
         .width(104.0)
         .selected_text(label(preference))
         .show_ui(ui, |ui| {
-            for choice in [
-                ThemePreference::System,
-                ThemePreference::Light,
-                ThemePreference::Dark,
-            ] {
+            for choice in [ThemePreference::System, ThemePreference::Light, ThemePreference::Dark] {
                 ui.selectable_value(&mut preference, choice, label(choice));
             }
         })

@@ -25,23 +25,13 @@ impl Headless {
     pub fn new() -> Result<Self, NoAdapter> {
         let setup = WgpuSetup::CreateNew(egui_wgpu::WgpuSetupCreateNew::without_display_handle());
         let instance = pollster::block_on(setup.new_instance());
-        let configuration = WgpuConfiguration {
-            wgpu_setup: setup,
-            ..Default::default()
-        };
-        let state = RenderState::create(
-            &configuration,
-            &instance,
-            None,
-            RendererOptions::PREDICTABLE,
-        );
+        let configuration = WgpuConfiguration { wgpu_setup: setup, ..Default::default() };
+        let state = RenderState::create(&configuration, &instance, None, RendererOptions::PREDICTABLE);
         let state = pollster::block_on(state).map_err(|error| {
             log::info!("no graphics adapter: {error}");
             NoAdapter
         })?;
-        Ok(Self {
-            canvas: Canvas::new(state),
-        })
+        Ok(Self { canvas: Canvas::new(state) })
     }
 
     /// Name of the adapter.
@@ -54,12 +44,7 @@ impl Headless {
     ///
     /// # Errors
     /// A size that cannot be drawn.
-    pub fn app_frame(
-        &mut self,
-        app: &mut App,
-        size: [u32; 2],
-        scale: f32,
-    ) -> Result<Image, RenderError> {
+    pub fn app_frame(&mut self, app: &mut App, size: [u32; 2], scale: f32) -> Result<Image, RenderError> {
         // egui settles the size of its panels over a few passes; time stands still meanwhile.
         for _ in 0..3 {
             self.canvas.pass(size, scale, |ui| app.show(ui))?;
@@ -108,12 +93,7 @@ impl Headless {
     ///
     /// # Errors
     /// A size that cannot be drawn.
-    pub fn encode_frame(
-        &mut self,
-        app: &mut App,
-        size: [u32; 2],
-        scale: f32,
-    ) -> Result<(), RenderError> {
+    pub fn encode_frame(&mut self, app: &mut App, size: [u32; 2], scale: f32) -> Result<(), RenderError> {
         app.viewport.advance(&app.player, 1.0 / 60.0);
         let output = self.canvas.pass(size, scale, |ui| app.show(ui))?;
         let (commands, _) = self.canvas.encode(output, size, scale);
@@ -123,12 +103,7 @@ impl Headless {
 
     /// Waits until the device has drawn what was submitted.
     pub fn wait(&self) {
-        if let Err(error) = self
-            .canvas
-            .state()
-            .device
-            .poll(wgpu::PollType::wait_indefinitely())
-        {
+        if let Err(error) = self.canvas.state().device.poll(wgpu::PollType::wait_indefinitely()) {
             log::warn!("waiting for the device: {error}");
         }
     }

@@ -1,9 +1,6 @@
 //! Buttons with painted icons: they need no font, and a screen reader reads their name.
 
-use eframe::egui::{
-    self, Color32, Pos2, Rect, Response, Role, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2,
-    vec2,
-};
+use eframe::egui::{self, Color32, Pos2, Rect, Response, Role, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 /// What an icon shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,14 +24,7 @@ pub enum Icon {
 }
 
 /// A button with a painted icon, `name` as its label and `help` as its tooltip. `prominent` fills it.
-pub fn icon_button(
-    ui: &mut Ui,
-    icon: Icon,
-    name: &str,
-    help: &str,
-    size: f32,
-    prominent: bool,
-) -> Response {
+pub fn icon_button(ui: &mut Ui, icon: Icon, name: &str, help: &str, size: f32, prominent: bool) -> Response {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(size), Sense::click());
     let enabled = ui.is_enabled();
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, name));
@@ -43,37 +33,17 @@ pub fn icon_button(
         let selection = ui.visuals().selection;
         let (fill, colour) = if prominent {
             let fill = selection.stroke.color;
-            let fill = if response.hovered() {
-                fill.gamma_multiply(0.85)
-            } else {
-                fill
-            };
-            (
-                fill,
-                if ui.visuals().dark_mode {
-                    Color32::from_gray(20)
-                } else {
-                    Color32::WHITE
-                },
-            )
+            let fill = if response.hovered() { fill.gamma_multiply(0.85) } else { fill };
+            (fill, if ui.visuals().dark_mode { Color32::from_gray(20) } else { Color32::WHITE })
         } else {
             (visuals.weak_bg_fill, visuals.fg_stroke.color)
         };
         let radius = if prominent { size / 2.0 } else { 6.0 };
-        let outline = if response.has_focus() {
-            ui.visuals().widgets.hovered.fg_stroke
-        } else {
-            Stroke::NONE
-        };
-        ui.painter()
-            .rect(rect, radius, fill, outline, egui::StrokeKind::Outside);
+        let outline = if response.has_focus() { ui.visuals().widgets.hovered.fg_stroke } else { Stroke::NONE };
+        ui.painter().rect(rect, radius, fill, outline, egui::StrokeKind::Outside);
         paint(ui, icon, rect.shrink(size * 0.28), colour);
     }
-    if help.is_empty() {
-        response
-    } else {
-        response.on_hover_text(help)
-    }
+    if help.is_empty() { response } else { response.on_hover_text(help) }
 }
 
 fn paint(ui: &Ui, icon: Icon, rect: Rect, colour: Color32) {
@@ -104,11 +74,7 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, colour: Color32) {
             let turned = |x: f32| if icon == Icon::After { x } else { 1.0 - x };
             for left in [0.0, 0.5] {
                 let point = |x: f32, y: f32| at(turned(left + x), y);
-                painter.add(triangle([
-                    point(0.0, 0.1),
-                    point(0.5, 0.5),
-                    point(0.0, 0.9),
-                ]));
+                painter.add(triangle([point(0.0, 0.1), point(0.5, 0.5), point(0.0, 0.9)]));
             }
         }
         Icon::Undo => {
@@ -118,9 +84,7 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, colour: Color32) {
                 let angle = turn * std::f32::consts::TAU;
                 centre + radius * vec2(angle.cos(), angle.sin())
             };
-            let points: Vec<Pos2> = (0..=20)
-                .map(|i| on_circle(0.70 + 0.78 * i as f32 / 20.0))
-                .collect();
+            let points: Vec<Pos2> = (0..=20).map(|i| on_circle(0.70 + 0.78 * i as f32 / 20.0)).collect();
             painter.add(Shape::line(points, Stroke::new(1.6, colour)));
             let tip = on_circle(0.70);
             let size = rect.width() * 0.34;

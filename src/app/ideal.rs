@@ -26,9 +26,7 @@ pub struct Gravity {
 impl Gravity {
     /// Constant from the start.
     pub fn new(gravity: Vec3) -> Self {
-        Self {
-            since: vec![(f64::NEG_INFINITY, gravity)],
-        }
+        Self { since: vec![(f64::NEG_INFINITY, gravity)] }
     }
 
     /// The run has taken a step from `start`, s, under `gravity`; later entries belong to another future and are dropped.
@@ -91,10 +89,7 @@ impl Ideal {
                 stopped: None,
             }
         });
-        Self {
-            output: scene.output.clone(),
-            motion,
-        }
+        Self { output: scene.output.clone(), motion }
     }
 
     /// Advances to `time`, s, to which the run is recorded, if that is near.
@@ -256,16 +251,11 @@ mod tests {
                 with.run_to(time);
                 without.run_to(time);
                 reach(&mut with);
-                assert_eq!(
-                    with.simulation().state_hash(),
-                    without.simulation().state_hash(),
-                    "{name}"
-                );
+                assert_eq!(with.simulation().state_hash(), without.simulation().state_hash(), "{name}");
                 let error = with.ideal().expect("on").output_error(with.frame());
                 let error = error.unwrap_or_else(|| panic!("{name}: none at {time}"));
                 let time = with.frame().time;
-                let two = alone(&scene, &scene.output, time)
-                    - alone(&closed(&scene), &scene.output, time);
+                let two = alone(&scene, &scene.output, time) - alone(&closed(&scene), &scene.output, time);
                 let off = (error - two).norm();
                 assert!(off < 1e-12 + 1e-9 * two.norm(), "{name}: {off:e}");
                 assert!(two.norm() > 1e-6, "{name}: {two:?}");
@@ -283,10 +273,7 @@ mod tests {
         let probe = player.frame().probe_error.expect("has a closed form");
         assert!((error.expect("came there") - probe).norm() < 1e-9);
         let channel = player.channels().tip_error();
-        assert_eq!(
-            player.channels().list()[channel].quantity,
-            Quantity::TipError
-        );
+        assert_eq!(player.channels().list()[channel].quantity, Quantity::TipError);
         let mut bins = Vec::new();
         player.history().bins(channel, 0.0, 0.02, 4000, &mut bins);
         assert!(bins.len() > 50, "{}", bins.len());
@@ -297,10 +284,7 @@ mod tests {
         let before = bins.len();
         bins.clear();
         player.history().bins(channel, 0.0, 0.02, 4000, &mut bins);
-        assert!(
-            bins.len() <= before + 1,
-            "what was not computed is not drawn"
-        );
+        assert!(bins.len() <= before + 1, "what was not computed is not drawn");
     }
 
     #[test]
@@ -413,10 +397,7 @@ mod tests {
         assert_eq!((gravity.at(1.0), gravity.next(1.0)), (g(-5.0), 2.0));
         // Back to 0.9: what came after is gone.
         assert!(gravity.observe(0.9, g(-9.81)));
-        assert_eq!(
-            (gravity.at(3.0), gravity.next(0.0)),
-            (g(-9.81), f64::INFINITY)
-        );
+        assert_eq!((gravity.at(3.0), gravity.next(0.0)), (g(-9.81), f64::INFINITY));
         assert!(gravity.observe(1.2, g(1.0)) && gravity.observe(1.2, g(2.0)));
         assert_eq!(gravity.at(1.2), g(2.0));
     }

@@ -55,29 +55,14 @@ pub struct Binding {
 }
 
 const fn bind(key: Key, action: Action, written: &'static str, help: &'static str) -> Binding {
-    Binding {
-        key,
-        action,
-        written,
-        help,
-    }
+    Binding { key, action, written, help }
 }
 
 /// All keys.
 pub const BINDINGS: [Binding; 40] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
-    bind(
-        Key::ArrowRight,
-        Action::Step,
-        "Right arrow",
-        "One step of the solver",
-    ),
-    bind(
-        Key::ArrowLeft,
-        Action::StepBack,
-        "Left arrow",
-        "Take the latest step back",
-    ),
+    bind(Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
+    bind(Key::ArrowLeft, Action::StepBack, "Left arrow", "Take the latest step back"),
     bind(
         Key::Comma,
         Action::Impact { forward: false },
@@ -86,12 +71,7 @@ pub const BINDINGS: [Binding; 40] = [
     ),
     bind(Key::Period, Action::Impact { forward: true }, "", ""),
     bind(Key::J, Action::Backwards, "J", "Play backwards"),
-    bind(
-        Key::Home,
-        Action::Home,
-        "Home, End",
-        "Start, and end of what was on show",
-    ),
+    bind(Key::Home, Action::Home, "Home, End", "Start, and end of what was on show"),
     bind(Key::End, Action::End, "", ""),
     bind(Key::R, Action::Reset, "R", "Reset to t = 0"),
     bind(Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
@@ -114,40 +94,15 @@ pub const BINDINGS: [Binding; 40] = [
     bind(Key::Num7, Action::CloseUp(2), "", ""),
     bind(Key::Num8, Action::CloseUp(3), "", ""),
     bind(Key::Num9, Action::CloseUp(4), "", ""),
-    bind(
-        Key::X,
-        Action::Magnify,
-        "X",
-        "Next magnification of the play",
-    ),
-    bind(
-        Key::M,
-        Action::Sound,
-        "M",
-        "Sound on or off: a click for every impact",
-    ),
-    bind(
-        Key::L,
-        Action::Microscope,
-        "L",
-        "Microscope on the ball joint in focus, shown or hidden",
-    ),
-    bind(
-        Key::G,
-        Action::IdealGhost,
-        "G",
-        "Ideal ghost: the machine without play, shown or hidden",
-    ),
+    bind(Key::X, Action::Magnify, "X", "Next magnification of the play"),
+    bind(Key::M, Action::Sound, "M", "Sound on or off: a click for every impact"),
+    bind(Key::L, Action::Microscope, "L", "Microscope on the ball joint in focus, shown or hidden"),
+    bind(Key::G, Action::IdealGhost, "G", "Ideal ghost: the machine without play, shown or hidden"),
     bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
     bind(Key::P, Action::Plots, "P", "Plots shown or hidden"),
     bind(Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
-    bind(
-        Key::F5,
-        Action::Present,
-        "F5",
-        "Presentation: the picture alone, large type, thick arrows",
-    ),
+    bind(Key::F5, Action::Present, "F5", "Presentation: the picture alone, large type, thick arrows"),
     bind(
         Key::PageDown,
         Action::TurnPage { forward: true },
@@ -165,32 +120,14 @@ pub const BINDINGS: [Binding; 40] = [
 /// Mouse and touch, for the overlay.
 pub const POINTER: [(&str, &str); 12] = [
     ("Drag beside the machine, one finger", "Turn the view"),
-    (
-        "Drag on a body; a finger stays first",
-        "Pull on it by a spring; with shift along the line of sight",
-    ),
-    (
-        "Right or middle drag, shift-drag, two fingers",
-        "Pan the view",
-    ),
+    ("Drag on a body; a finger stays first", "Pull on it by a spring; with shift along the line of sight"),
+    ("Right or middle drag, shift-drag, two fingers", "Pan the view"),
     ("Wheel, pinch", "Zoom in on what is under the cursor"),
     ("Hover", "Details of a part"),
-    (
-        "Click, tap on a ball joint",
-        "Put it into the middle and under the microscope",
-    ),
-    (
-        "Double-click, double tap",
-        "Follow a body or joint; on the ground: stop following",
-    ),
-    (
-        "Double-click, double tap on the lowest bar",
-        "Presentation, as F5",
-    ),
-    (
-        "Ctrl +, Ctrl -, Ctrl 0",
-        "Larger and smaller type; as it was",
-    ),
+    ("Click, tap on a ball joint", "Put it into the middle and under the microscope"),
+    ("Double-click, double tap", "Follow a body or joint; on the ground: stop following"),
+    ("Double-click, double tap on the lowest bar", "Presentation, as F5"),
+    ("Ctrl +, Ctrl -, Ctrl 0", "Larger and smaller type; as it was"),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),
     ("Arrows after a drag on a slider", "Move that slider"),
@@ -280,11 +217,7 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     }
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(Id::unique(SLIDER), response.id));
-        let arrows = EventFilter {
-            horizontal_arrows: true,
-            vertical_arrows: true,
-            ..EventFilter::default()
-        };
+        let arrows = EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
         ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
     }
     response
@@ -314,9 +247,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     }
     let held_back = |key: Key| match key {
         Key::Space => focused.is_some() && !slider,
-        Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End => {
-            focused.is_some()
-        }
+        Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End => focused.is_some(),
         _ => false,
     };
     ctx.input(|input| {
@@ -324,21 +255,13 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
             .events
             .iter()
             .filter_map(|event| match event {
-                egui::Event::Key {
-                    key,
-                    pressed: true,
-                    repeat,
-                    modifiers,
-                    ..
-                } if !modifiers.command && !modifiers.alt => {
-                    let binding = BINDINGS
-                        .iter()
-                        .find(|b| b.key == *key && !held_back(*key))?;
+                egui::Event::Key { key, pressed: true, repeat, modifiers, .. }
+                    if !modifiers.command && !modifiers.alt =>
+                {
+                    let binding = BINDINGS.iter().find(|b| b.key == *key && !held_back(*key))?;
                     // Only these repeat while held down.
-                    let repeats = matches!(
-                        binding.action,
-                        Action::Step | Action::StepBack | Action::Faster | Action::Slower
-                    );
+                    let repeats =
+                        matches!(binding.action, Action::Step | Action::StepBack | Action::Faster | Action::Slower);
                     (!repeat || repeats).then_some(binding.action)
                 }
                 _ => None,

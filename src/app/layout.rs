@@ -53,24 +53,13 @@ pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
 
 /// A menu. Opened by the keyboard, it focuses its first entry, and it closes when it loses the focus; `stays`: a click on an
 /// entry leaves it open.
-pub(super) fn menu(
-    ui: &mut Ui,
-    name: &str,
-    stays: bool,
-    add: impl FnOnce(&mut Ui),
-) -> egui::Response {
+pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut Ui)) -> egui::Response {
     use egui::containers::menu::{MenuButton, MenuConfig};
-    let close = if stays {
-        egui::PopupCloseBehavior::CloseOnClickOutside
-    } else {
-        egui::PopupCloseBehavior::CloseOnClick
-    };
+    let close =
+        if stays { egui::PopupCloseBehavior::CloseOnClickOutside } else { egui::PopupCloseBehavior::CloseOnClick };
     let opened = ui.scope_id().with((name, "opened by keyboard"));
     // In the pass after opening the entries exist, and this moves the focus from the button to the first of them.
-    if ui
-        .data_mut(|data| data.remove_temp::<bool>(opened))
-        .is_some()
-    {
+    if ui.data_mut(|data| data.remove_temp::<bool>(opened)).is_some() {
         ui.memory_mut(|memory| memory.move_focus(egui::FocusDirection::Next));
     }
     let button = MenuButton::new(name).config(MenuConfig::new().close_behavior(close));
@@ -106,21 +95,17 @@ pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mu
     let height = lines as f32 * line;
     let size = egui::vec2(ui.available_width(), height);
     let place = ui.allocate_exact_size(size, egui::Sense::hover()).0;
-    let inside = egui::UiBuilder::new()
-        .max_rect(place)
-        .layout(egui::Layout::top_down(egui::Align::LEFT));
+    let inside = egui::UiBuilder::new().max_rect(place).layout(egui::Layout::top_down(egui::Align::LEFT));
     ui.scope_builder(inside, |ui| {
         ui.spacing_mut().item_spacing.y = 2.0;
-        ScrollArea::vertical()
-            .id_salt(id)
-            .max_height(height)
-            .min_scrolled_height(height)
-            .auto_shrink(false)
-            .show(ui, |ui| {
+        ScrollArea::vertical().id_salt(id).max_height(height).min_scrolled_height(height).auto_shrink(false).show(
+            ui,
+            |ui| {
                 // Room for the scroll bar.
                 ui.set_max_width(ui.available_width() - 10.0);
                 add(ui);
-            });
+            },
+        );
     });
 }
 
@@ -137,13 +122,7 @@ fn drop_hint(ui: &Ui, area: egui::Rect) {
     painter.rect_stroke(area.shrink(8.0), 8.0, edge, egui::StrokeKind::Inside);
     let font = egui::TextStyle::Heading.resolve(ui.style());
     let place = egui::Align2::CENTER_CENTER;
-    painter.text(
-        area.center(),
-        place,
-        "Drop a scene file to open it",
-        font,
-        colour,
-    );
+    painter.text(area.center(), place, "Drop a scene file to open it", font, colour);
 }
 
 impl App {
@@ -190,9 +169,7 @@ impl App {
             egui::Margin::symmetric(12, 8)
         };
         let bar = theme::panel(ui).inner_margin(margin);
-        Panel::top("header")
-            .frame(bar)
-            .show(ui, |ui| self.header(ui, compact));
+        Panel::top("header").frame(bar).show(ui, |ui| self.header(ui, compact));
         match arrangement {
             Arrangement::Large => self.side_by_side(ui, bar),
             Arrangement::Portrait => self.portrait(ui, bar),
@@ -213,10 +190,7 @@ impl App {
         } else {
             Panel::bottom("lesson").exact_size(0.42 * ui.available_height())
         };
-        panel
-            .frame(bar)
-            .resizable(false)
-            .show(ui, |ui| self.lesson_ui(ui));
+        panel.frame(bar).resizable(false).show(ui, |ui| self.lesson_ui(ui));
     }
 
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
@@ -236,18 +210,18 @@ impl App {
             ..
         } = self;
         let mut present = false;
-        Panel::left("controls")
-            .frame(bar)
-            .default_size(300.0)
-            .size_range(240.0..=480.0)
-            .show_collapsible(ui, show_controls, |ui| {
+        Panel::left("controls").frame(bar).default_size(300.0).size_range(240.0..=480.0).show_collapsible(
+            ui,
+            show_controls,
+            |ui| {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     // Room for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 });
-            });
+            },
+        );
         let of_bench = Panel::right("bench")
             .frame(bar)
             .resizable(true)
@@ -304,10 +278,7 @@ impl App {
     fn portrait(&mut self, ui: &mut Ui, bar: Frame) {
         if self.sheet.is_some() {
             let height = (ui.available_height() * 0.42).max(160.0);
-            Panel::bottom("sheet")
-                .frame(bar)
-                .exact_size(height)
-                .show(ui, |ui| self.sheet(ui));
+            Panel::bottom("sheet").frame(bar).exact_size(height).show(ui, |ui| self.sheet(ui));
         }
         let free = !self.is_under_way();
         let mut present = false;
@@ -340,19 +311,14 @@ impl App {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 ui.horizontal(|ui| {
-                    let tabs = if self.course().is_some() {
-                        350.0
-                    } else {
-                        270.0
-                    };
+                    let tabs = if self.course().is_some() { 350.0 } else { 270.0 };
                     // Where they would cover the buttons, they are a menu.
                     let folded = ui.available_width() < tabs + transport::LEAST;
                     let tabs = if folded { 90.0 } else { tabs };
                     let room = ui.available_width() - tabs;
                     let asked = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
-                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
-                                .inner
+                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
                         })
                         .inner;
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
@@ -370,11 +336,7 @@ impl App {
             .inner;
         if self.sheet.is_some() {
             let width = (ui.available_width() * 0.42).clamp(260.0, 340.0);
-            Panel::right("sheet beside")
-                .frame(bar)
-                .resizable(false)
-                .exact_size(width)
-                .show(ui, |ui| self.sheet(ui));
+            Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
         self.central(ui, asked);
         if present {
@@ -429,41 +391,29 @@ impl App {
             return self.lesson_ui(ui);
         }
         let free = !self.is_under_way();
-        let Self {
-            player,
-            controls,
-            accuracy,
-            plots,
-            bench,
-            sheet,
-            viewport,
-            ..
-        } = self;
+        let Self { player, controls, accuracy, plots, bench, sheet, viewport, .. } = self;
         let mut of_bench = None;
-        ScrollArea::vertical()
-            .id_salt("sheet")
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                ui.set_max_width(ui.available_width() - 10.0);
-                match sheet {
-                    Some(Sheet::Controls) => {
-                        ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
-                    }
-                    Some(Sheet::Plots) => {
-                        plots.header(ui, player);
-                        let size = egui::vec2(ui.available_width(), 340.0);
-                        let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
-                        if let Some(time) = asked.filter(|_| free) {
-                            player.go_to(time);
-                            viewport.arrive(player);
-                        }
-                    }
-                    Some(Sheet::Bench) => {
-                        of_bench = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
-                    }
-                    Some(Sheet::Lesson) | None => {}
+        ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
+            ui.set_max_width(ui.available_width() - 10.0);
+            match sheet {
+                Some(Sheet::Controls) => {
+                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 }
-            });
+                Some(Sheet::Plots) => {
+                    plots.header(ui, player);
+                    let size = egui::vec2(ui.available_width(), 340.0);
+                    let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
+                    if let Some(time) = asked.filter(|_| free) {
+                        player.go_to(time);
+                        viewport.arrive(player);
+                    }
+                }
+                Some(Sheet::Bench) => {
+                    of_bench = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
+                }
+                Some(Sheet::Lesson) | None => {}
+            }
+        });
         if let Some(wish) = of_bench {
             self.bench_asks(wish);
         }
@@ -501,15 +451,9 @@ impl App {
         let narrow = area.width() < 520.0;
         let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
         // Beside the microscope of a phone the time needs all of the upper edge.
-        let edge = if area.width() < SLIM {
-            Align2::RIGHT_BOTTOM
-        } else {
-            Align2::RIGHT_TOP
-        };
+        let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
-        let buttons = egui::UiBuilder::new()
-            .max_rect(edge.align_size_within_rect(row, inner))
-            .layout(backwards);
+        let buttons = egui::UiBuilder::new().max_rect(edge.align_size_within_rect(row, inner)).layout(backwards);
         ui.scope_builder(buttons, |ui| {
             if presenting {
                 return;
@@ -532,8 +476,7 @@ impl App {
         let messages = self.messages(ui, inner);
         self.notice_plate(ui, messages);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
-        ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
-            .inner
+        ui.scope_builder(middle, |ui| transport::banner(ui, &self.player)).inner
     }
 
     /// Messages over the lower edge of the picture: they come and go by themselves, and move nothing. Returns the part of
@@ -576,20 +519,15 @@ impl App {
             self.notice = None;
             return;
         }
-        ui.ctx()
-            .request_repaint_after(std::time::Duration::from_secs_f64(left));
+        ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(left));
         let font = egui::TextStyle::Body.resolve(ui.style());
         let colour = ui.visuals().text_color();
         let width = (area.width() - 24.0).max(40.0);
-        let words = ui
-            .painter()
-            .layout(notice.text.clone(), font, colour, width);
+        let words = ui.painter().layout(notice.text.clone(), font, colour, width);
         let above = egui::vec2(0.0, ui.spacing().interact_size.y + 8.0);
-        let place = egui::Align2::CENTER_BOTTOM
-            .align_size_within_rect(words.size(), area.translate(-above));
+        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(words.size(), area.translate(-above));
         let fill = ui.visuals().window_fill.gamma_multiply(0.92);
-        ui.painter()
-            .rect_filled(place.expand2(egui::vec2(10.0, 5.0)), 6.0, fill);
+        ui.painter().rect_filled(place.expand2(egui::vec2(10.0, 5.0)), 6.0, fill);
         ui.painter().galley(place.min, words, colour);
     }
 }

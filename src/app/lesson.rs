@@ -95,18 +95,14 @@ impl Course {
     /// Why it cannot be computed.
     pub fn measure(&mut self) -> Result<(), String> {
         self.measured.advance(|| true);
-        self.measured
-            .fault()
-            .map_or(Ok(()), |why| Err(why.to_owned()))
+        self.measured.fault().map_or(Ok(()), |why| Err(why.to_owned()))
     }
 
     /// Index of the right choice of the question of this step; `None` while it is not known.
     pub fn right(&self) -> Option<usize> {
         let names = self.measured.names();
         let choices = &self.now().question.as_ref()?.choices;
-        choices
-            .iter()
-            .position(|choice| names.holds(&choice.when) == Some(true))
+        choices.iter().position(|choice| names.holds(&choice.when) == Some(true))
     }
 
     /// The instant to which the machine is to run, s.
@@ -139,22 +135,12 @@ impl Course {
                 }
             }
             if let Some(question) = question {
-                let right = question
-                    .choices
-                    .iter()
-                    .filter(|c| names.holds(&c.when) == Some(true));
+                let right = question.choices.iter().filter(|c| names.holds(&c.when) == Some(true));
                 let right: Vec<&str> = right.map(|choice| &*choice.text).collect();
                 if right.len() != 1 {
-                    let values: Vec<String> = question
-                        .choices
-                        .iter()
-                        .map(|c| known_values(&c.when, &names))
-                        .collect();
+                    let values: Vec<String> = question.choices.iter().map(|c| known_values(&c.when, &names)).collect();
                     let values = values.join("; ");
-                    return Err(at(format!(
-                        "{} choices are right: {right:?}: {values}",
-                        right.len()
-                    )));
+                    return Err(at(format!("{} choices are right: {right:?}: {values}", right.len())));
                 }
             }
             if let Some(until) = &step.until {
@@ -197,11 +183,7 @@ impl Course {
             if let Some(question) = &step.question {
                 out += &words(&question.ask);
                 for (index, choice) in question.choices.iter().enumerate() {
-                    let mark = if self.right() == Some(index) {
-                        "x"
-                    } else {
-                        " "
-                    };
+                    let mark = if self.right() == Some(index) { "x" } else { " " };
                     out += &format!("  [{mark}]{}", words(&choice.text));
                 }
             }
@@ -289,8 +271,7 @@ impl App {
             let until = course.lesson.steps[step].until.as_ref();
             until.and_then(|until| course.measured.names().time(until))
         };
-        let in_place = end(course.step).is_none_or(|end| shown >= end)
-            && end(step).is_none_or(|end| shown < end);
+        let in_place = end(course.step).is_none_or(|end| shown >= end) && end(step).is_none_or(|end| shown < end);
         let begins = course.lesson.steps[step].begins;
         let goes_on = forward && !begins && in_place && course.is_own(&self.player);
         (course.step, course.predicted, course.reached) = (step, None, false);
@@ -309,20 +290,14 @@ impl App {
         };
         (course.sets, course.predicted, course.reached) = (true, None, false);
         let begin = &course.lesson.steps[course.lesson.beginning(course.step)];
-        let (scene, link) = (
-            course.lesson.runs[begin.run].scene.clone(),
-            begin.link.clone(),
-        );
+        let (scene, link) = (course.lesson.runs[begin.run].scene.clone(), begin.link.clone());
         let before = &course.lesson.steps[course.lesson.beginning(course.step)..course.step];
         let names = course.measured.names();
         let mut ends = before.iter().rev().filter_map(|step| step.until.as_ref());
         let whole = begin.twin || !course.lesson.runs[begin.run].changes.is_empty();
         let left_at = ends.find_map(|until| names.time(until)).filter(|_| !whole);
         let same = self.player.wanted().source.text == scene.source.text;
-        let pose = self
-            .viewport
-            .pose()
-            .filter(|_| same && link.camera.is_none());
+        let pose = self.viewport.pose().filter(|_| same && link.camera.is_none());
         self.problem = self.show_scene(&scene).err();
         self.player.set_playing(false);
         if let Some(pose) = pose {
@@ -430,16 +405,10 @@ impl App {
 
     /// Rings around what the step points at, over everything: they move nothing.
     pub(super) fn point_out(&self, ui: &egui::Ui) {
-        let wanted = self
-            .course()
-            .map_or(&[][..], |course| &course.now().highlight);
+        let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
         let joints = &self.player.scene().ball_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
-        let labels: Vec<String> = wanted
-            .iter()
-            .filter(|name| joint(name).is_none())
-            .cloned()
-            .collect();
+        let labels: Vec<String> = wanted.iter().filter(|name| joint(name).is_none()).cloned().collect();
         let places = Spots::places(ui.ctx(), &labels);
         let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
         let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("rings"));
@@ -449,12 +418,7 @@ impl App {
         }
         let inside = painter.with_clip_rect(self.picture_rect);
         for joint in wanted.iter().filter_map(joint) {
-            let centre = self
-                .player
-                .frame()
-                .joints
-                .get(joint)
-                .map(|joint| joint.ball_centre);
+            let centre = self.player.frame().joints.get(joint).map(|joint| joint.ball_centre);
             if let Some(place) = centre.and_then(|centre| self.place_in_view(&centre)) {
                 inside.circle_stroke(place, 26.0, stroke);
             }
@@ -469,11 +433,7 @@ impl App {
         let wanted = &course.now().highlight;
         let joints = &self.player.scene().ball_joints;
         let is_joint = |name: &&String| joints.iter().any(|joint| joint.name == **name);
-        let labels: Vec<String> = wanted
-            .iter()
-            .filter(|name| !is_joint(name))
-            .cloned()
-            .collect();
+        let labels: Vec<String> = wanted.iter().filter(|name| !is_joint(name)).cloned().collect();
         Spots::places(ctx, &labels).len() == labels.len()
     }
 }

@@ -39,12 +39,7 @@ impl Load {
     ) -> Option<Self> {
         let leg = |point: &SweptPoint, sections| Leg {
             settings: point.settings.clone(),
-            schedule: Schedule {
-                first: point.first,
-                interval: point.interval,
-                sections,
-                discard: 0,
-            },
+            schedule: Schedule { first: point.first, interval: point.interval, sections, discard: 0 },
         };
         let mut point = points(index)?;
         let mut legs = vec![leg(point, section + 1)];
@@ -54,21 +49,11 @@ impl Load {
         }
         legs.reverse();
         let mut scene = scene.clone();
-        let varied = legs[0]
-            .settings
-            .iter()
-            .map(|(key, _)| key.clone())
-            .collect();
+        let varied = legs[0].settings.iter().map(|(key, _)| key.clone()).collect();
         // The first point is where the run starts.
         scene.changes.append(&mut legs[0].settings);
         let last = legs.last()?.schedule;
-        Some(Self {
-            scene,
-            varied,
-            total: last.time(last.sections.saturating_sub(1)),
-            legs,
-            next: 0,
-        })
+        Some(Self { scene, varied, total: last.time(last.sections.saturating_sub(1)), legs, next: 0 })
     }
 
     /// Keys that the sweep varied.
@@ -82,11 +67,7 @@ impl Load {
     }
 
     /// Continues while `may_step`; returns how it ended, once there.
-    pub fn advance(
-        &mut self,
-        player: &mut Player,
-        mut may_step: impl FnMut() -> bool,
-    ) -> Option<Arrival> {
+    pub fn advance(&mut self, player: &mut Player, mut may_step: impl FnMut() -> bool) -> Option<Arrival> {
         loop {
             if player.sections_to_come() == 0 {
                 let Some(leg) = self.legs.get(self.next) else {
@@ -137,17 +118,13 @@ mod tests {
             exponent: false,
         };
         let mut points = vec![None; 3];
-        perform(
-            &Job::Sweep(task.clone(), Share::WHOLE),
-            &mut || 0.0,
-            &mut |message| {
-                if let Message::Point(point) = message {
-                    let index = point.index;
-                    points[index] = Some(*point);
-                }
-                ControlFlow::Continue(())
-            },
-        );
+        perform(&Job::Sweep(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
+            if let Message::Point(point) = message {
+                let index = point.index;
+                points[index] = Some(*point);
+            }
+            ControlFlow::Continue(())
+        });
         let find = |index: usize| points.get(index)?.as_ref();
         for (index, kept) in [(2, 0), (1, 1), (0, 0)] {
             let way = Load::new(&task.scene, find, index, task.discard + kept, 3);

@@ -52,12 +52,7 @@ impl Event {
 
     /// The instants at which steps end from here on.
     pub fn schedule(&self) -> Option<Schedule> {
-        let Self::Sections {
-            first,
-            interval,
-            sections,
-        } = self
-        else {
+        let Self::Sections { first, interval, sections } = self else {
             return None;
         };
         Some(Schedule {
@@ -92,23 +87,14 @@ impl From<Pull> for Pulled {
     fn from(pull: Pull) -> Self {
         let (p, h) = (pull.point, pull.hand);
         let numbers = [p.x, p.y, p.z, h.x, h.y, h.z, pull.stiffness, pull.damping];
-        Self {
-            body: pull.body,
-            numbers: numbers.map(Number),
-        }
+        Self { body: pull.body, numbers: numbers.map(Number) }
     }
 }
 
 impl From<Pulled> for Pull {
     fn from(pulled: Pulled) -> Self {
         let [px, py, pz, hx, hy, hz, stiffness, damping] = pulled.numbers.map(|n| n.0);
-        Self {
-            body: pulled.body,
-            point: Vec3::new(px, py, pz),
-            hand: Vec3::new(hx, hy, hz),
-            stiffness,
-            damping,
-        }
+        Self { body: pulled.body, point: Vec3::new(px, py, pz), hand: Vec3::new(hx, hy, hz), stiffness, damping }
     }
 }
 
@@ -145,10 +131,7 @@ pub struct Log {
 impl Log {
     /// An empty log of a run that starts with these changes.
     pub fn new(base: &[(String, String)]) -> Self {
-        Self {
-            base: base.to_vec(),
-            entries: Vec::new(),
-        }
+        Self { base: base.to_vec(), entries: Vec::new() }
     }
 
     /// Adds a change of `key` to `value`.
@@ -171,11 +154,9 @@ impl Log {
             text.push_str(&match &entry.event {
                 Event::Set { key, value } => format!("{steps} {key}={value}\n"),
                 Event::Original { key } => format!("{steps} {key}\n"),
-                Event::Sections {
-                    first,
-                    interval,
-                    sections,
-                } => format!("{steps} |{} {} {sections}\n", first.0, interval.0),
+                Event::Sections { first, interval, sections } => {
+                    format!("{steps} |{} {} {sections}\n", first.0, interval.0)
+                }
                 Event::Pull(None) => format!("{steps} @\n"),
                 Event::Pull(Some(pulled)) => {
                     let numbers = pulled.numbers.map(|number| number.0.to_string());
@@ -192,10 +173,7 @@ impl Log {
     /// # Errors
     /// The line that is not an entry.
     pub fn read(base: Vec<(String, String)>, text: &str) -> Result<Self, String> {
-        let mut log = Self {
-            base,
-            entries: Vec::new(),
-        };
+        let mut log = Self { base, entries: Vec::new() };
         let mut before = 0_u64;
         for line in text.lines() {
             let wrong = || {
@@ -219,14 +197,9 @@ impl Log {
             log.push(
                 before,
                 match what.split_once('=') {
-                    Some((key, value)) => Event::Set {
-                        key: key.to_owned(),
-                        value: value.to_owned(),
-                    },
+                    Some((key, value)) => Event::Set { key: key.to_owned(), value: value.to_owned() },
                     None if what == "!" => Event::Stop,
-                    None => Event::Original {
-                        key: what.to_owned(),
-                    },
+                    None => Event::Original { key: what.to_owned() },
                 },
             );
         }
@@ -243,11 +216,7 @@ fn read_sections(text: &str) -> Option<Event> {
     };
     let (first, interval) = (number()?, number()?);
     let sections = parts.next()?.parse().ok()?;
-    parts.next().is_none().then_some(Event::Sections {
-        first,
-        interval,
-        sections,
-    })
+    parts.next().is_none().then_some(Event::Sections { first, interval, sections })
 }
 
 /// Reads `BODY` and eight numbers, or nothing.
@@ -278,11 +247,7 @@ mod tests {
         log.set(120, "joint.S1.clearance", "0.4 mm");
         let key = "contact.clearance".to_owned();
         log.push(120, Event::Original { key });
-        let sections = Event::Sections {
-            first: Number(0.1 + 0.2),
-            interval: Number(2.0),
-            sections: 30,
-        };
+        let sections = Event::Sections { first: Number(0.1 + 0.2), interval: Number(2.0), sections: 30 };
         log.push(130, sections);
         let pull = Pull {
             body: 3,

@@ -3,9 +3,7 @@
 mod draw;
 mod sight;
 
-use eframe::egui::{
-    self, ComboBox, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2,
-};
+use eframe::egui::{self, ComboBox, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use glam::Vec3;
 
 use super::player::Player;
@@ -84,9 +82,7 @@ impl Microscope {
             return None;
         }
         let size = (SHARE * room).min(USUAL).max(least);
-        let panel = panel
-            .default_size(size)
-            .size_range(least..=(MOST * room).max(least));
+        let panel = panel.default_size(size).size_range(least..=(MOST * room).max(least));
         panel
             .resizable(true)
             .frame(theme::panel(ui).inner_margin(8.0))
@@ -126,9 +122,7 @@ impl Microscope {
                     }
                 })
                 .response
-                .on_hover_text(
-                    "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes",
-                )
+                .on_hover_text("Plane of the picture, seen along its normal: as the 3D view, or that of two world axes")
                 .accessible_name("Plane of the microscope");
             let close = ui.button("Close").on_hover_text("Esc, or key L");
             if close.clicked() {
@@ -166,14 +160,7 @@ impl Microscope {
     }
 
     /// The picture of the clearance sphere.
-    fn sphere(
-        &mut self,
-        ui: &mut Ui,
-        player: &Player,
-        sight: &Sight,
-        axes: [Vec3; 2],
-        size: egui::Vec2,
-    ) {
+    fn sphere(&mut self, ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2], size: egui::Vec2) {
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
         let report = &sight.report;
         let name = player.scene().ball_joints.get(self.joint);
@@ -186,11 +173,7 @@ impl Microscope {
         );
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
         if report.state == ContactState::Ideal || report.clearance <= 0.0 {
-            draw::empty(
-                ui,
-                rect,
-                "An ideal joint has no clearance: there is no play to see",
-            );
+            draw::empty(ui, rect, "An ideal joint has no clearance: there is no play to see");
             return;
         }
         let now = player.pacer.shown();
@@ -211,14 +194,11 @@ impl Microscope {
 
 fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
     // Sideways, too: a long number must not widen the panel.
-    ScrollArea::both()
-        .id_salt("under the microscope")
-        .auto_shrink(false)
-        .show(ui, |ui| {
-            // Room for the scroll bar.
-            ui.set_max_width(ui.available_width() - 10.0);
-            add(ui);
-        });
+    ScrollArea::both().id_salt("under the microscope").auto_shrink(false).show(ui, |ui| {
+        // Room for the scroll bar.
+        ui.set_max_width(ui.available_width() - 10.0);
+        add(ui);
+    });
 }
 
 /// The picture of the contact.
@@ -254,9 +234,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
     let (beside, pressed) = match &sight.patch {
-        Some(patch) if patch.penetration > 0.0 => {
-            (NONE.to_owned(), value::quantity(patch.penetration, "um", 3))
-        }
+        Some(patch) if patch.penetration > 0.0 => (NONE.to_owned(), value::quantity(patch.penetration, "um", 3)),
         Some(patch) => (draw::length(-patch.penetration, 3), NONE.to_owned()),
         None => (NONE.to_owned(), NONE.to_owned()),
     };
@@ -272,30 +250,16 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             draw::length(f64::from(towards), 3),
             "The part of it that the picture does not show, along the line of sight",
         ),
-        (
-            "Gap",
-            beside,
-            "Between ball and wall, where they are nearest",
-        ),
-        (
-            "Penetration",
-            pressed,
-            "How deep the ball presses into the wall",
-        ),
+        ("Gap", beside, "Between ball and wall, where they are nearest"),
+        ("Penetration", pressed, "How deep the ball presses into the wall"),
         (
             "Elastic patch",
-            patch.map_or(NONE.to_owned(), |patch| {
-                format!("radius {}", draw::length(patch.radius(), 3))
-            }),
+            patch.map_or(NONE.to_owned(), |patch| format!("radius {}", draw::length(patch.radius(), 3))),
             "Radius of the contact patch by Hertz, a = √(R δ), R = (r + c) r / c",
         ),
         (
             "Speed of approach",
-            if sight.normal.is_some() {
-                speed(report.penetration_rate)
-            } else {
-                NONE.to_owned()
-            },
+            if sight.normal.is_some() { speed(report.penetration_rate) } else { NONE.to_owned() },
             "Rate at which the ball nears the wall now; negative while it leaves it",
         ),
         (
@@ -311,13 +275,9 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     ];
     let given = |number: f64| value::number(number, 4);
     let impact = sight.impact;
-    let of = |read: fn(&crate::simulate::Impact) -> String| {
-        impact.as_ref().map_or(NONE.to_owned(), read)
-    };
+    let of = |read: fn(&crate::simulate::Impact) -> String| impact.as_ref().map_or(NONE.to_owned(), read);
     let now = player.pacer.shown();
-    let ago = impact.map_or(NONE.to_owned(), |impact| {
-        format!("{} ago", value::time(now - impact.end))
-    });
+    let ago = impact.map_or(NONE.to_owned(), |impact| format!("{} ago", value::time(now - impact.end)));
     let latest = [
         ("Latest impact", ago, "When its contact ended"),
         (
@@ -330,11 +290,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             of(|impact| value::quantity(impact.separation_speed, "m/s", 4)),
             "Speed of separation when it ended",
         ),
-        (
-            "Deepest",
-            of(|impact| value::quantity(impact.deepest, "um", 3)),
-            "Its deepest penetration",
-        ),
+        ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its deepest penetration"),
         (
             "Restitution asked",
             impact.map_or(NONE.to_owned(), |impact| given(impact.asked)),
@@ -351,22 +307,16 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             "Speed of separation over speed of approach of the latest impact",
         ),
     ];
-    Grid::new("numbers under the microscope")
-        .num_columns(2)
-        .spacing([10.0, 2.0])
-        .min_row_height(16.0)
-        .show(ui, |ui| {
-            for (name, number, help) in rows.into_iter().chain(latest) {
-                let label = ui.label(RichText::new(name).small().weak());
-                label.on_hover_text(help);
-                ui.label(RichText::new(number).small());
-                ui.end_row();
-            }
-        });
-    let remark = match impact {
-        Some(impact) if impact.floored => {
-            "It began slower than impact_speed_floor: it rebounds higher than asked"
+    Grid::new("numbers under the microscope").num_columns(2).spacing([10.0, 2.0]).min_row_height(16.0).show(ui, |ui| {
+        for (name, number, help) in rows.into_iter().chain(latest) {
+            let label = ui.label(RichText::new(name).small().weak());
+            label.on_hover_text(help);
+            ui.label(RichText::new(number).small());
+            ui.end_row();
         }
+    });
+    let remark = match impact {
+        Some(impact) if impact.floored => "It began slower than impact_speed_floor: it rebounds higher than asked",
         Some(impact) if impact.disturbed => {
             "Another joint touched meanwhile, or a change came: its restitution is not the law's alone"
         }
@@ -407,9 +357,7 @@ impl App {
         ui.label("Instruments");
         ui.horizontal(|ui| {
             ui.checkbox(&mut self.microscope.open, "Microscope")
-                .on_hover_text(
-                    "The play of the joint in focus, magnified: path of the ball, contact, impacts (key L)",
-                );
+                .on_hover_text("The play of the joint in focus, magnified: path of the ball, contact, impacts (key L)");
             self.sound_switch(ui);
         });
         self.ideal_switch(ui);

@@ -147,10 +147,7 @@ impl AppOptions {
             theme: ThemePreference::System,
             playing: true,
             time_scale: 0.02,
-            view: ViewOptions {
-                magnification: 20.0,
-                ..ViewOptions::default()
-            },
+            view: ViewOptions { magnification: 20.0, ..ViewOptions::default() },
             link: None,
             lesson: None,
             embedded: None,
@@ -161,11 +158,7 @@ impl AppOptions {
 
     /// Begins `lesson` at step `step`, counted from 0.
     pub fn of_lesson(lesson: Arc<Lesson>, step: usize) -> Self {
-        Self {
-            playing: false,
-            lesson: Some((lesson.clone(), step)),
-            ..Self::new(lesson.runs[0].scene.clone())
-        }
+        Self { playing: false, lesson: Some((lesson.clone(), step)), ..Self::new(lesson.runs[0].scene.clone()) }
     }
 
     /// Reads a link: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. An empty one gives the default scene.
@@ -190,8 +183,7 @@ impl AppOptions {
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
         link.followed(&scene).map_err(|error| error.to_string())?;
-        link.under_microscope(&scene)
-            .map_err(|error| error.to_string())?;
+        link.under_microscope(&scene).map_err(|error| error.to_string())?;
         let mut options = Self::new(scene);
         options.lesson = lesson;
         options.embedded.clone_from(&link.embedded);
@@ -213,10 +205,7 @@ impl AppOptions {
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
             let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
-            Self {
-                problem: Some(problem),
-                ..Self::new(scene)
-            }
+            Self { problem: Some(problem), ..Self::new(scene) }
         })
     }
 }
@@ -330,14 +319,7 @@ impl App {
             touched: false,
             fingers: None,
             host: Box::new(NoHost),
-            scene_file: SceneFile::named(
-                options
-                    .scene
-                    .source
-                    .file
-                    .clone()
-                    .filter(|_| options.link.is_none()),
-            ),
+            scene_file: SceneFile::named(options.scene.source.file.clone().filter(|_| options.link.is_none())),
             replay: None,
             load: None,
             verdict: None,
@@ -401,12 +383,7 @@ impl App {
     }
 
     /// Continues in another window, or with new graphics after the old were lost; nothing else changes.
-    pub fn attach(
-        &mut self,
-        ctx: &egui::Context,
-        state: Option<&egui_wgpu::RenderState>,
-        theme: ThemePreference,
-    ) {
+    pub fn attach(&mut self, ctx: &egui::Context, state: Option<&egui_wgpu::RenderState>, theme: ThemePreference) {
         theme::apply(ctx);
         ctx.set_theme(theme);
         self.renderer = String::new();
@@ -559,11 +536,7 @@ impl App {
     /// # Errors
     /// As [`Self::open_link`] and [`Self::open`], in words.
     pub fn open_any(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
-        if share::is_link(text) {
-            self.open_link(ctx, text)
-        } else {
-            self.open(text.trim())
-        }
+        if share::is_link(text) { self.open_link(ctx, text) } else { self.open(text.trim()) }
     }
 
     /// Back to t = 0 with every change applied.
@@ -671,11 +644,7 @@ impl App {
         }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
-        moves
-            || sought
-            || self.player.is_seeking()
-            || self.player.is_playing()
-            || self.player.is_ideal_behind()
+        moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
@@ -780,15 +749,10 @@ impl App {
                 egui::Theme::Light => ThemePreference::Dark,
             }),
             Action::Help => {
-                self.dialog = if self.dialog == Some(Dialog::Help) {
-                    None
-                } else {
-                    Some(Dialog::Help)
-                };
+                self.dialog = if self.dialog == Some(Dialog::Help) { None } else { Some(Dialog::Help) };
             }
             Action::Close => {
-                let told =
-                    self.problem.is_some() || self.is_under_way() || egui::Popup::is_any_open(ctx);
+                let told = self.problem.is_some() || self.is_under_way() || egui::Popup::is_any_open(ctx);
                 if self.dialog.take().is_none() {
                     self.cancel_replay();
                     self.problem = None;
@@ -853,10 +817,7 @@ impl App {
                 if let Err(reason) = self.open_any(ctx, &argument) {
                     // The dialog shows it.
                     self.problem = None;
-                    self.dialog = Some(Dialog::Open {
-                        path: argument,
-                        error: Some(reason),
-                    });
+                    self.dialog = Some(Dialog::Open { path: argument, error: Some(reason) });
                 }
             }
             None => self.dialog = Some(dialog),

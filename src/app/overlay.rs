@@ -6,9 +6,7 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, 
 use super::value;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};
-use crate::view::{
-    Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme, WearMap, WearScale,
-};
+use crate::view::{Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme, WearMap, WearScale};
 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
@@ -55,20 +53,13 @@ const LED: f32 = 14.0;
 
 /// A place for a plate of `size` that is `anchor`ed `beside` a point, over none of `plates` and in `rect`: there, on another side
 /// of the point, or above and below, the nearest first.
-fn clear_of(
-    plates: &[Rect],
-    rect: Rect,
-    at: Pos2,
-    (anchor, beside): (Align2, Vec2),
-    size: Vec2,
-) -> Option<Rect> {
+fn clear_of(plates: &[Rect], rect: Rect, at: Pos2, (anchor, beside): (Align2, Vec2), size: Vec2) -> Option<Rect> {
     let first = anchor.anchor_size(at + beside, size).expand2(PAD);
     let mirrored = first.translate(vec2(2.0 * (at.x - first.center().x), 0.0));
     let row = first.height() + 1.0;
     let rows = (FURTHEST / row) as i32;
     let steps = (0..=rows).flat_map(|k| [-k, k].into_iter().skip(usize::from(k == 0)));
-    let places =
-        steps.flat_map(|k| [first, mirrored].map(|p| p.translate(vec2(0.0, k as f32 * row))));
+    let places = steps.flat_map(|k| [first, mirrored].map(|p| p.translate(vec2(0.0, k as f32 * row))));
     let free = |place: &Rect| !plates.iter().any(|plate| plate.intersects(*place));
     places.filter(|place| rect.contains_rect(*place)).find(free)
 }
@@ -104,11 +95,7 @@ pub fn paint(
     if let Some(scale) = &list.wear_scale {
         taken.extend(wear_scale(painter, rect, scale, theme));
     }
-    if let Some(shown) = list
-        .legend
-        .as_ref()
-        .filter(|_| overlay.legend && has_room(rect))
-    {
+    if let Some(shown) = list.legend.as_ref().filter(|_| overlay.legend && has_room(rect)) {
         taken.push(legend(painter, rect, scale, shown, theme));
     }
     if let Some(at) = overlay.time {
@@ -137,9 +124,7 @@ fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList, taken: Vec
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
         let plate = match label.kind {
             LabelKind::Joint(_) => Some((13.0, Align2::LEFT_BOTTOM, vec2(10.0, -8.0))),
-            LabelKind::Peak(_) | LabelKind::Outside => {
-                Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0)))
-            }
+            LabelKind::Peak(_) | LabelKind::Outside => Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0))),
             LabelKind::Error => Some((12.0, Align2::CENTER_TOP, vec2(0.0, 10.0))),
             LabelKind::Axis | LabelKind::Gravity => None,
         };
@@ -165,36 +150,17 @@ fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList, taken: Vec
             continue;
         }
         let ink = colour(label.colour);
-        text(
-            painter,
-            at,
-            Align2::CENTER_CENTER,
-            &label.text,
-            12.0,
-            ink,
-            halo,
-        );
+        text(painter, at, Align2::CENTER_CENTER, &label.text, 12.0, ink, halo);
     }
 }
 
 /// Simulated time in the upper left corner, with notes below it, on a plate of their own: where that is.
-fn time(
-    painter: &Painter,
-    rect: Rect,
-    time: f64,
-    notes: impl Iterator<Item = String>,
-    theme: Theme,
-) -> Rect {
+fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = String>, theme: Theme) -> Rect {
     let palette = Palette::of(theme);
     let ink = colour(palette.text);
-    let line =
-        |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
+    let line = |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
     let large = has_room(rect);
-    let (size, small_size, margin) = if large {
-        (18.0, 13.0, MARGIN)
-    } else {
-        (11.0, 10.0, 6.0)
-    };
+    let (size, small_size, margin) = if large { (18.0, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
     let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
     // The first note says how much the play is magnified: never left out for want of room alone.
     let notes = notes.filter(|note| !note.is_empty());
@@ -220,10 +186,7 @@ pub fn plate(joints: usize) -> [f32; 2] {
     const LONGEST: f32 = 230.0;
     const LINE: f32 = 16.0;
     // Time and magnification come first.
-    [
-        MARGIN + LONGEST + 8.0,
-        MARGIN + 38.0 + LINE * joints as f32 + 8.0,
-    ]
+    [MARGIN + LONGEST + 8.0, MARGIN + 38.0 + LINE * joints as f32 + 8.0]
 }
 
 /// One line per ball joint: its forces as the step reported them.
@@ -260,34 +223,16 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
     let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
     let axis = corner.y - 18.0;
     let left = corner.x - shown;
-    painter.line_segment(
-        [pos2(left, axis), pos2(corner.x, axis)],
-        Stroke::new(1.5, ink),
-    );
+    painter.line_segment([pos2(left, axis), pos2(corner.x, axis)], Stroke::new(1.5, ink));
     let mut all = Rect::from_min_max(pos2(left, axis), corner + vec2(12.0, 0.0));
     let mut free_from = f32::NEG_INFINITY;
-    for tick in legend
-        .ticks
-        .iter()
-        .filter(|tick| tick.fraction * full <= shown + 0.5)
-    {
+    for tick in legend.ticks.iter().filter(|tick| tick.fraction * full <= shown + 0.5) {
         let x = left + tick.fraction * full;
-        painter.line_segment(
-            [pos2(x, axis - 4.0), pos2(x, axis + 4.0)],
-            Stroke::new(1.5, ink),
-        );
+        painter.line_segment([pos2(x, axis - 4.0), pos2(x, axis + 4.0)], Stroke::new(1.5, ink));
         let words = format_quantity_digits(f64::from(tick.force), "", 3);
         // Omitted where it would touch the mark before it.
         if x - 12.0 >= free_from {
-            let placed = text(
-                painter,
-                pos2(x, axis + 5.0),
-                Align2::CENTER_TOP,
-                &words,
-                11.0,
-                ink,
-                halo,
-            );
+            let placed = text(painter, pos2(x, axis + 5.0), Align2::CENTER_TOP, &words, 11.0, ink, halo);
             free_from = placed.max.x + 4.0;
         }
     }
@@ -378,12 +323,7 @@ fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) ->
         let hue = colour(WearScale::colour(0.5 * (from + to)));
         painter.rect_filled(Rect::from_points(&rows), 0.0, hue);
     }
-    let outline = [
-        bar.left_top(),
-        bar.right_top(),
-        bar.right_bottom(),
-        bar.left_bottom(),
-    ];
+    let outline = [bar.left_top(), bar.right_top(), bar.right_bottom(), bar.left_bottom()];
     painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.0, ink)));
     let mut all = bar;
     for tick in scale.ticks() {
@@ -392,29 +332,13 @@ fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) ->
         painter.line_segment([pos2(left, y), pos2(bar.min.x, y)], Stroke::new(1.0, ink));
         let words = format_quantity_digits(f64::from(tick), "", 1);
         let place = pos2(left - 3.0, y);
-        all |= text(
-            painter,
-            place,
-            Align2::RIGHT_CENTER,
-            &words,
-            11.0,
-            ink,
-            halo,
-        );
+        all |= text(painter, place, Align2::RIGHT_CENTER, &words, 11.0, ink, halo);
     }
     // In a narrow picture the note beside the time says what it is; the title would lie over a joint.
     if rect.width() >= 520.0 {
         let title = format!("Wear: {what}, {unit}");
         let place = pos2(bar.max.x, bar.min.y - 6.0);
-        all |= text(
-            painter,
-            place,
-            Align2::RIGHT_BOTTOM,
-            &title,
-            12.0,
-            ink,
-            halo,
-        );
+        all |= text(painter, place, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo);
     }
     Some(all)
 }
@@ -441,10 +365,7 @@ mod tests {
             pixel: glam::Vec2::new(300.0, 100.0 + apart * joint as f32),
             colour: Palette::of(Theme::Light).text,
         };
-        let list = DrawList {
-            labels: (0..count).map(label).collect(),
-            ..DrawList::default()
-        };
+        let list = DrawList { labels: (0..count).map(label).collect(), ..DrawList::default() };
         let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
         let words = shapes_of(&list, rect).into_iter().filter_map(|shape| {
             let Shape::Text(text) = shape else {
@@ -511,10 +432,7 @@ mod tests {
                 let others = &plates[i + 1..];
                 assert!(!others.iter().any(|other| other.intersects(*plate)), "{i}");
                 let at = list.labels[i].pixel;
-                let (at, led) = (
-                    pos2(at.x, at.y),
-                    plate.distance_to_pos(pos2(at.x, at.y)) > LED,
-                );
+                let (at, led) = (pos2(at.x, at.y), plate.distance_to_pos(pos2(at.x, at.y)) > LED);
                 let line = ends.iter().find(|[from, _]| from.distance(at) < 0.01);
                 assert_eq!(line.is_some(), led, "{i}");
                 let arrives = line.is_none_or(|[_, to]| plate.distance_to_pos(*to) < 0.01);
@@ -549,28 +467,13 @@ mod tests {
             }),
             ..DrawList::default()
         };
-        let overlay = Overlay {
-            time: Some(0.0),
-            legend: true,
-            labels: true,
-            ..Overlay::default()
-        };
+        let overlay = Overlay { time: Some(0.0), legend: true, labels: true, ..Overlay::default() };
         let texts = |overlay: &Overlay| {
             let shapes = shapes(rect, |painter| {
-                paint(
-                    painter,
-                    rect,
-                    1.0,
-                    &list,
-                    Theme::Light,
-                    overlay,
-                    Some(caption),
-                );
+                paint(painter, rect, 1.0, &list, Theme::Light, overlay, Some(caption));
             });
             let texts = shapes.into_iter().filter_map(|shape| match shape {
-                Shape::Text(text) => {
-                    Some((text.galley.text().to_owned(), text.visual_bounding_rect()))
-                }
+                Shape::Text(text) => Some((text.galley.text().to_owned(), text.visual_bounding_rect())),
                 _ => None,
             });
             texts.collect::<Vec<_>>()
@@ -586,19 +489,8 @@ mod tests {
             }
         }
         // Without the rest they would stand there.
-        let alone = texts(&Overlay {
-            labels: true,
-            ..Overlay::default()
-        });
-        assert!(
-            alone[0].1.intersects(
-                others
-                    .iter()
-                    .find(|(text, _)| text.starts_with("t ="))
-                    .expect("time")
-                    .1
-            )
-        );
+        let alone = texts(&Overlay { labels: true, ..Overlay::default() });
+        assert!(alone[0].1.intersects(others.iter().find(|(text, _)| text.starts_with("t =")).expect("time").1));
     }
 
     #[test]
@@ -612,10 +504,7 @@ mod tests {
             let joint: f32 = name[1..].parse().expect("a number");
             let wanted = 100.0 + joint * 400.0 / 4096.0;
             let off = (at.y - wanted).abs();
-            assert!(
-                off <= FURTHEST + 30.0,
-                "{name}: {off} points from its joint"
-            );
+            assert!(off <= FURTHEST + 30.0, "{name}: {off} points from its joint");
         }
     }
 }

@@ -100,16 +100,8 @@ impl Pace {
 
     /// Takes a frame between others that moved.
     fn count(&mut self, dt: f64, drawing: f64) {
-        self.slow = if dt > SLOW && 2.0 * drawing >= dt {
-            (self.slow.0 + 1, self.slow.1 + dt)
-        } else {
-            (0, 0.0)
-        };
-        self.room = if drawing < ROOM {
-            self.room + dt
-        } else {
-            (self.room - LOSS * dt).max(0.0)
-        };
+        self.slow = if dt > SLOW && 2.0 * drawing >= dt { (self.slow.0 + 1, self.slow.1 + dt) } else { (0, 0.0) };
+        self.room = if drawing < ROOM { self.room + dt } else { (self.room - LOSS * dt).max(0.0) };
         let trial = self.trial.map(|trial| trial + dt);
         self.trial = trial.filter(|trial| *trial < TRIAL);
         if trial.is_some() && self.trial.is_none() {
@@ -163,13 +155,7 @@ mod tests {
 
         fn show(&mut self, moves: bool, dt: f64, drawing: f64) -> Quality {
             let before = self.pace.row;
-            let quality = self.pace.frame(&Seen {
-                size: SIZE,
-                moves,
-                now: self.now,
-                dt,
-                drawing,
-            });
+            let quality = self.pace.frame(&Seen { size: SIZE, moves, now: self.now, dt, drawing });
             if self.pace.row != before {
                 self.changes.push((self.now, self.pace.row));
             }

@@ -31,21 +31,15 @@ struct Path {
 
 /// Axes of body `body` as columns; those of the world for `None`.
 pub fn axes_of(frame: &Frame, body: Option<usize>) -> Mat3 {
-    body.and_then(|body| frame.bodies.get(body))
-        .map_or_else(Mat3::identity, |motion| motion.rotation)
+    body.and_then(|body| frame.bodies.get(body)).map_or_else(Mat3::identity, |motion| motion.rotation)
 }
 
 impl Paths {
     /// Empty paths for `scene`.
     pub fn new(scene: &Scene) -> Self {
         let joints = scene.ball_joints.iter().take(RECORDED_JOINTS);
-        let path = |joint: &crate::scene::BallJoint| Path {
-            carrier: joint.socket.body,
-            points: Vec::new(),
-        };
-        Self {
-            joints: joints.map(path).collect(),
-        }
+        let path = |joint: &crate::scene::BallJoint| Path { carrier: joint.socket.body, points: Vec::new() };
+        Self { joints: joints.map(path).collect() }
     }
 
     /// Records an instant of the run. One earlier than the latest begins another future: what came after it is dropped.
@@ -59,11 +53,7 @@ impl Paths {
             let place = [here.x as f32, here.y as f32, here.z as f32];
             let grain = GRAIN * joint.clearance as f32;
             let moved = |last: &Point| {
-                let squares = last
-                    .place
-                    .iter()
-                    .zip(&place)
-                    .map(|(a, b)| (a - b) * (a - b));
+                let squares = last.place.iter().zip(&place).map(|(a, b)| (a - b) * (a - b));
                 squares.sum::<f32>() > grain * grain
             };
             // In an ideal joint the ball cannot move.

@@ -39,16 +39,8 @@ pub enum Contents {
 impl Contents {
     const ALL: [(Self, &'static str, &'static str); 3] = [
         (Self::View, "View only", "The 3D view without its buttons"),
-        (
-            Self::Plots,
-            "View and plots",
-            "The 3D view with the plots below it",
-        ),
-        (
-            Self::Window,
-            "Whole window",
-            "The window as it is, with all panels",
-        ),
+        (Self::Plots, "View and plots", "The 3D view with the plots below it"),
+        (Self::Window, "Whole window", "The window as it is, with all panels"),
     ];
 }
 
@@ -126,15 +118,13 @@ impl App {
         let picture = &mut self.picture;
         ui.horizontal(|ui| {
             for (contents, name, help) in Contents::ALL {
-                ui.selectable_value(&mut picture.contents, contents, name)
-                    .on_hover_text(help);
+                ui.selectable_value(&mut picture.contents, contents, name).on_hover_text(help);
             }
         });
         ui.horizontal(|ui| {
             for times in TIMES {
                 let help = format!("{times} times as many pixels along each edge as on the screen");
-                ui.selectable_value(&mut picture.times, Some(times), format!("{times}×"))
-                    .on_hover_text(help);
+                ui.selectable_value(&mut picture.times, Some(times), format!("{times}×")).on_hover_text(help);
             }
             let own = Button::selectable(picture.times.is_none(), "Own size");
             if ui.add(own).on_hover_text("Any width and height").clicked() {
@@ -152,11 +142,7 @@ impl App {
             });
         });
         let ([width, height], _) = picture.size(points, screen);
-        ui.label(
-            RichText::new(format!("{width} × {height} pixels"))
-                .small()
-                .weak(),
-        );
+        ui.label(RichText::new(format!("{width} × {height} pixels")).small().weak());
     }
 
     /// Size on the screen of what the picture shows, points.
@@ -200,35 +186,25 @@ impl App {
         self.picture.pending = None;
         let described = self.describe();
         let software = format!("jointplay {}", crate::VERSION);
-        let texts = [
-            ("Software", software.as_str()),
-            ("Description", described.as_str()),
-        ];
+        let texts = [("Software", software.as_str()), ("Description", described.as_str())];
         let bytes = image
             .map_err(|error| error.to_string())
             .and_then(|image| image.png(&texts).map_err(|error| error.to_string()));
         match bytes {
-            Ok(bytes) => self.save(vec![SaveFile {
-                name: format!("{}.png", self.file_stem()),
-                mime: "image/png",
-                bytes,
-            }]),
+            Ok(bytes) => {
+                self.save(vec![SaveFile { name: format!("{}.png", self.file_stem()), mime: "image/png", bytes }])
+            }
             Err(reason) => self.problem = Some(format!("The picture cannot be saved: {reason}")),
         }
     }
 
     /// Draws the picture off screen.
     fn draw_picture(&mut self, ctx: &egui::Context) -> Result<Pending, String> {
-        let state: RenderState = self
-            .graphics
-            .clone()
-            .ok_or("The picture cannot be drawn: there is no graphics adapter")?;
-        let measures = self
-            .picture
-            .size(self.picture_points(ctx), ctx.pixels_per_point());
+        let state: RenderState =
+            self.graphics.clone().ok_or("The picture cannot be drawn: there is no graphics adapter")?;
+        let measures = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
         let contents = self.picture.contents;
-        let drawn =
-            self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, measures, true);
+        let drawn = self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, measures, true);
         drawn.map_err(|error| format!("The picture cannot be drawn: {error}"))
     }
 
@@ -246,9 +222,7 @@ impl App {
     ) -> Result<Pending, String> {
         let kept = (self.picture.contents, self.picture.times, self.picture.own);
         (self.picture.contents, self.picture.times, self.picture.own) = (contents, None, size);
-        let measures = self
-            .picture
-            .size(self.picture_points(ctx), ctx.pixels_per_point());
+        let measures = self.picture.size(self.picture_points(ctx), ctx.pixels_per_point());
         (self.picture.contents, self.picture.times, self.picture.own) = kept;
         let drawn = self.draw_off_screen(ctx, canvas, contents, measures, first);
         drawn.map_err(|error| error.to_string())
@@ -312,11 +286,7 @@ mod tests {
     #[test]
     fn a_larger_picture_is_sharper_and_a_small_view_gets_room_for_its_names() {
         let of = |times, own, points, screen| {
-            let picture = Picture {
-                times,
-                own,
-                ..Picture::default()
-            };
+            let picture = Picture { times, own, ..Picture::default() };
             picture.size(points, screen)
         };
         let view = vec2(980.0, 470.0);
@@ -331,9 +301,6 @@ mod tests {
         assert_eq!(of(Some(1), [0, 0], small, 1.0), ([390, 150], 1.0));
         let (pixels, scale) = of(Some(4), [0, 0], small, 1.0);
         assert_eq!(pixels, [1560, 600]);
-        assert!(
-            (pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1,
-            "{scale}"
-        );
+        assert!((pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1, "{scale}");
     }
 }

@@ -17,8 +17,8 @@ use crate::analysis::presets::too_slow;
 use crate::analysis::section::Schedule;
 use crate::scene::{SOLVER_KEYS, Scene, Value};
 use crate::simulate::{
-    ChangeError, Channels, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull,
-    RECORDED_JOINTS, Simulation, StartError, Stopped, Wear,
+    ChangeError, Channels, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
+    StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
 use keyframes::Keyframes;
@@ -107,10 +107,7 @@ const MOST_RECORDED: f64 = 64.0;
 fn sentences(scene: &Scene) -> Vec<String> {
     let warnings = scene.warnings().into_iter();
     let slow = too_slow(scene).map(|slow| slow.to_string());
-    warnings
-        .map(|warning| warning.to_string())
-        .chain(slow)
-        .collect()
+    warnings.map(|warning| warning.to_string()).chain(slow).collect()
 }
 
 impl Player {
@@ -121,13 +118,8 @@ impl Player {
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         let simulation = Simulation::new(scene)?;
         // The text has been parsed before; should that fail now, a control's default is its present value.
-        let original = Scene::parse_with(
-            &scene.source.text,
-            scene.source.file.as_deref(),
-            &scene.source.beside,
-            &[],
-        )
-        .unwrap_or_else(|_| scene.clone());
+        let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
+            .unwrap_or_else(|_| scene.clone());
         let channels = Channels::of(scene);
         let mut player = Self {
             pacer: Pacer::default(),
@@ -221,8 +213,7 @@ impl Player {
         self.picks = patterns.to_vec();
         let (first, channels) = (self.clearances().end, self.history.channels());
         let old = self.channels.clone();
-        self.channels
-            .pick(self.simulation.running_scene(), &self.frame, patterns);
+        self.channels.pick(self.simulation.running_scene(), &self.frame, patterns);
         let place = |new: &Listed| {
             let same = |old: &Listed| old.column == new.column;
             old.picked().iter().position(same).map(|at| first + at)
@@ -342,8 +333,7 @@ impl Player {
     /// Instants of the schedule that are still to come.
     pub(super) fn sections_to_come(&self) -> usize {
         let now = self.simulation.time();
-        self.sections
-            .map_or(0, |schedule| schedule.sections - passed(&schedule, now))
+        self.sections.map_or(0, |schedule| schedule.sections - passed(&schedule, now))
     }
 
     /// Accepted steps since the start.
@@ -439,11 +429,7 @@ impl Player {
 
     /// What the latest frame took beyond stepping, s, if it was `dt` s long.
     pub fn drawing(&self, dt: f64) -> f64 {
-        if self.playing && !self.backwards {
-            self.pacer.drawing()
-        } else {
-            dt
-        }
+        if self.playing && !self.backwards { self.pacer.drawing() } else { dt }
     }
 
     /// One accepted step, shown at once.
@@ -504,9 +490,7 @@ impl Player {
         let scene = self.simulation.running_scene();
         let mut channels = Channels::of(scene);
         channels.pick(scene, &first, &self.picks);
-        if channels.list() != self.channels.list()
-            || channels.picked().len() != self.channels.picked().len()
-        {
+        if channels.list() != self.channels.list() || channels.picked().len() != self.channels.picked().len() {
             self.history = record_of(scene, &channels);
         }
         channels.ask(&mut self.recorded);
@@ -581,8 +565,7 @@ impl Player {
         self.branch();
         // Of several moves between two steps only the last one counts.
         let steps = self.steps();
-        let moved =
-            |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
+        let moved = |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
         if pull.is_some() && self.log.entries.last().is_some_and(moved) {
             self.log.entries.pop();
             self.event_times.pop();
@@ -599,10 +582,7 @@ impl Player {
     }
 
     /// Changes the run at its latest state. The rest of the latest step is still shown as it was.
-    fn change<T>(
-        &mut self,
-        change: impl FnOnce(&mut Simulation) -> Result<T, ChangeError>,
-    ) -> Result<T, ChangeError> {
+    fn change<T>(&mut self, change: impl FnOnce(&mut Simulation) -> Result<T, ChangeError>) -> Result<T, ChangeError> {
         let run = &mut self.simulation;
         if self.pacer.shown() >= run.time() || run.step_start() >= run.time() {
             return change(run);
@@ -615,8 +595,7 @@ impl Player {
 
     fn after_change(&mut self) {
         self.warnings = sentences(self.wanted());
-        self.watch
-            .begin(self.simulation.running_scene(), self.simulation.time());
+        self.watch.begin(self.simulation.running_scene(), self.simulation.time());
         self.settling = Settling::new(self.simulation.running_scene());
         // Where the run is taken again, it has begun only later.
         let now = self.simulation.time();
@@ -633,10 +612,7 @@ impl Player {
 
     /// Whether any change waits for a reset.
     pub fn has_waiting(&self) -> bool {
-        self.wanted()
-            .changes
-            .iter()
-            .any(|(key, _)| self.is_waiting(key))
+        self.wanted().changes.iter().any(|(key, _)| self.is_waiting(key))
     }
 
     /// What is allowed but may not do what the user expects.
@@ -671,10 +647,7 @@ impl Player {
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
-                let (start, gravity) = (
-                    self.simulation.step_start(),
-                    self.simulation.running_scene().gravity,
-                );
+                let (start, gravity) = (self.simulation.step_start(), self.simulation.running_scene().gravity);
                 if self.gravity.observe(start, gravity)
                     && let Some(ideal) = &mut self.ideal
                 {
@@ -718,15 +691,10 @@ impl Player {
         let start = self.recorded_to;
         if until > start {
             // A long step is also recorded at instants within it, so that plots stay smooth.
-            let parts = ((until - start) / self.automatic_window() * 400.0)
-                .ceil()
-                .clamp(1.0, MOST_RECORDED);
+            let parts = ((until - start) / self.automatic_window() * 400.0).ceil().clamp(1.0, MOST_RECORDED);
             for part in 1..=parts as u32 {
-                let end = if f64::from(part) == parts {
-                    until
-                } else {
-                    start + (until - start) * f64::from(part) / parts
-                };
+                let end =
+                    if f64::from(part) == parts { until } else { start + (until - start) * f64::from(part) / parts };
                 // A peak between two instants adds one more.
                 let close = end - 1e-3 * (end - start) / parts;
                 while let Some(peak) = self.next_peak().filter(|peak| *peak < close) {

@@ -1,12 +1,8 @@
 //! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind; and one per name by which
 //! channels are picked, and unit.
 
-use eframe::egui::{
-    self, ComboBox, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo, vec2,
-};
-use egui_plot::{
-    AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform,
-};
+use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo, vec2};
+use egui_plot::{AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform};
 
 use super::curve::{Curves, Path, Trace};
 use super::layout;
@@ -160,10 +156,7 @@ fn find(player: &Player, search: &str) -> Vec<Entry> {
                 entry.units += &format!(", {unit}");
             }
         } else if entries.len() < MOST_FOUND {
-            entries.push(Entry {
-                name: name.to_owned(),
-                units: unit.to_owned(),
-            });
+            entries.push(Entry { name: name.to_owned(), units: unit.to_owned() });
         }
     };
     let pattern = search.contains(['*', '?']);
@@ -248,37 +241,21 @@ impl Plots {
 
     fn menu(&mut self, ui: &mut Ui, player: &Player) {
         for quantity in Quantity::ALL {
-            if !player
-                .channels()
-                .list()
-                .iter()
-                .any(|c| c.quantity == quantity)
-            {
+            if !player.channels().list().iter().any(|c| c.quantity == quantity) {
                 continue;
             }
             let mut on = self.chosen.contains(&quantity);
             let label = format!("{}, {}", quantity.label(), quantity.unit().0);
-            if ui
-                .checkbox(&mut on, label)
-                .on_hover_text(quantity.help())
-                .changed()
-            {
+            if ui.checkbox(&mut on, label).on_hover_text(quantity.help()).changed() {
                 self.chosen.retain(|q| *q != quantity);
                 if on {
                     self.chosen.push(quantity);
-                    self.chosen
-                        .sort_by_key(|q| Quantity::ALL.iter().position(|a| a == q));
+                    self.chosen.sort_by_key(|q| Quantity::ALL.iter().position(|a| a == q));
                 }
             }
         }
         if player.scene().ball_joints.len() > RECORDED_JOINTS {
-            ui.label(
-                RichText::new(format!(
-                    "The first {RECORDED_JOINTS} ball joints are recorded"
-                ))
-                .small()
-                .weak(),
-            );
+            ui.label(RichText::new(format!("The first {RECORDED_JOINTS} ball joints are recorded")).small().weak());
         }
         ui.separator();
         self.channels(ui, player);
@@ -302,30 +279,25 @@ impl Plots {
         }
         let Self { picked, found, .. } = self;
         let found = found.as_ref().map_or(&[][..], |(_, entries)| entries);
-        let own = picked
-            .iter()
-            .filter(|name| !found.iter().any(|entry| entry.name == **name));
+        let own = picked.iter().filter(|name| !found.iter().any(|entry| entry.name == **name));
         let own: Vec<String> = own.cloned().collect();
         let mut toggled = None;
-        ScrollArea::vertical()
-            .id_salt("channels")
-            .max_height(180.0)
-            .show(ui, |ui| {
-                let listed = found.iter().map(|entry| (&entry.name, &*entry.units));
-                for (name, units) in own.iter().map(|name| (name, "")).chain(listed) {
-                    let mut on = picked.contains(name);
-                    let label = match units {
-                        "" => name.clone(),
-                        units => format!("{name}, {units}"),
-                    };
-                    if ui.checkbox(&mut on, label).changed() {
-                        toggled = Some((name.clone(), on));
-                    }
+        ScrollArea::vertical().id_salt("channels").max_height(180.0).show(ui, |ui| {
+            let listed = found.iter().map(|entry| (&entry.name, &*entry.units));
+            for (name, units) in own.iter().map(|name| (name, "")).chain(listed) {
+                let mut on = picked.contains(name);
+                let label = match units {
+                    "" => name.clone(),
+                    units => format!("{name}, {units}"),
+                };
+                if ui.checkbox(&mut on, label).changed() {
+                    toggled = Some((name.clone(), on));
                 }
-                if found.is_empty() {
-                    ui.label(RichText::new("No such channel").small().weak());
-                }
-            });
+            }
+            if found.is_empty() {
+                ui.label(RichText::new("No such channel").small().weak());
+            }
+        });
         if player.channels().picked().len() == MOST_PICKED {
             let note = format!("At most {MOST_PICKED} of them are recorded");
             ui.label(RichText::new(note).small().weak());
@@ -371,18 +343,10 @@ impl Plots {
         let shown = player.pacer.shown();
         let known = player.known_to();
         let length = self.window_length(player);
-        let end = if self.window == Window::Everything {
-            known
-        } else {
-            shown
-        };
+        let end = if self.window == Window::Everything { known } else { shown };
         let end = end.max(known.min(shown + 0.25 * length));
         // A window that starts before t = 0 fills from the left.
-        if end < length {
-            (0.0, length)
-        } else {
-            (end - length, end)
-        }
+        if end < length { (0.0, length) } else { (end - length, end) }
     }
 
     /// The chosen plots, side by side if there is room, otherwise stacked. Returns the instant that was clicked, s.
@@ -406,30 +370,21 @@ impl Plots {
         // The last mark of the axis below reaches beyond the plot.
         let width = (space.x - 16.0 - gap.x * (columns - 1) as f32) / columns as f32;
         let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(LEAST_HEIGHT);
-        egui::ScrollArea::vertical()
-            .id_salt("plots")
-            .show(ui, |ui| {
-                for row in chosen.chunks(columns) {
-                    ui.horizontal_top(|ui| {
-                        for panel in row {
-                            let shown = ui.allocate_ui(vec2(width, height), |ui| {
-                                self.plot(ui, player, panel, vec2(width, height))
-                            });
-                            asked = asked.or(shown.inner);
-                        }
-                    });
-                }
-            });
+        egui::ScrollArea::vertical().id_salt("plots").show(ui, |ui| {
+            for row in chosen.chunks(columns) {
+                ui.horizontal_top(|ui| {
+                    for panel in row {
+                        let shown =
+                            ui.allocate_ui(vec2(width, height), |ui| self.plot(ui, player, panel, vec2(width, height)));
+                        asked = asked.or(shown.inner);
+                    }
+                });
+            }
+        });
         asked
     }
 
-    fn plot(
-        &mut self,
-        ui: &mut Ui,
-        player: &Player,
-        panel: &Panel<'_>,
-        space: egui::Vec2,
-    ) -> Option<f64> {
+    fn plot(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>, space: egui::Vec2) -> Option<f64> {
         let (unit, size) = panel.unit;
         let (from, to) = self.range(player);
         let (length, now) = (to - from, player.pacer.shown());
@@ -459,10 +414,7 @@ impl Plots {
         if kind == PlotKind::FromZeroWithClearances {
             // As recorded: the present value says nothing about the past.
             for index in player.clearances() {
-                let mut trace = Trace {
-                    colour: faint,
-                    ..Trace::default()
-                };
+                let mut trace = Trace { colour: faint, ..Trace::default() };
                 query(index, &mut trace.bins);
                 let closed = trace.bins.iter().all(|bin| bin.greatest <= 0.0);
                 if !closed && !self.levels.iter().any(|level| level.bins == trace.bins) {
@@ -470,18 +422,12 @@ impl Plots {
                 }
             }
         }
-        let bands = if kind == PlotKind::Bands {
-            self.bands(members, units)
-        } else {
-            Vec::new()
-        };
+        let bands = if kind == PlotKind::Bands { self.bands(members, units) } else { Vec::new() };
         let from_zero = matches!(kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
         let values = if bands.is_empty() {
             extremes(self.traces.iter().chain(&self.levels), size)
         } else {
-            let edges = bands
-                .iter()
-                .flat_map(|band| band.low.iter().chain(&band.high));
+            let edges = bands.iter().flat_map(|band| band.low.iter().chain(&band.high));
             edges.fold(None, |all, &edge| widened(all, edge, edge))
         };
         let (least, greatest) = range(values, from_zero);
@@ -491,54 +437,40 @@ impl Plots {
             readings.extend(trace.bins.iter().flat_map(|bin| {
                 let time = 0.5 * (bin.from + bin.to) / time_size;
                 let ends = [bin.least, bin.greatest].map(|v| PlotPoint::new(time, v / size));
-                ends.into_iter()
-                    .take(1 + usize::from(bin.least != bin.greatest))
+                ends.into_iter().take(1 + usize::from(bin.least != bin.greatest))
             }));
         }
 
         ui.vertical(|ui| {
             self.title(ui, panel);
             let font = egui::TextStyle::Small.resolve(ui.style());
-            let axis = |hints: AxisHints<'static>| {
-                hints.tick_label_color(faint).tick_label_font(font.clone())
-            };
+            let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
             let width = space.x - 12.0;
-            let time_mark = move |mark: &GridMark| {
-                format!(
-                    "{} {time_unit}",
-                    tick(mark.value, mark.step_size, to / time_size)
-                )
-            };
+            let time_mark =
+                move |mark: &GridMark| format!("{} {time_unit}", tick(mark.value, mark.step_size, to / time_size));
             let frame = f64::from(width - 52.0);
-            let across = axis(AxisHints::new_x())
-                .label_spacing(Rangef::new(0.0, 1.0))
-                .formatter(move |mark, range| {
-                    let words = time_mark(&mark);
-                    let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
-                    // Omit one that would reach into the next plot.
-                    if 0.5 * LETTER * words.chars().count() as f64 > beyond + 28.0 {
-                        return String::new();
-                    }
-                    words
-                });
-            let up = axis(AxisHints::new_y())
-                .min_thickness(40.0)
-                .label_spacing(Rangef::new(0.0, 1.0))
-                .formatter(|mark, range| {
+            let across = axis(AxisHints::new_x()).label_spacing(Rangef::new(0.0, 1.0)).formatter(move |mark, range| {
+                let words = time_mark(&mark);
+                let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
+                // Omit one that would reach into the next plot.
+                if 0.5 * LETTER * words.chars().count() as f64 > beyond + 28.0 {
+                    return String::new();
+                }
+                words
+            });
+            let up = axis(AxisHints::new_y()).min_thickness(40.0).label_spacing(Rangef::new(0.0, 1.0)).formatter(
+                |mark, range| {
                     let most = range.start().abs().max(range.end().abs());
                     short_tick(mark.value, mark.step_size, most)
-                });
+                },
+            );
             // Late times have long numbers, of which fewer fit side by side.
             let letters = |mark: &GridMark| time_mark(mark).chars().count();
             let marks_across = move |input: GridInput| {
                 let marks = marks(&input, MARKS);
                 let longest = marks.iter().map(letters).max().unwrap_or(1);
                 let room = frame / (LETTER * longest as f64 + 8.0);
-                if room < MARKS {
-                    self::marks(&input, room.max(1.0))
-                } else {
-                    marks
-                }
+                if room < MARKS { self::marks(&input, room.max(1.0)) } else { marks }
             };
             let finest = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
             let earliest = value::digits_within(length, to);
@@ -559,17 +491,10 @@ impl Plots {
                 .grid_spacing(Rangef::new(MARKS_APART, 300.0))
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0);
-            let Self {
-                traces,
-                levels,
-                readings,
-                hidden,
-                ..
-            } = &*self;
+            let Self { traces, levels, readings, hidden, .. } = &*self;
             // All curves at the time under the pointer.
             let reading = |position: &HoverPosition<'_>| {
-                let (HoverPosition::NearDataPoint { position, .. }
-                | HoverPosition::Elsewhere { position }) = position;
+                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
                 let time = position.x * time_size;
                 let mut words = format!("{} {time_unit}", value::number(position.x, earliest));
                 for ((channel, member), trace) in members.iter().zip(traces) {
@@ -577,8 +502,7 @@ impl Plots {
                     let Some((least, greatest)) = values else {
                         continue;
                     };
-                    let [least, greatest] =
-                        [least, greatest].map(|v| value::number(v / size, finest));
+                    let [least, greatest] = [least, greatest].map(|v| value::number(v / size, finest));
                     words += &if least == greatest {
                         format!("\n{member} {least} {unit}")
                     } else {
@@ -604,18 +528,14 @@ impl Plots {
                 }
                 plot.add(Curves::new(levels, units).dashed());
                 plot.add(Curves::new(traces, units));
-                for ((channel, member), (trace, points)) in
-                    members.iter().zip(traces.iter().zip(readings))
-                {
+                for ((channel, member), (trace, points)) in members.iter().zip(traces.iter().zip(readings)) {
                     if !hidden.contains(channel) {
                         plot.add(Path::readings(member, points, trace.colour));
                     }
                 }
             });
             let name = format!("Plot of {}", panel.label);
-            shown
-                .response
-                .widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
+            shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
             let transform = shown.transform;
             let asked = self.pointer(ui, &shown.response, &transform, time_size, player);
             if let Some(quantity) = panel.quantity {
@@ -627,9 +547,7 @@ impl Plots {
             };
             let frame = *transform.frame();
             if (from..to).contains(&now)
-                && (player.has_future()
-                    || self.zoomed.is_some()
-                    || player.abandoned_future().is_some())
+                && (player.has_future() || self.zoomed.is_some() || player.abandoned_future().is_some())
             {
                 // The future is pale.
                 let painter = ui.painter_at(frame);
@@ -638,13 +556,9 @@ impl Plots {
                 let line = egui::Stroke::new(1.0, ui.visuals().strong_text_color());
                 painter.vline(x(now), frame.y_range(), line);
             }
-            for flag in player
-                .flags()
-                .filter(|flag| (from..=to).contains(&flag.time))
-            {
+            for flag in player.flags().filter(|flag| (from..=to).contains(&flag.time)) {
                 let line = egui::Stroke::new(1.0, ui.visuals().warn_fg_color.gamma_multiply(0.7));
-                ui.painter_at(frame)
-                    .vline(x(flag.time), frame.y_range(), line);
+                ui.painter_at(frame).vline(x(flag.time), frame.y_range(), line);
             }
             asked
         })
@@ -682,10 +596,7 @@ impl Plots {
             }
         }
         let clicked = response.clicked().then(|| response.interact_pointer_pos());
-        clicked
-            .flatten()
-            .map(time)
-            .filter(|time| *time <= player.reached())
+        clicked.flatten().map(time).filter(|time| *time <= player.reached())
     }
 
     /// The terms of the energy balance, stacked: energy supplied above zero, energy absorbed or stored below.
@@ -722,8 +633,7 @@ impl Plots {
             ui.spacing_mut().button_padding = vec2(4.0, 1.0);
             let height = theme::side(ui, 18.0);
             ui.spacing_mut().interact_size.y = height;
-            ui.label(RichText::new(panel.title()).small())
-                .on_hover_text(panel.help);
+            ui.label(RichText::new(panel.title()).small()).on_hover_text(panel.help);
             ui.add_space(4.0);
             for (index, (channel, member)) in panel.members.iter().enumerate() {
                 let on = !self.hidden.contains(channel);
@@ -732,13 +642,8 @@ impl Plots {
                 if !on {
                     text = text.strikethrough().color(ui.visuals().weak_text_color());
                 }
-                let response = ui.add(
-                    egui::Button::new(text)
-                        .frame(false)
-                        .min_size(vec2(theme::side(ui, 0.0), 0.0)),
-                );
-                ui.ctx()
-                    .accesskit_node_builder(response.id, |node| node.set_toggled(on.into()));
+                let response = ui.add(egui::Button::new(text).frame(false).min_size(vec2(theme::side(ui, 0.0), 0.0)));
+                ui.ctx().accesskit_node_builder(response.id, |node| node.set_toggled(on.into()));
                 if response.on_hover_text("Line shown or hidden").clicked() {
                     if on {
                         self.hidden.push(*channel);
@@ -768,9 +673,7 @@ fn widened(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f
 /// The least and the greatest value in `traces`, in units of `size`.
 fn extremes<'a>(traces: impl Iterator<Item = &'a Trace>, size: f64) -> Option<(f64, f64)> {
     let bins = traces.flat_map(|trace| &trace.bins);
-    bins.fold(None, |all, bin| {
-        widened(all, bin.least / size, bin.greatest / size)
-    })
+    bins.fold(None, |all, bin| widened(all, bin.least / size, bin.greatest / size))
 }
 
 /// Axis range for values in a range, or for none: all of them with a margin, or a range in which they look flat if they differ
@@ -808,19 +711,10 @@ pub(super) fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
         let step = step.unwrap_or(10.0 * power);
         let first = (least / step).ceil() as i64;
         let last = (greatest / step).floor() as i64;
-        (first..=last)
-            .map(|index| GridMark {
-                value: index as f64 * step,
-                step_size: step,
-            })
-            .collect()
+        (first..=last).map(|index| GridMark { value: index as f64 * step, step_size: step }).collect()
     };
     let round = marks(ROUND);
-    if round.len() < 2 {
-        marks(ROUND_ENOUGH)
-    } else {
-        round
-    }
+    if round.len() < 2 { marks(ROUND_ENOUGH) } else { round }
 }
 
 impl Window {
@@ -889,14 +783,9 @@ mod tests {
         let most = least.abs().max(greatest.abs());
         let marks = marks(&input, MARKS);
         assert!(marks.iter().all(|m| (least..=greatest).contains(&m.value)));
-        let apart = marks
-            .windows(2)
-            .all(|w| w[1].value - w[0].value >= 0.99 * input.base_step_size);
+        let apart = marks.windows(2).all(|w| w[1].value - w[0].value >= 0.99 * input.base_step_size);
         assert!(apart, "{marks:?}");
-        marks
-            .iter()
-            .map(|m| tick(m.value, m.step_size, most))
-            .collect()
+        marks.iter().map(|m| tick(m.value, m.step_size, most)).collect()
     }
 
     #[test]
@@ -912,10 +801,7 @@ mod tests {
     fn marks_are_round_few_and_told_apart() {
         assert_eq!(words(0.0, 871.0, 120.0), ["0", "200", "400", "600", "800"]);
         assert_eq!(words(-0.015, 0.315, 120.0), ["0", "0.1", "0.2", "0.3"]);
-        assert_eq!(
-            words(203.44080, 203.44120, 120.0),
-            ["203.4408", "203.4409", "203.4410", "203.4411", "203.4412"]
-        );
+        assert_eq!(words(203.44080, 203.44120, 120.0), ["203.4408", "203.4409", "203.4410", "203.4411", "203.4412"]);
         assert_eq!(words(-1e-7, 2e-7, 120.0), ["-1e-7", "0", "1e-7", "2e-7"]);
         for height in [36.0, 45.0, 60.0, 200.0] {
             for (least, greatest) in [
@@ -933,10 +819,7 @@ mod tests {
                 assert_eq!(different.len(), words.len(), "{words:?}");
             }
         }
-        let nothing = GridInput {
-            bounds: (1.0, 1.0),
-            base_step_size: 0.0,
-        };
+        let nothing = GridInput { bounds: (1.0, 1.0), base_step_size: 0.0 };
         assert!(marks(&nothing, 5.0).is_empty());
     }
 

@@ -98,12 +98,10 @@ impl App {
                 let row = egui::Layout::right_to_left(egui::Align::Center);
                 let size = vec2(ui.available_width(), theme::side(ui, transport::PLAY));
                 ui.allocate_ui_with_layout(size, row, |ui| {
-                    let help =
-                        "Back to the window with its panels (F5, Esc, double-tap on this bar)";
+                    let help = "Back to the window with its panels (F5, Esc, double-tap on this bar)";
                     leave |= ui.button("Leave").on_hover_text(help).clicked();
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                        ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
-                            .inner
+                        ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
                     })
                     .inner
                 })

@@ -27,10 +27,7 @@ impl Grip {
         let motion = player.frame().bodies.get(body)?;
         let point = Exact::from(hit.point.to_array().map(f64::from));
         let inside = motion.rotation.tr_mul(&(point - motion.position));
-        Some(Self {
-            pull: Pull::softly(scene, body, inside, point),
-            hand: hit.point,
-        })
+        Some(Self { pull: Pull::softly(scene, body, inside, point), hand: hit.point })
     }
 
     /// The pointer has moved to `pixel`: the hand moves parallel to the picture or, with `depth`, along the line of sight (up
@@ -51,10 +48,7 @@ impl Grip {
 
     /// As input to the run.
     pub fn pull(&self) -> Pull {
-        Pull {
-            hand: Exact::from(self.hand.to_array().map(f64::from)),
-            ..self.pull
-        }
+        Pull { hand: Exact::from(self.hand.to_array().map(f64::from)), ..self.pull }
     }
 }
 
@@ -89,10 +83,7 @@ mod tests {
         let seen = camera.project(grip.hand, size).expect("seen");
         assert!(seen.distance(aside) < 0.1, "the hand is under the pointer");
         let (_, _, back) = camera.axes();
-        assert!(
-            (grip.hand - to_f32(&place)).dot(back).abs() < 1e-5,
-            "no depth"
-        );
+        assert!((grip.hand - to_f32(&place)).dot(back).abs() < 1e-5, "no depth");
         let before = grip.hand;
         grip.drag(&camera, aside, Vec2::new(0.0, -30.0), size, true);
         let moved = grip.hand - before;
@@ -103,16 +94,11 @@ mod tests {
         let pulled = player.frame().pull.expect("pulls");
         let expected = f64::from(stretch(&grip, &player)) * grip.pull.stiffness;
         let speed = player.frame().bodies[0].velocity.norm();
-        assert!(
-            (pulled.force.norm() - expected).abs() <= 1e-5 * expected + grip.pull.damping * speed
-        );
+        assert!((pulled.force.norm() - expected).abs() <= 1e-5 * expected + grip.pull.damping * speed);
         player.run_to(0.4);
         let ledger = player.frame().ledger.expect("kept");
         assert!(ledger.external_work.abs() > 1e-3, "{ledger:?}");
-        assert!(
-            ledger.residual().abs() < 1e-3 * ledger.external_work.abs(),
-            "{ledger:?}"
-        );
+        assert!(ledger.residual().abs() < 1e-3 * ledger.external_work.abs(), "{ledger:?}");
         player.pull(None).expect("lets go");
         let work = |player: &Player| player.frame().ledger.expect("kept").external_work;
         // The rest of the displayed step was pulled, too.

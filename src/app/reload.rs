@@ -36,18 +36,12 @@ pub(super) type Given = BTreeMap<String, Vec<u8>>;
 impl SceneFile {
     /// The file `name`, as the user named it; the host is to be told.
     pub(super) fn named(name: Option<String>) -> Self {
-        Self {
-            name,
-            ..Self::default()
-        }
+        Self { name, ..Self::default() }
     }
 
     /// The file `name`, opened together with those `given`.
     pub(super) fn opened(name: String, given: Given) -> Self {
-        Self {
-            given,
-            ..Self::named(Some(name))
-        }
+        Self { given, ..Self::named(Some(name)) }
     }
 
     /// The scene is saved with `changes` in it.
@@ -154,10 +148,7 @@ impl App {
         let (phase, time) = (self.player.watch().phase(), self.player.pacer.shown());
         let told = self.scene_file.told.clone();
         self.show_scene(&scene)?;
-        self.scene_file = SceneFile {
-            told,
-            ..SceneFile::opened(name, given)
-        };
+        self.scene_file = SceneFile { told, ..SceneFile::opened(name, given) };
         self.player.set_phase(phase);
         let reached = self.reach(time);
         self.player.set_twin(twin);

@@ -53,11 +53,7 @@ impl Replay {
     }
 
     /// Continues while `may_step`; returns the verdict once there.
-    pub fn advance(
-        &mut self,
-        player: &mut Player,
-        mut may_step: impl FnMut() -> bool,
-    ) -> Option<Verdict> {
+    pub fn advance(&mut self, player: &mut Player, mut may_step: impl FnMut() -> bool) -> Option<Verdict> {
         loop {
             while let Some(entry) = self.due(player) {
                 self.next += 1;
@@ -79,9 +75,7 @@ impl Replay {
             if !player.step() {
                 return Some(match self.due(player) {
                     // As in the original run: the guard's refusal is itself the next event of the log.
-                    Some(Entry {
-                        event: Event::Stop, ..
-                    }) => {
+                    Some(Entry { event: Event::Stop, .. }) => {
                         self.next += 1;
                         continue;
                     }
@@ -124,11 +118,7 @@ impl Replay {
         match self.link.hash {
             None => Verdict::Reached,
             Some(expected) if expected == found => Verdict::Agrees(found),
-            Some(expected) => Verdict::Differs {
-                expected,
-                found,
-                version: self.link.version.clone(),
-            },
+            Some(expected) => Verdict::Differs { expected, found, version: self.link.version.clone() },
         }
     }
 }
@@ -215,9 +205,7 @@ mod tests {
             };
             play(&mut original, 4);
             // Smaller than the ball's eccentricity: the wall closes in over many steps.
-            original
-                .set("contact.clearance", "0.1 mm")
-                .expect("in range");
+            original.set("contact.clearance", "0.1 mm").expect("in range");
             play(&mut original, 3);
             let joint = original.scene().ball_joints[0].name.clone();
             let own = format!("joint.{joint}.clearance");
@@ -228,21 +216,13 @@ mod tests {
             }
             original.step_back();
             original.step_back();
-            original
-                .set("solver.preset", "real-time")
-                .expect("a preset");
-            original
-                .set("solver.method", "rosenbrock")
-                .expect("a method");
+            original.set("solver.preset", "real-time").expect("a preset");
+            original.set("solver.method", "rosenbrock").expect("a method");
             original.set("gravity.y", "2 m/s^2").expect("in range");
             original.set_playing(true);
             play(&mut original, 3);
-            original
-                .set("solver.method", "automatic")
-                .expect("a method");
-            original
-                .set_original("contact.clearance")
-                .expect("the file's");
+            original.set("solver.method", "automatic").expect("a method");
+            original.set_original("contact.clearance").expect("the file's");
             play(&mut original, 5);
             assert!(original.log().entries.len() >= 8);
             agrees(&original);
@@ -260,9 +240,7 @@ mod tests {
     fn changes_before_a_reset_are_what_the_run_starts_with() {
         let mut original = player("spcmm");
         original.run_to(5e-3);
-        original
-            .set("contact.clearance", "0.5 mm")
-            .expect("in range");
+        original.set("contact.clearance", "0.5 mm").expect("in range");
         original.set("spcmm.frequency", "0.4 Hz").expect("in range");
         original.run_to(9e-3);
         original.reset().expect("starts");
@@ -270,9 +248,7 @@ mod tests {
         assert_eq!(original.log().base.len(), 2);
         original.run_to(40e-3);
         // A change that waits for the next reset is in the link, too.
-        original
-            .set("spcmm.frequency", "0.45 Hz")
-            .expect("in range");
+        original.set("spcmm.frequency", "0.45 Hz").expect("in range");
         agrees(&original);
         let (copy, ..) = follow(link_to(&original), 50);
         assert!(copy.is_waiting("spcmm.frequency"));
@@ -302,10 +278,7 @@ mod tests {
         let log = original.log();
         let events = log.entries.iter().map(|entry| &entry.event);
         assert!(!events.clone().any(|event| *event == Event::Stop));
-        assert_eq!(
-            follow(link_to(&original), 5).1,
-            Verdict::Agrees(original.simulation().state_hash())
-        );
+        assert_eq!(follow(link_to(&original), 5).1, Verdict::Agrees(original.simulation().state_hash()));
     }
 
     #[test]

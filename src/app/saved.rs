@@ -25,11 +25,7 @@ pub(super) struct Watcher {
 impl Watcher {
     /// Watches the file `name` and the files `beside` it, and calls `changed` whenever there is something to
     /// [`Self::poll`]: first its content as it is. `None` if the system provides no thread.
-    pub(super) fn start(
-        name: &str,
-        beside: &[String],
-        changed: impl Fn() + Send + 'static,
-    ) -> Option<Self> {
+    pub(super) fn start(name: &str, beside: &[String], changed: impl Fn() + Send + 'static) -> Option<Self> {
         let (sender, changes) = channel();
         let over = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&over);
@@ -47,8 +43,7 @@ impl Watcher {
                         continue;
                     }
                     // Some editors replace a file: for a moment there is none.
-                    let there =
-                        |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
+                    let there = |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
                     let saved = now[0].is_some() && now.iter().zip(&seen).any(there);
                     seen = now;
                     if saved {
@@ -109,8 +104,7 @@ mod tests {
         });
         let watcher = watcher.expect("a thread");
         let next = || {
-            told.recv_timeout(Duration::from_secs(30))
-                .expect("a change");
+            told.recv_timeout(Duration::from_secs(30)).expect("a change");
             let file = watcher.poll().expect("its content");
             assert_eq!(file.name, path.display().to_string());
             String::from_utf8(file.content.expect("readable")).expect("text")
@@ -130,10 +124,7 @@ mod tests {
     #[test]
     fn the_content_arrives_again_when_a_file_beside_it_is_saved() {
         let folder = tempfile::tempdir().expect("a folder");
-        let (path, leg) = (
-            folder.path().join("a.toml"),
-            folder.path().join("parts/leg"),
-        );
+        let (path, leg) = (folder.path().join("a.toml"), folder.path().join("parts/leg"));
         std::fs::create_dir(folder.path().join("parts")).expect("makes");
         std::fs::write(&path, "scene").expect("writes");
         std::fs::write(&leg, "1").expect("writes");
@@ -145,8 +136,7 @@ mod tests {
         });
         let watcher = watcher.expect("a thread");
         let next = || {
-            told.recv_timeout(Duration::from_secs(30))
-                .expect("a change");
+            told.recv_timeout(Duration::from_secs(30)).expect("a change");
             let content = watcher.poll().expect("its content").content;
             assert_eq!(content.as_deref(), Ok(&b"scene"[..]));
         };

@@ -79,8 +79,7 @@ impl Settling {
             Some(period) if self.has_resumed => period,
             _ => 0.0,
         };
-        self.quiet
-            .is_some_and(|since| self.here.time - since >= needed)
+        self.quiet.is_some_and(|since| self.here.time - since >= needed)
     }
 
     /// Records the next instant of the run.
@@ -90,9 +89,7 @@ impl Settling {
         if !least.is_finite() || frame.joints.len() != self.joints.len() {
             return;
         }
-        let free = |(play, now): (&Option<_>, &JointReport)| {
-            play.is_some() && now.state == ContactState::Free
-        };
+        let free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactState::Free;
         let driven = self.period.is_some();
         if driven && self.joints.iter().zip(&frame.joints).any(free) {
             self.past.clear();
@@ -103,18 +100,12 @@ impl Settling {
         self.past.retain(|then| {
             let mut points = then.points.iter().zip(&here.points).enumerate();
             let still = points.all(|(i, (a, b))| {
-                let clearance = if driven {
-                    joints[i].map(|(_, clearance)| clearance)
-                } else {
-                    Some(least)
-                };
+                let clearance = if driven { joints[i].map(|(_, clearance)| clearance) } else { Some(least) };
                 clearance.is_none_or(|clearance| (a - b).norm() <= STILL * clearance)
             });
             let mut loads = then.loads.iter().zip(&here.loads);
             // Those older than two stretches are no longer needed.
-            still
-                && here.time - then.time < 2.0 * stretch
-                && loads.all(|(a, b)| (a - b).abs() <= LOAD * a)
+            still && here.time - then.time < 2.0 * stretch && loads.all(|(a, b)| (a - b).abs() <= LOAD * a)
         });
         let since = |then: Option<&Instant>| then.map(|then| here.time - then.time);
         let quiet = since(self.past.first()).is_some_and(|age| age >= stretch);
@@ -130,11 +121,7 @@ impl Settling {
 
     /// Takes the positions: in a driven scene, of the balls in the axes of their sockets; otherwise, of points of the bodies.
     fn take(&mut self, frame: &Frame) {
-        let Instant {
-            time,
-            points,
-            loads,
-        } = &mut self.here;
+        let Instant { time, points, loads } = &mut self.here;
         *time = frame.time;
         points.clear();
         loads.clear();
@@ -177,20 +164,15 @@ mod tests {
     }
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
-        let changes: Vec<(String, String)> = changes
-            .iter()
-            .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
-            .collect();
+        let changes: Vec<(String, String)> =
+            changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         Scene::load(name, &changes).expect("built in")
     }
 
     #[test]
     fn the_papers_mechanism_settles_once_it_has_rattled_and_stays_so() {
         let turns = turns(&scene("spcmm", &[]), 2.2);
-        assert!(
-            turns.len() == 1 && (0.1..0.45).contains(&turns[0]),
-            "{turns:?}"
-        );
+        assert!(turns.len() == 1 && (0.1..0.45).contains(&turns[0]), "{turns:?}");
     }
 
     #[test]

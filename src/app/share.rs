@@ -15,8 +15,8 @@ use super::embed::Embedded;
 use super::log::Log;
 use super::plots::Window;
 use crate::scene::{
-    DEFAULT_SCENE, Dimension, LARGEST_FILE, Scene, SceneError, Texts, built_in_text,
-    parse_quantity, visible, visible_line,
+    DEFAULT_SCENE, Dimension, LARGEST_FILE, Scene, SceneError, Texts, built_in_text, parse_quantity, visible,
+    visible_line,
 };
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::view::Picked;
@@ -64,11 +64,8 @@ const WORDS: [&str; 22] = [
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
-const THEMES: [(&str, ThemePreference); 3] = [
-    ("light", ThemePreference::Light),
-    ("dark", ThemePreference::Dark),
-    ("system", ThemePreference::System),
-];
+const THEMES: [(&str, ThemePreference); 3] =
+    [("light", ThemePreference::Light), ("dark", ThemePreference::Dark), ("system", ThemePreference::System)];
 
 /// A link that cannot be read: what is wrong and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -208,9 +205,7 @@ impl Link {
             None => "",
         };
         let pairs = |part: &str| -> Vec<(String, String)> {
-            form_urlencoded::parse(part.as_bytes())
-                .map(|(key, value)| (key.into_owned(), value.into_owned()))
-                .collect()
+            form_urlencoded::parse(part.as_bytes()).map(|(key, value)| (key.into_owned(), value.into_owned())).collect()
         };
         let (mut all, last) = (pairs(query), pairs(fragment));
         if last.iter().any(|(key, _)| key == "scene" || key == "text") {
@@ -237,26 +232,19 @@ impl Link {
                 "text" => file = Some(unpack(key, value)?),
                 "log" => log = Some(unpack(key, value)?),
                 "t" => {
-                    let time = parse_quantity(value, Dimension::Time)
-                        .map_err(|error| wrong(&error.to_string()))?;
+                    let time = parse_quantity(value, Dimension::Time).map_err(|error| wrong(&error.to_string()))?;
                     if time < 0.0 {
                         return Err(wrong("must not be before the start; allowed 0 s and later"));
                     }
                     link.time = Some(time);
                 }
                 "steps" => {
-                    let steps = value
-                        .parse()
-                        .map_err(|_| wrong("is not a number of steps"))?;
+                    let steps = value.parse().map_err(|_| wrong("is not a number of steps"))?;
                     link.steps = Some(steps);
                 }
                 "hash" => {
-                    let hash = (value.len() == 16)
-                        .then(|| u64::from_str_radix(value, 16).ok())
-                        .flatten();
-                    link.hash = Some(hash.ok_or_else(|| {
-                        wrong("is not a state hash: 16 digits, 0 to 9 and a to f")
-                    })?);
+                    let hash = (value.len() == 16).then(|| u64::from_str_radix(value, 16).ok()).flatten();
+                    link.hash = Some(hash.ok_or_else(|| wrong("is not a state hash: 16 digits, 0 to 9 and a to f"))?);
                 }
                 "scale" => link.time_scale = Some(read_scale(value).map_err(|m| wrong(&m))?),
                 "camera" => link.camera = Some(read_camera(value).map_err(|m| wrong(&m))?),
@@ -300,8 +288,7 @@ impl Link {
                 "theme" => {
                     let known = THEMES.iter().find(|(word, _)| *word == value);
                     let theme = known.map(|(_, theme)| *theme);
-                    link.theme =
-                        Some(theme.ok_or_else(|| wrong("allowed light, dark and system"))?);
+                    link.theme = Some(theme.ok_or_else(|| wrong("allowed light, dark and system"))?);
                 }
                 // Chosen before the application starts, by `web/main.js`.
                 "renderer" if RENDERERS.contains(&value) => {}
@@ -329,10 +316,7 @@ impl Link {
             return Err(fault("log", "", "continues past the link's last step"));
         }
         link.scene = match (file, name) {
-            (Some(text), name) => SceneText::File {
-                name: name.unwrap_or_else(|| "link.toml".to_owned()),
-                text,
-            },
+            (Some(text), name) => SceneText::File { name: name.unwrap_or_else(|| "link.toml".to_owned()), text },
             (None, Some(name)) => {
                 if name.contains('/') || name.ends_with(".toml") {
                     let message = "a link names a built-in scene; a file travels in `text`";
@@ -371,10 +355,7 @@ impl Link {
         add("steps", self.steps.map(|steps| steps.to_string()));
         add("scale", self.time_scale.map(|scale| scale.to_string()));
         add("camera", self.camera.map(write_camera));
-        add(
-            "magnification",
-            self.magnification.map(|factor| factor.to_string()),
-        );
+        add("magnification", self.magnification.map(|factor| factor.to_string()));
         add("follow", self.follow.clone());
         add("plots", self.plots.as_deref().map(shown::write_plots));
         let channels = self.channels.as_deref();
@@ -384,10 +365,7 @@ impl Link {
         add("lesson", self.lesson.clone());
         add("step", self.step.map(|step| step.to_string()));
         add("embed", self.embedded.as_ref().map(Embedded::write));
-        add(
-            "play",
-            self.playing.map(|playing| u8::from(playing).to_string()),
-        );
+        add("play", self.playing.map(|playing| u8::from(playing).to_string()));
         let theme = THEMES.iter().find(|(_, theme)| self.theme == Some(*theme));
         add("theme", theme.map(|(word, _)| (*word).to_owned()));
         add("version", self.version.clone());
@@ -417,15 +395,9 @@ impl Link {
         if whole.len() <= LONGEST_LINK {
             return Ok((whole, None));
         }
-        let start = Self {
-            log: Log::new(&wanted.changes),
-            steps: None,
-            time: None,
-            hash: None,
-            playing: None,
-            ..self.clone()
-        }
-        .format();
+        let start =
+            Self { log: Log::new(&wanted.changes), steps: None, time: None, hash: None, playing: None, ..self.clone() }
+                .format();
         if start.len() <= LONGEST_LINK {
             let note = format!(
                 "This run has more changes than fit in a link of {LONGEST_LINK} characters ({}): the link starts the \
@@ -448,9 +420,7 @@ impl Link {
     pub fn load(&self) -> Result<Scene, SceneError> {
         match &self.scene {
             SceneText::BuiltIn(name) => Scene::load(name, &self.log.base),
-            SceneText::File { name, text } => {
-                Scene::parse_with(text, Some(name), &self.beside, &self.log.base)
-            }
+            SceneText::File { name, text } => Scene::parse_with(text, Some(name), &self.beside, &self.log.base),
         }
     }
 
@@ -470,11 +440,7 @@ impl Link {
     /// # Errors
     /// There is no such joint.
     pub fn under_microscope(&self, scene: &Scene) -> Result<Option<usize>, LinkError> {
-        let Some(name) = self
-            .instruments
-            .as_ref()
-            .and_then(|i| i.microscope.as_ref())
-        else {
+        let Some(name) = self.instruments.as_ref().and_then(|i| i.microscope.as_ref()) else {
             return Ok(None);
         };
         let mut joints = scene.ball_joints.iter();
@@ -490,10 +456,7 @@ impl Link {
 
     /// Whether the link names an instant to go to.
     pub fn has_instant(&self) -> bool {
-        self.steps.is_some()
-            || self.time.is_some()
-            || self.hash.is_some()
-            || !self.log.entries.is_empty()
+        self.steps.is_some() || self.time.is_some() || self.hash.is_some() || !self.log.entries.is_empty()
     }
 }
 
@@ -511,10 +474,7 @@ impl SceneText {
             return Self::BuiltIn(scene.name.clone());
         }
         let path = scene.source.file.as_deref().unwrap_or("scene.toml");
-        Self::File {
-            name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(),
-            text: text.clone(),
-        }
+        Self::File { name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(), text: text.clone() }
     }
 }
 
@@ -526,11 +486,7 @@ fn fault(key: &str, value: &str, message: impl Into<String>) -> LinkError {
         }
         short
     };
-    LinkError {
-        key: short(key),
-        value: short(value),
-        message: message.into(),
-    }
+    LinkError { key: short(key), value: short(value), message: message.into() }
 }
 
 fn unknown(key: &str) -> String {
@@ -575,28 +531,19 @@ fn read_camera(text: &str) -> Result<CameraPose, String> {
                 && [x, y, z].iter().all(|part| part.abs() <= 1e4)
                 && fitted.is_none_or(|aspect| (1e-2..=1e2).contains(&aspect)) =>
         {
-            Ok(CameraPose {
-                yaw,
-                pitch,
-                distance,
-                target: [x, y, z],
-                fitted,
-            })
+            Ok(CameraPose { yaw, pitch, distance, target: [x, y, z], fitted })
         }
-        _ => Err(
-            "is not a camera: yaw and pitch (-1.57 to 1.57) in rad, distance (0.0001 to 10000) and target x, y, z \
+        _ => {
+            Err("is not a camera: yaw and pitch (-1.57 to 1.57) in rad, distance (0.0001 to 10000) and target x, y, z \
              (-10000 to 10000) in m; then, if it shows everything, width over height (0.01 to 100) of the picture"
-                .to_owned(),
-        ),
+                .to_owned())
+        }
     }
 }
 
 fn write_camera(camera: CameraPose) -> String {
     let [x, y, z] = camera.target;
-    let mut words = format!(
-        "{} {} {} {x} {y} {z}",
-        camera.yaw, camera.pitch, camera.distance
-    );
+    let mut words = format!("{} {} {} {x} {y} {z}", camera.yaw, camera.pitch, camera.distance);
     if let Some(aspect) = camera.fitted {
         // Writing to a String cannot fail.
         let _ = write!(words, " {aspect}");
@@ -616,8 +563,7 @@ fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
 fn unpack_within(key: &str, packed: &str, most: usize) -> Result<String, LinkError> {
     let damaged = || fault(key, "", "does not unpack: the link is cut short or damaged");
     let bytes = BASE64.decode(packed).map_err(|_| damaged())?;
-    let text =
-        miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, most).map_err(|_| damaged())?;
+    let text = miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, most).map_err(|_| damaged())?;
     String::from_utf8(text).map_err(|_| damaged())
 }
 

@@ -60,19 +60,10 @@ impl App {
         if !(self.sound.on && plays) {
             return;
         }
-        let stretch = Stretch {
-            from,
-            to: player.pacer.shown(),
-            lasts: dt,
-        };
+        let stretch = Stretch { from, to: player.pacer.shown(), lasts: dt };
         // The simulation may be a step ahead of what is on show.
         let impacts = player.simulation().impacts();
-        clicks(
-            impacts,
-            &stretch,
-            mass(player.scene()),
-            &mut self.sound.clicks,
-        );
+        clicks(impacts, &stretch, mass(player.scene()), &mut self.sound.clicks);
         if !self.sound.clicks.is_empty() {
             self.host.click(&self.sound.clicks);
         }

@@ -29,21 +29,15 @@ impl Speaker {
         let (open, closed) = channel::<()>();
         let told = fail.clone();
         let begun =
-            std::thread::Builder::new()
-                .name("sound".to_owned())
-                .spawn(move || match stream(to_play, told.clone()) {
-                    // Until the other end is dropped.
-                    Ok(_stream) => drop(closed.recv()),
-                    Err(why) => drop(told.send(why)),
-                });
+            std::thread::Builder::new().name("sound".to_owned()).spawn(move || match stream(to_play, told.clone()) {
+                // Until the other end is dropped.
+                Ok(_stream) => drop(closed.recv()),
+                Err(why) => drop(told.send(why)),
+            });
         if let Err(error) = begun {
             let _ = fail.send(error.to_string());
         }
-        Self {
-            clicks,
-            failed,
-            _open: open,
-        }
+        Self { clicks, failed, _open: open }
     }
 
     /// Sounds `clicks` of a frame that begins now.
@@ -63,15 +57,11 @@ impl Speaker {
 }
 
 /// Starts the flow of samples. Errors of it that end it go to `failed`.
-fn stream(
-    clicks: Receiver<(Instant, Click)>,
-    failed: Sender<String>,
-) -> Result<cpal::Stream, String> {
+fn stream(clicks: Receiver<(Instant, Click)>, failed: Sender<String>) -> Result<cpal::Stream, String> {
     let device = cpal::default_host().default_output_device();
     let device = device.ok_or("this machine has no sound device")?;
-    let supported = device
-        .default_output_config()
-        .map_err(|error| format!("the sound device does not answer: {error}"))?;
+    let supported =
+        device.default_output_config().map_err(|error| format!("the sound device does not answer: {error}"))?;
     let config: StreamConfig = supported.into();
     let mixer = Mixer::new(clicks, f64::from(config.sample_rate));
     match supported.sample_format() {
@@ -127,12 +117,7 @@ impl Mixer {
     }
 
     /// The next samples, those from `now` on, the same on every channel.
-    fn fill<T: SizedSample + FromSample<f32>>(
-        &mut self,
-        out: &mut [T],
-        channels: usize,
-        now: Instant,
-    ) {
+    fn fill<T: SizedSample + FromSample<f32>>(&mut self, out: &mut [T], channels: usize, now: Instant) {
         for (due, click) in self.clicks.try_iter() {
             if self.voices.len() < MOST_VOICES {
                 let wait = due.saturating_duration_since(now).as_secs_f64() * self.rate;
@@ -163,11 +148,7 @@ mod tests {
 
     #[test]
     fn clicks_sound_when_they_are_due_on_every_channel_and_add_up() {
-        let click = |loudness| Click {
-            after: 0.0,
-            pitch: 440.0,
-            loudness,
-        };
+        let click = |loudness| Click { after: 0.0, pitch: 440.0, loudness };
         let rate = 48_000.0;
         let (send, clicks) = channel();
         let mut mixer = Mixer::new(clicks, rate);
@@ -203,11 +184,7 @@ mod tests {
         let mut mixer = Mixer::new(clicks, 48_000.0);
         let now = Instant::now();
         for _ in 0..10 * MOST_VOICES {
-            let click = Click {
-                after: 0.0,
-                pitch: 440.0,
-                loudness: 1.0,
-            };
+            let click = Click { after: 0.0, pitch: 440.0, loudness: 1.0 };
             send.send((now, click)).expect("is heard");
         }
         let mut block = [0_i16; 256];

@@ -12,11 +12,7 @@ pub fn stack(terms: &[Vec<f64>]) -> Vec<Band> {
         .map(|term| {
             let (mut low, mut high) = (Vec::with_capacity(instants), Vec::with_capacity(instants));
             for (i, value) in term[..instants].iter().enumerate() {
-                let edge = if *value >= 0.0 {
-                    &mut up[i]
-                } else {
-                    &mut down[i]
-                };
+                let edge = if *value >= 0.0 { &mut up[i] } else { &mut down[i] };
                 let from = *edge;
                 *edge += value;
                 low.push(from.min(*edge));
@@ -33,12 +29,7 @@ mod tests {
 
     #[test]
     fn bands_touch_and_both_sides_reach_equally_far() {
-        let terms = [
-            vec![3.0, 1.0],
-            vec![2.0, -2.0],
-            vec![-4.0, 3.0],
-            vec![-1.0, -2.0],
-        ];
+        let terms = [vec![3.0, 1.0], vec![2.0, -2.0], vec![-4.0, 3.0], vec![-1.0, -2.0]];
         let bands = stack(&terms);
         assert_eq!(bands[0], (vec![0.0, 0.0], vec![3.0, 1.0]));
         assert_eq!(bands[1], (vec![3.0, -2.0], vec![5.0, 0.0]));

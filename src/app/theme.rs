@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Frame, Margin,
-    Response, RichText, Stroke, TextStyle, Theme, Ui, Visuals, vec2,
+    self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Frame, Margin, Response, RichText,
+    Stroke, TextStyle, Theme, Ui, Visuals, vec2,
 };
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
@@ -36,11 +36,7 @@ pub fn series(index: usize, dark: bool) -> Color32 {
 /// that is half of what the interface costs.
 pub fn panel(ui: &Ui) -> Frame {
     let frame = Frame::side_top_panel(ui.style());
-    if cfg!(target_arch = "wasm32") {
-        frame.fill(Color32::TRANSPARENT)
-    } else {
-        frame
-    }
+    if cfg!(target_arch = "wasm32") { frame.fill(Color32::TRANSPARENT) } else { frame }
 }
 
 /// Least side of a touch target, points.
@@ -50,11 +46,7 @@ pub const FINGER: f32 = 44.0;
 pub fn apply_size(ctx: &egui::Context, fingers: bool) {
     ctx.all_styles_mut(|style| {
         let spacing = &mut style.spacing;
-        spacing.interact_size = if fingers {
-            vec2(FINGER, FINGER)
-        } else {
-            vec2(40.0, 26.0)
-        };
+        spacing.interact_size = if fingers { vec2(FINGER, FINGER) } else { vec2(40.0, 26.0) };
         spacing.icon_width = if fingers { 22.0 } else { 16.0 };
         spacing.combo_height = if fingers { 320.0 } else { 200.0 };
     });
@@ -66,11 +58,7 @@ pub fn apply_size(ctx: &egui::Context, fingers: bool) {
 
 /// Side of a small button, points: `mouse` where there is no need to make it larger.
 pub fn side(ui: &Ui, mouse: f32) -> f32 {
-    if ui.spacing().interact_size.y >= FINGER {
-        FINGER
-    } else {
-        mouse
-    }
+    if ui.spacing().interact_size.y >= FINGER { FINGER } else { mouse }
 }
 
 /// A small line of text that warns.
@@ -112,34 +100,18 @@ pub fn apply(ctx: &egui::Context) {
         spacing.menu_margin = Margin::same(8);
         spacing.window_margin = Margin::same(16);
         style.text_styles = [
-            (
-                TextStyle::Heading,
-                FontId::new(18.0, FontFamily::Proportional),
-            ),
+            (TextStyle::Heading, FontId::new(18.0, FontFamily::Proportional)),
             (TextStyle::Body, FontId::new(14.0, FontFamily::Proportional)),
-            (
-                TextStyle::Button,
-                FontId::new(14.0, FontFamily::Proportional),
-            ),
-            (
-                TextStyle::Monospace,
-                FontId::new(13.0, FontFamily::Monospace),
-            ),
-            (
-                TextStyle::Small,
-                FontId::new(12.0, FontFamily::Proportional),
-            ),
+            (TextStyle::Button, FontId::new(14.0, FontFamily::Proportional)),
+            (TextStyle::Monospace, FontId::new(13.0, FontFamily::Monospace)),
+            (TextStyle::Small, FontId::new(12.0, FontFamily::Proportional)),
         ]
         .into();
     });
 }
 
 fn visuals(dark: bool) -> Visuals {
-    let mut visuals = if dark {
-        Visuals::dark()
-    } else {
-        Visuals::light()
-    };
+    let mut visuals = if dark { Visuals::dark() } else { Visuals::light() };
     let pick = |on_light, on_dark| rgb(if dark { on_dark } else { on_light });
     visuals.panel_fill = pick(0xFAFBFC, 0x1B2026);
     visuals.window_fill = pick(0xFFFFFF, 0x22282F);
@@ -201,8 +173,7 @@ mod tests {
         for folder in ["src/app", "assets/scenes", "assets/lessons"] {
             texts(&root.join(folder), &mut shown);
         }
-        let shown: std::collections::BTreeSet<char> =
-            shown.iter().flat_map(|text| text.chars()).collect();
+        let shown: std::collections::BTreeSet<char> = shown.iter().flat_map(|text| text.chars()).collect();
         let shown = shown.into_iter().filter(|c| !c.is_control());
         let font = FontId::proportional(14.0);
         let missing: String = ctx.fonts_mut(|fonts| {

@@ -2,8 +2,7 @@
 //! its ball came into contact; flags show what was done. A click or a drag displays any instant.
 
 use eframe::egui::{
-    self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui,
-    WidgetInfo,
+    self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, WidgetInfo,
     accesskit::{Action, ActionData},
     pos2, vec2,
 };
@@ -63,11 +62,8 @@ impl Timeline {
                 }
                 let help = "Play backwards to the start (key J)";
                 let backwards = player.is_playing_backwards();
-                let (icon, name) = if backwards {
-                    (Icon::Pause, "Pause backwards")
-                } else {
-                    (Icon::Backwards, "Play backwards")
-                };
+                let (icon, name) =
+                    if backwards { (Icon::Pause, "Pause backwards") } else { (Icon::Backwards, "Play backwards") };
                 if icon_button(ui, icon, name, help, side, false).clicked() {
                     if backwards {
                         player.set_playing(false);
@@ -127,39 +123,23 @@ impl Timeline {
             player.go_to(time);
         }
         if ui.is_rect_visible(rect) {
-            let scale = Scale {
-                rect,
-                range: self.range(player),
-            };
+            let scale = Scale { rect, range: self.range(player) };
             paint(ui, player, &scale, &response);
         }
         if let Some(pos) = response.hover_pos() {
-            response
-                .clone()
-                .on_hover_ui_at_pointer(|ui| describe(ui, player, &scale, pos));
+            response.clone().on_hover_ui_at_pointer(|ui| describe(ui, player, &scale, pos));
         }
         asked.is_some()
     }
 
     /// Pointer and key input: returns an instant, or changes the time range.
-    fn input(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        player: &Player,
-        scale: &Scale,
-    ) -> Option<f64> {
+    fn input(&mut self, ui: &Ui, response: &Response, player: &Player, scale: &Scale) -> Option<f64> {
         let (from, to) = scale.range;
         let length = to - from;
-        let asked = |action| {
-            ui.input(|input| input.num_accesskit_action_requests(response.id, action)) as f64
-        };
+        let asked = |action| ui.input(|input| input.num_accesskit_action_requests(response.id, action)) as f64;
         let mut by = asked(Action::Increment) - asked(Action::Decrement);
         if response.has_focus() {
-            let arrows = EventFilter {
-                horizontal_arrows: true,
-                ..EventFilter::default()
-            };
+            let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
             ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
             let pressed = |key| ui.input(|input| input.num_presses(key)) as f64;
             by += pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
@@ -232,22 +212,10 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let shown = player.pacer.shown();
     let (_, end) = scale.range;
     if let Some(left) = player.abandoned_future() {
-        contact_lanes(
-            ui,
-            &left.contact_history,
-            scale,
-            (player.reached(), end),
-            PALE,
-        );
+        contact_lanes(ui, &left.contact_history, scale, (player.reached(), end), PALE);
     }
     contact_lanes(ui, player.contact_history(), scale, (0.0, shown), 1.0);
-    contact_lanes(
-        ui,
-        player.contact_history(),
-        scale,
-        (shown, player.reached()),
-        PALE,
-    );
+    contact_lanes(ui, player.contact_history(), scale, (shown, player.reached()), PALE);
     let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
         for flag in flags {
             let later = pale || flag.time > shown;
@@ -257,10 +225,7 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     };
     flags(&mut player.flags(), false);
     if let Some(left) = player.abandoned_future() {
-        let ahead = left
-            .flags
-            .iter()
-            .filter(|flag| flag.time > player.reached());
+        let ahead = left.flags.iter().filter(|flag| flag.time > player.reached());
         flags(&mut ahead.cloned(), true);
     }
     let x = scale.x(shown);
@@ -268,23 +233,14 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.vline(x, scale.rect.y_range(), Stroke::new(1.5, colour));
     let handle = pos2(x, scale.rect.top() + 4.0);
     painter.circle_filled(handle, 4.0, colour);
-    let edge = if response.has_focus() {
-        visuals.widgets.hovered.fg_stroke
-    } else {
-        visuals.widgets.noninteractive.bg_stroke
-    };
+    let edge =
+        if response.has_focus() { visuals.widgets.hovered.fg_stroke } else { visuals.widgets.noninteractive.bg_stroke };
     painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
 }
 
 /// The lanes between two times, s: sliding in half the joint's colour, sticking in full colour, and a mark where its ball came
 /// into contact. A pixel column is coloured in proportion to the time in each state.
-fn contact_lanes(
-    ui: &Ui,
-    contacts: &ContactHistory,
-    scale: &Scale,
-    between: (f64, f64),
-    part: f32,
-) {
+fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), part: f32) {
     let dark = ui.visuals().dark_mode;
     let pixel = 1.0 / ui.ctx().pixels_per_point();
     let from = between.0.max(scale.range.0);
@@ -322,13 +278,10 @@ fn contact_lanes(
         while start < columns {
             let share = shares[start];
             let same = shares[start..columns].iter();
-            let count = same
-                .take_while(|other| (*other - share).abs() < 0.01)
-                .count();
+            let count = same.take_while(|other| (*other - share).abs() < 0.01).count();
             if share > 0.0 {
                 let left = scale.rect.left() + start as f32 * pixel;
-                let place =
-                    Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
+                let place = Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
                 // Even the shortest contact stays visible.
                 mesh.add_colored_rect(place, colour.gamma_multiply(share.clamp(0.12, 1.0)));
             }
@@ -383,10 +336,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         };
         ui.label(format!("{name}: {words}"));
     }
-    let left = player
-        .abandoned_future()
-        .into_iter()
-        .flat_map(|left| left.flags.iter().cloned());
+    let left = player.abandoned_future().into_iter().flat_map(|left| left.flags.iter().cloned());
     for flag in player.flags().chain(left) {
         if (scale.x(flag.time) - pos.x).abs() <= NEAR {
             ui.label(format!("{}: {}", value::time(flag.time), flag.words));

@@ -1,8 +1,6 @@
 //! Transport: play, step, reset, time scale, and how fast time really passes.
 
-use eframe::egui::{
-    self, ComboBox, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText,
-};
+use eframe::egui::{self, ComboBox, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
@@ -28,18 +26,9 @@ pub const PLAY: f32 = 40.0;
 /// The next scale of [`SCALES`] faster or slower than the present one.
 pub fn next_scale(scale: f64, faster: bool) -> f64 {
     if faster {
-        SCALES
-            .iter()
-            .rev()
-            .copied()
-            .find(|&s| s > scale * 1.0001)
-            .unwrap_or(SCALES[0])
+        SCALES.iter().rev().copied().find(|&s| s > scale * 1.0001).unwrap_or(SCALES[0])
     } else {
-        SCALES
-            .iter()
-            .copied()
-            .find(|&s| s < scale * 0.9999)
-            .unwrap_or(SCALES[SCALES.len() - 1])
+        SCALES.iter().copied().find(|&s| s < scale * 0.9999).unwrap_or(SCALES[SCALES.len() - 1])
     }
 }
 
@@ -135,30 +124,23 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
 fn clock(ui: &Ui) -> Vec2 {
     let font = egui::TextStyle::Monospace.resolve(ui.style());
     let digits = "0".repeat(value::LONGEST_TIME);
-    let galley = ui
-        .painter()
-        .layout_no_wrap(digits, font, egui::Color32::PLACEHOLDER);
+    let galley = ui.painter().layout_no_wrap(digits, font, egui::Color32::PLACEHOLDER);
     galley.size().ceil()
 }
 
 fn time(ui: &mut Ui, player: &Player) {
     let time = RichText::new(value::time(player.pacer.shown()));
     let label = egui::Label::new(time.monospace().strong()).halign(egui::Align::RIGHT);
-    ui.add_sized(clock(ui), label)
-        .on_hover_text("Simulated time");
+    ui.add_sized(clock(ui), label).on_hover_text("Simulated time");
 }
 
 fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     let mut scale = player.pacer.scale();
-    ui.label("Time scale").on_hover_text(
-        "Simulated against real time: 1:50 shows a fiftieth of a second in a second (keys + and -)",
-    );
+    ui.label("Time scale")
+        .on_hover_text("Simulated against real time: 1:50 shows a fiftieth of a second in a second (keys + and -)");
     ui.spacing_mut().slider_width = if narrow { 90.0 } else { 150.0 };
-    let slider = Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1)
-        .logarithmic(true)
-        .show_value(false);
-    let response =
-        keys::slider(ui, slider).on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
+    let slider = Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1).logarithmic(true).show_value(false);
+    let response = keys::slider(ui, slider).on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
     if response.changed() {
         player.pacer.set_scale(scale);
     }
@@ -176,10 +158,7 @@ fn scales(ui: &mut Ui, player: &mut Player) {
         .show_ui(ui, |ui| {
             for preset in SCALES {
                 let chosen = (player.pacer.scale() / preset - 1.0).abs() < 1e-3;
-                if ui
-                    .selectable_label(chosen, value::time_scale(preset))
-                    .clicked()
-                {
+                if ui.selectable_label(chosen, value::time_scale(preset)).clicked() {
                     player.pacer.set_scale(preset);
                 }
             }
@@ -197,9 +176,7 @@ fn scales(ui: &mut Ui, player: &mut Player) {
     let mut way = left.unwrap_or(0.0) + drag.drag_delta().x;
     while way.abs() >= SCALE_APART {
         let faster = way > 0.0;
-        player
-            .pacer
-            .set_scale(next_scale(player.pacer.scale(), faster));
+        player.pacer.set_scale(next_scale(player.pacer.scale(), faster));
         way -= SCALE_APART.copysign(way);
     }
     ui.data_mut(|data| data.insert_temp(drag.id, way));
@@ -227,8 +204,7 @@ fn reached(ui: &mut Ui, player: &Player) {
     };
     let words = format!("reached {}", value::time_scale(reached));
     let Some(limit) = player.limit() else {
-        ui.label(RichText::new(words).weak())
-            .on_hover_text("Simulated against real time, as measured");
+        ui.label(RichText::new(words).weak()).on_hover_text("Simulated against real time, as measured");
         return;
     };
     let (by, help) = match limit {
@@ -244,15 +220,9 @@ fn reached(ui: &mut Ui, player: &Player) {
         ),
     };
     let colour = ui.visuals().warn_fg_color;
-    ui.label(RichText::new(words).color(colour))
-        .on_hover_text(help);
+    ui.label(RichText::new(words).color(colour)).on_hover_text(help);
     let by = RichText::new(by).small().color(colour);
-    let by = WidgetText::from(by).into_galley(
-        ui,
-        Some(TextWrapMode::Extend),
-        f32::INFINITY,
-        TextStyle::Body,
-    );
+    let by = WidgetText::from(by).into_galley(ui, Some(TextWrapMode::Extend), f32::INFINITY, TextStyle::Body);
     // Where there is no room the tooltip says it.
     if by.size().x < ui.available_width() {
         ui.label(by).on_hover_text(help);
@@ -272,11 +242,7 @@ pub fn banner(ui: &mut Ui, player: &Player) -> bool {
         .inner_margin(10.0)
         .show(ui, |ui| {
             ui.horizontal_wrapped(|ui| {
-                ui.label(
-                    RichText::new(format!("Stopped at {}", value::time(stopped.time)))
-                        .strong()
-                        .color(colour),
-                );
+                ui.label(RichText::new(format!("Stopped at {}", value::time(stopped.time))).strong().color(colour));
                 ui.label(stopped.fault.to_string());
                 ui.label(stopped.advice.to_string());
                 ui.button("Reset the run").clicked()

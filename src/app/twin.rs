@@ -97,11 +97,7 @@ impl Twin {
 
     /// Where it is now.
     pub fn mark(&self) -> TwinMark {
-        TwinMark {
-            begins: self.begins,
-            state: self.simulation.snapshot(),
-            steps: self.steps,
-        }
+        TwinMark { begins: self.begins, state: self.simulation.snapshot(), steps: self.steps }
     }
 
     /// Goes back with `run`, which has just been taken to where it was when `mark` was set. Without a mark of this twin it
@@ -157,11 +153,7 @@ impl Twin {
 
     /// Records its distance from the run, where that is not known from before.
     fn measure(&mut self) {
-        if self
-            .distances
-            .last()
-            .is_some_and(|[at, _]| *at >= self.goal)
-        {
+        if self.distances.last().is_some_and(|[at, _]| *at >= self.goal) {
             return;
         }
         let scales = self.simulation.scales();
@@ -207,11 +199,7 @@ impl Twin {
         let largest = self.distances.iter().map(|d| d[1]).fold(0.0, f64::max);
         let end = self.distances.iter().position(|d| d[1] >= GROWN * largest);
         let growing = &self.distances[..end.map_or(0, |end| end + 1)];
-        fit(if growing.len() < FEWEST {
-            &self.distances
-        } else {
-            growing
-        })
+        fit(if growing.len() < FEWEST { &self.distances } else { growing })
     }
 }
 

@@ -63,10 +63,7 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
 /// Name and displayed value of `key` of `scene`; `None` if the scene has no such key.
 fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
     let (value, parameter) = (scene.get(key).ok()?, scene.parameter(key).ok()?);
-    let name = match key
-        .strip_prefix("joint.")
-        .and_then(|rest| rest.rsplit_once('.'))
-    {
+    let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
         Some((joint, _)) => format!("{} of {joint}", parameter.label),
         None => parameter.label.to_owned(),
     };
@@ -79,9 +76,7 @@ pub fn scene_line(scene: &Scene, except: &[String]) -> String {
     let changed = changed.filter(|key| !except.contains(key) && !is_solver_or_view_key(key));
     let mut parts = vec![scene.name.clone()];
     parts.extend(
-        changed
-            .filter_map(|key| named(scene, key))
-            .map(|(name, value)| format!("{} {value}", name.to_lowercase())),
+        changed.filter_map(|key| named(scene, key)).map(|(name, value)| format!("{} {value}", name.to_lowercase())),
     );
     parts.push(solver(scene));
     parts.join(", ")
@@ -155,30 +150,18 @@ pub fn number(value: f64, digits: usize) -> String {
 /// Digits that distinguish values of size up to `most` that differ by a thousandth of `span`.
 pub fn digits_within(span: f64, most: f64) -> usize {
     let more = (most / span).log10().ceil();
-    if more.is_finite() {
-        4 + (more.max(0.0) as usize).min(11)
-    } else {
-        4
-    }
+    if more.is_finite() { 4 + (more.max(0.0) as usize).min(11) } else { 4 }
 }
 
 /// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
 pub fn power_of_ten(share: f64) -> String {
-    if share == 0.0 || (1e-3..1e4).contains(&share.abs()) {
-        number(share, 2)
-    } else {
-        format!("{share:.0e}")
-    }
+    if share == 0.0 || (1e-3..1e4).contains(&share.abs()) { number(share, 2) } else { format!("{share:.0e}") }
 }
 
 /// A share in per cent, two digits, however small.
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    if percent == 0.0 || percent >= 0.01 {
-        format!("{} %", number(percent, 2))
-    } else {
-        format!("{percent:.0e} %")
-    }
+    if percent == 0.0 || percent >= 0.01 { format!("{} %", number(percent, 2)) } else { format!("{percent:.0e} %") }
 }
 
 /// Most characters of [`time`] up to 10^9 s: the width reserved for a clock.
@@ -194,9 +177,8 @@ pub fn time(seconds: f64) -> String {
             return format!("{:.*} {name}", decimals as usize, seconds / unit);
         }
     }
-    let decimals = (0..4)
-        .find(|taken| size < libm::pow(10.0, f64::from(4 + taken)) - 0.5)
-        .map_or(0, |taken| 4 - taken as usize);
+    let decimals =
+        (0..4).find(|taken| size < libm::pow(10.0, f64::from(4 + taken)) - 0.5).map_or(0, |taken| 4 - taken as usize);
     format!("{seconds:.decimals$} s")
 }
 
@@ -215,11 +197,7 @@ pub fn time_scale(scale: f64) -> String {
 
 /// A count with a thin space between thousands.
 fn grouped(count: u64) -> String {
-    if count < 10_000 {
-        count.to_string()
-    } else {
-        format!("{}\u{202f}{:03}", count / 1000, count % 1000)
-    }
+    if count < 10_000 { count.to_string() } else { format!("{}\u{202f}{:03}", count / 1000, count % 1000) }
 }
 
 #[cfg(test)]
@@ -249,14 +227,8 @@ mod tests {
             ("3 um", "3 µm"),
             ("3um and 5 us.", "3µm and 5 µs."),
             ("units m, mm, um, um/s", "units m, mm, µm, µm/s"),
-            (
-                "-9.81 m/s^2 to 20 kg mm^2, m^3",
-                "-9.81 m/s² to 20 kg mm², m³",
-            ),
-            (
-                "maximum of status, 2^20, x^2y",
-                "maximum of status, 2^20, x^2y",
-            ),
+            ("-9.81 m/s^2 to 20 kg mm^2, m^3", "-9.81 m/s² to 20 kg mm², m³"),
+            ("maximum of status, 2^20, x^2y", "maximum of status, 2^20, x^2y"),
             ("", ""),
         ] {
             assert_eq!(typeset(plain), printed);
@@ -264,17 +236,11 @@ mod tests {
         let kinds = crate::scene::table().iter().map(|parameter| parameter.kind);
         let mut seen = 0;
         for kind in kinds {
-            let Kind::Number {
-                dimension, display, ..
-            } = kind
-            else {
+            let Kind::Number { dimension, display, .. } = kind else {
                 continue;
             };
             let printed = shown(&Value::Number(0.25), &kind);
-            assert!(
-                !printed.contains('^') && !printed.contains("um"),
-                "{printed}"
-            );
+            assert!(!printed.contains('^') && !printed.contains("um"), "{printed}");
             let read = crate::scene::parse_quantity(&printed, dimension).expect("reads back");
             assert!((read - 0.25).abs() < 1e-6, "{display}: {printed}");
             seen += 1;

@@ -5,8 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use eframe::egui::{
-    self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip,
-    Ui, WidgetInfo, vec2,
+    self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip, Ui, WidgetInfo, vec2,
 };
 use glam::{Vec2, Vec3};
 
@@ -20,8 +19,8 @@ use crate::render;
 use crate::scene::Vec3 as Exact;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
-    Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme,
-    ViewOptions, WearMap, to_f32,
+    Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions, WearMap,
+    to_f32,
 };
 
 /// Points of the probe's trail that are kept.
@@ -148,10 +147,7 @@ impl Viewport {
 
     /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
     pub fn show_scene(&mut self, player: &Player) {
-        *self = Self {
-            pace: self.pace.take().map(|_| Pace::default()),
-            ..Self::new(player, self.options.clone())
-        };
+        *self = Self { pace: self.pace.take().map(|_| Pace::default()), ..Self::new(player, self.options.clone()) };
     }
 
     /// After a reset: the same shapes at t = 0.
@@ -219,8 +215,7 @@ impl Viewport {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
             let scene = player.scene();
-            self.view
-                .close_up(&mut goal, joint, scene, player.frame(), &self.options);
+            self.view.close_up(&mut goal, joint, scene, player.frame(), &self.options);
             self.glide(player, goal, joint);
         }
     }
@@ -323,27 +318,19 @@ impl Viewport {
     /// The next factor of a short list for the magnification of the play.
     pub fn next_magnification(&mut self) {
         const STEPS: [f32; 6] = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0];
-        let next = STEPS
-            .iter()
-            .find(|&&step| step > self.options.magnification * 1.001);
+        let next = STEPS.iter().find(|&&step| step > self.options.magnification * 1.001);
         self.options.magnification = *next.unwrap_or(&STEPS[0]);
     }
 
     /// The picture with its overlays, over all of `ui`; a `plain` one shows nothing about what is under the cursor.
     /// Names keep clear of what is painted `above` it.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: Option<Rect>) {
-        let (rect, response) = ui.allocate_exact_size(
-            ui.available_size().max(vec2(16.0, 16.0)),
-            Sense::click_and_drag(),
-        );
+        let (rect, response) =
+            ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
         let size = screen.size;
-        self.options.theme = if ui.visuals().dark_mode {
-            Theme::Dark
-        } else {
-            Theme::Light
-        };
+        self.options.theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
 
         let aspect = size[0] as f32 / size[1] as f32;
         // Folding the sheet or turning a phone would leave half of the mechanism outside.
@@ -354,13 +341,7 @@ impl Viewport {
             // The first picture of a scene does not move into place.
             let first = self.list.size == [0, 0];
             let mut goal = self.goal.unwrap_or(self.camera);
-            self.view.fit(
-                &mut goal,
-                player.scene(),
-                player.frame(),
-                &self.options,
-                size,
-            );
+            self.view.fit(&mut goal, player.scene(), player.frame(), &self.options, size);
             if first {
                 (self.camera, self.goal) = (goal, None);
             } else {
@@ -372,16 +353,9 @@ impl Viewport {
         let camera = self.framed(aspect);
         let shot = shot!(self, player, &camera, screen);
         let pick = |pos: Pos2| self.view.pick(&shot, screen.pixel(pos));
-        let hovered = response
-            .hover_pos()
-            .filter(|_| !plain && !response.dragged())
-            .and_then(pick);
+        let hovered = response.hover_pos().filter(|_| !plain && !response.dragged()).and_then(pick);
         // A lifted finger does not hover.
-        let tapped = response
-            .interact_pointer_pos()
-            .filter(|_| response.clicked())
-            .and_then(pick)
-            .map(|hit| hit.what);
+        let tapped = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(pick).map(|hit| hit.what);
         let on_screen = !plain && self.frozen.is_none();
         let follows = self.pace.is_some() && on_screen;
         let said = if follows {
@@ -403,11 +377,7 @@ impl Viewport {
         let following = self.followed.and_then(|picked| name_of(player, picked));
         let overlay = Overlay {
             time: Some(player.pacer.shown()),
-            notes: following
-                .map(|name| format!("following {name}"))
-                .into_iter()
-                .chain(said)
-                .collect(),
+            notes: following.map(|name| format!("following {name}")).into_iter().chain(said).collect(),
             legend: true,
             labels: true,
         };
@@ -415,14 +385,8 @@ impl Viewport {
         overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above);
         if let Some(hit) = hovered {
             // Away from the nearer edge: the transport below stays free.
-            let low = response
-                .hover_pos()
-                .is_some_and(|pos| pos.y > rect.center().y);
-            let align = if low {
-                RectAlign::TOP_START
-            } else {
-                RectAlign::BOTTOM_START
-            };
+            let low = response.hover_pos().is_some_and(|pos| pos.y > rect.center().y);
+            let align = if low { RectAlign::TOP_START } else { RectAlign::BOTTOM_START };
             let mut card = Tooltip::for_enabled(&response).at_pointer().gap(12.0);
             card.popup = card.popup.align(align);
             card.show(|ui| describe(ui, player, hit.what));
@@ -430,13 +394,7 @@ impl Viewport {
     }
 
     /// Describes what `screen` shows with `quality` in `self.next`; returns what is said about ghosts.
-    fn list_next(
-        &mut self,
-        player: &Player,
-        camera: &Camera,
-        screen: &Screen,
-        quality: Quality,
-    ) -> Vec<String> {
+    fn list_next(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let mut list = std::mem::take(&mut self.next);
         let drawn = screen.drawn_with(quality);
         let shot = shot!(self, player, camera, drawn);
@@ -451,26 +409,14 @@ impl Viewport {
     }
 
     /// The same in `self.list`, as another picture.
-    fn compose(
-        &mut self,
-        player: &Player,
-        camera: &Camera,
-        screen: &Screen,
-        quality: Quality,
-    ) -> Vec<String> {
+    fn compose(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let said = self.list_next(player, camera, screen, quality);
         self.show_next();
         said
     }
 
     /// The same with what quality the frames allow; the picture before stays if nothing has changed.
-    fn compose_paced(
-        &mut self,
-        ui: &Ui,
-        player: &Player,
-        camera: &Camera,
-        screen: &Screen,
-    ) -> Vec<String> {
+    fn compose_paced(&mut self, ui: &Ui, player: &Player, camera: &Camera, screen: &Screen) -> Vec<String> {
         let before = self.list.quality;
         let said = self.list_next(player, camera, screen, before);
         // Bodies first: what mostly differs.
@@ -479,16 +425,9 @@ impl Viewport {
             return said;
         };
         let (now, dt) = ui.input(|input| (input.time, f64::from(input.stable_dt)));
-        let quality = pace.frame(&Seen {
-            size: screen.size,
-            moves,
-            now,
-            dt,
-            drawing: player.drawing(dt),
-        });
+        let quality = pace.frame(&Seen { size: screen.size, moves, now, dt, drawing: player.drawing(dt) });
         if let Some(wait) = pace.until_still(now).filter(|_| quality != Quality::FULL) {
-            ui.ctx()
-                .request_repaint_after(Duration::from_secs_f64(wait));
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(wait));
         }
         if quality != before {
             return self.compose(player, camera, screen, quality);
@@ -508,8 +447,7 @@ impl Viewport {
 
     fn drag(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) {
         let Screen { rect, size, scale } = *screen;
-        let (shift, fingers, touches) =
-            ui.input(|i| (i.modifiers.shift, i.multi_touch(), i.any_touches()));
+        let (shift, fingers, touches) = ui.input(|i| (i.modifiers.shift, i.multi_touch(), i.any_touches()));
         self.pinched &= touches;
         if let Some(fingers) = fingers
             && (self.pinched || rect.contains(fingers.center_pos))
@@ -548,20 +486,10 @@ impl Viewport {
     }
 
     /// Takes hold of a body by press and drag, or by a long touch; returns whether the pointer holds one.
-    fn pull(
-        &mut self,
-        ui: &Ui,
-        response: &egui::Response,
-        player: &Player,
-        screen: &Screen,
-    ) -> bool {
-        let (finger, shift, origin) =
-            ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
-        let taken = if finger {
-            self.finger_stays(ui, response)
-        } else {
-            response.drag_started_by(PointerButton::Primary)
-        };
+    fn pull(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) -> bool {
+        let (finger, shift, origin) = ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
+        let taken =
+            if finger { self.finger_stays(ui, response) } else { response.drag_started_by(PointerButton::Primary) };
         if let Some(origin) = origin.filter(|_| taken) {
             let shot = shot!(self, player, &self.camera, screen);
             let hit = self.view.pick(&shot, screen.pixel(origin));
@@ -599,10 +527,7 @@ impl Viewport {
         }
         let (now, way) = ui.input(|i| {
             let way = i.pointer.latest_pos().zip(i.pointer.press_origin());
-            (
-                i.time,
-                way.map_or(0.0, |(pos, origin)| pos.distance(origin)),
-            )
+            (i.time, way.map_or(0.0, |(pos, origin)| pos.distance(origin)))
         });
         let since = self.finger_since.get_or_insert(now);
         if way > STILL {
@@ -611,8 +536,7 @@ impl Viewport {
         let left = *since + HOLD - now;
         if left > 0.0 {
             if left.is_finite() {
-                ui.ctx()
-                    .request_repaint_after(std::time::Duration::from_secs_f64(left));
+                ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(left));
             }
             return false;
         }
@@ -645,29 +569,21 @@ impl Viewport {
 
     /// Buttons for points of view, each added in turn; `backwards` where the layout runs from right to left.
     pub fn camera_buttons(&mut self, ui: &mut Ui, backwards: bool) {
-        let mut buttons: Vec<Option<Preset>> =
-            Preset::ALL.into_iter().map(Some).chain([None]).collect();
+        let mut buttons: Vec<Option<Preset>> = Preset::ALL.into_iter().map(Some).chain([None]).collect();
         if backwards {
             buttons.reverse();
         }
         for button in buttons {
             match button {
                 Some(preset) => {
-                    let key = Preset::ALL
-                        .iter()
-                        .position(|p| *p == preset)
-                        .map_or(0, |i| i + 1);
+                    let key = Preset::ALL.iter().position(|p| *p == preset).map_or(0, |i| i + 1);
                     let help = format!("Look from here (key {key})");
                     if ui.button(preset.label()).on_hover_text(help).clicked() {
                         self.preset(preset);
                     }
                 }
                 None => {
-                    if ui
-                        .button("Fit")
-                        .on_hover_text("Show everything (key F)")
-                        .clicked()
-                    {
+                    if ui.button("Fit").on_hover_text("Show everything (key F)").clicked() {
                         self.fit();
                     }
                 }
@@ -682,33 +598,23 @@ impl Viewport {
             "Draws eccentricity and clearance larger than they are, together, so that the ball never leaves its \
              socket. The motion of the machine stays as it is. Key X.",
         );
-        let slider = Slider::new(&mut options.magnification, 1.0..=100.0)
-            .logarithmic(true)
-            .prefix("×")
-            .max_decimals(1);
+        let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
         keys::slider(ui, slider).accessible_name("Magnification of the play");
         ui.add_space(4.0);
         ui.label("Force arrows");
         ui.horizontal(|ui| {
-            ui.checkbox(&mut options.arrows.normal, "Normal")
-                .on_hover_text("Normal force on each ball, N");
-            ui.checkbox(&mut options.arrows.friction, "Friction")
-                .on_hover_text("Friction force on each ball, N");
-            ui.add_enabled(options.arrows.normal, Checkbox::new(&mut options.arrows.peaks, "Peaks"))
-                .on_hover_text(
-                    "A hollow arrow where a ball has struck: its largest normal force, N, and how long ago that was in \
+            ui.checkbox(&mut options.arrows.normal, "Normal").on_hover_text("Normal force on each ball, N");
+            ui.checkbox(&mut options.arrows.friction, "Friction").on_hover_text("Friction force on each ball, N");
+            ui.add_enabled(options.arrows.normal, Checkbox::new(&mut options.arrows.peaks, "Peaks")).on_hover_text(
+                "A hollow arrow where a ball has struck: its largest normal force, N, and how long ago that was in \
                      simulated time. It fades as simulated time passes.",
-                );
+            );
         });
         ui.horizontal(|ui| {
             ui.radio_value(&mut options.arrows.scaling, Scaling::Linear, "Linear")
                 .on_hover_text("Length in proportion to the force");
-            ui.radio_value(
-                &mut options.arrows.scaling,
-                Scaling::Logarithmic,
-                "Logarithmic",
-            )
-            .on_hover_text("Length by the logarithm of the force, over three decades");
+            ui.radio_value(&mut options.arrows.scaling, Scaling::Logarithmic, "Logarithmic")
+                .on_hover_text("Length by the logarithm of the force, over three decades");
         });
         let mut automatic = options.arrows.reference.is_none();
         if ui
@@ -716,40 +622,28 @@ impl Viewport {
             .on_hover_text("The scale follows the largest force; off, it stays")
             .changed()
         {
-            options.arrows.reference = if automatic {
-                None
-            } else {
-                Some(self.marks.reference(&options.arrows))
-            };
+            options.arrows.reference = if automatic { None } else { Some(self.marks.reference(&options.arrows)) };
         }
         if let Some(reference) = &mut options.arrows.reference {
-            ui.add(
-                Slider::new(reference, 0.1..=10_000.0)
-                    .logarithmic(true)
-                    .suffix(" N")
-                    .max_decimals(1),
-            )
-            .on_hover_text("Force of the longest arrow in the legend")
-            .accessible_name("Force of the reference arrow");
+            ui.add(Slider::new(reference, 0.1..=10_000.0).logarithmic(true).suffix(" N").max_decimals(1))
+                .on_hover_text("Force of the longest arrow in the legend")
+                .accessible_name("Force of the reference arrow");
         }
         ui.add_space(4.0);
         ui.label("Show");
         ui.checkbox(&mut options.flash, "Flash joints that are hit")
             .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
-        ui.checkbox(&mut options.joint_names, "Joint names")
-            .on_hover_text("Names beside the ball joints");
+        ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the ball joints");
         ui.horizontal(|ui| {
             ui.checkbox(&mut options.sockets, "Sockets")
                 .on_hover_text("The cut-open sockets; without them the balls stand free");
             ui.checkbox(&mut options.hinges, "Hinges and slides")
                 .on_hover_text("Pins and rails where the scene draws none of its own");
         });
-        ui.checkbox(&mut options.floor, "Floor grid")
-            .on_hover_text("The floor with its grid and the shadows on it");
+        ui.checkbox(&mut options.floor, "Floor grid").on_hover_text("The floor with its grid and the shadows on it");
         ui.checkbox(&mut options.triad, "Axes and gravity")
             .on_hover_text("World axes X, Y, Z and the direction of gravity g");
-        ui.checkbox(&mut options.trail, "Trail of the probe tip")
-            .on_hover_text("Where the tip of the probe was");
+        ui.checkbox(&mut options.trail, "Trail of the probe tip").on_hover_text("Where the tip of the probe was");
         ui.add_space(4.0);
         ui.label("Wear map").on_hover_text(
             "Colours the inner faces of the sockets by what they took since the reset, in cells of equal area; the balls are then \
@@ -758,16 +652,8 @@ impl Viewport {
         ui.horizontal(|ui| {
             for (map, name, help) in [
                 (WearMap::Off, "Off", "Sockets as they are"),
-                (
-                    WearMap::Impulse,
-                    "Impulse",
-                    "How often and how hard: time integral of the normal force, N s/mm²",
-                ),
-                (
-                    WearMap::FrictionWork,
-                    "Friction work",
-                    "Size of the work that friction took, mJ/mm²",
-                ),
+                (WearMap::Impulse, "Impulse", "How often and how hard: time integral of the normal force, N s/mm²"),
+                (WearMap::FrictionWork, "Friction work", "Size of the work that friction took, mJ/mm²"),
             ] {
                 ui.radio_value(&mut options.wear, map, name)
                     .on_hover_text(help)
@@ -787,10 +673,7 @@ impl Viewport {
             self.follow_frame_rate(follows);
         }
         if self.followed.is_some()
-            && ui
-                .button("Stop following")
-                .on_hover_text("Stop following (double-click on the ground)")
-                .clicked()
+            && ui.button("Stop following").on_hover_text("Stop following (double-click on the ground)").clicked()
         {
             self.follow(None);
         }
@@ -798,16 +681,14 @@ impl Viewport {
 
     fn extend_trail(&mut self, player: &Player) {
         let output = &player.scene().output;
-        let (Some(probe), Some(body)) = (output.probe, player.frame().bodies.get(output.body))
-        else {
+        let (Some(probe), Some(body)) = (output.probe, player.frame().bodies.get(output.body)) else {
             return;
         };
         if self.trail.len() == TRAIL {
             // Half at once: shifting the whole trail for every point would be too costly.
             self.trail.drain(..TRAIL / 2);
         }
-        self.trail
-            .push(to_f32(&(body.position + body.rotation * probe)));
+        self.trail.push(to_f32(&(body.position + body.rotation * probe)));
     }
 }
 
@@ -825,11 +706,7 @@ struct Screen {
 impl Screen {
     fn new(rect: Rect, scale: f32) -> Self {
         let pixels = |length: f32| ((length * scale).round() as u32).max(1);
-        Self {
-            rect,
-            size: [pixels(rect.width()), pixels(rect.height())],
-            scale,
-        }
+        Self { rect, size: [pixels(rect.width()), pixels(rect.height())], scale }
     }
 
     /// The same with the pixels that `quality` draws.
@@ -848,10 +725,7 @@ fn name_of(player: &Player, picked: Picked) -> Option<&str> {
     let scene = player.scene();
     match picked {
         Picked::Body(index) => scene.bodies.get(index).map(|body| body.name.as_str()),
-        Picked::Joint(index) => scene
-            .ball_joints
-            .get(index)
-            .map(|joint| joint.name.as_str()),
+        Picked::Joint(index) => scene.ball_joints.get(index).map(|joint| joint.name.as_str()),
         Picked::Fixed(_) => None,
     }
 }
@@ -871,9 +745,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     ui.strong(name);
     match picked {
         Picked::Body(index) => {
-            if let (Some(body), Some(motion)) =
-                (player.scene().bodies.get(index), frame.bodies.get(index))
-            {
+            if let (Some(body), Some(motion)) = (player.scene().bodies.get(index), frame.bodies.get(index)) {
                 row(ui, "Mass", body.mass, "kg");
                 row(ui, "Speed", motion.velocity.norm(), "m/s");
                 row(ui, "Angular speed", motion.angular_velocity.norm(), "rad/s");
@@ -911,9 +783,7 @@ mod tests {
         let draw = |viewport: &mut Viewport| {
             let ctx = egui::Context::default();
             theme::apply(&ctx);
-            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
-                viewport.ui(ui, &player, true, None)
-            });
+            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| viewport.ui(ui, &player, true, None));
             // No texture is made of it.
             output.textures_delta.clear();
         };

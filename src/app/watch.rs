@@ -186,9 +186,7 @@ mod tests {
         watch.set_phase(0.25, 0.0);
         run(&mut watch, &mut simulation, 0.7);
         let times = |watch: &RunWatch| watch.sections().map(|(time, _)| *time).collect::<Vec<_>>();
-        let near = |a: &[f64], b: &[f64]| {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
-        };
+        let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45, 0.65]));
         watch.show(0.5);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
@@ -213,12 +211,7 @@ mod tests {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         let mut simulation = Simulation::new(&scene).expect("starts");
         let mut watch = RunWatch::new(&scene);
-        assert!(
-            watch
-                .period()
-                .expect_err("hangs")
-                .contains("no drive phase")
-        );
+        assert!(watch.period().expect_err("hangs").contains("no drive phase"));
         run(&mut watch, &mut simulation, 0.1);
         assert!(watch.orbit().count() > 20 && watch.sections().len() == 0);
     }

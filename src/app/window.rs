@@ -44,9 +44,7 @@ pub fn run_native(mut options: AppOptions, page: String) -> Result<(), WindowErr
         Ok(Box::new(app))
     });
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {
-        eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {
-            render::NoAdapter.into()
-        }
+        eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => render::NoAdapter.into(),
         other => WindowError::Window(other.to_string()),
     })
 }

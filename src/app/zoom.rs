@@ -29,11 +29,7 @@ impl Zoom {
             }
             None => (response.hover_pos()?, 0.0),
         };
-        (factor != 1.0 || shift != 0.0).then_some(Self {
-            factor,
-            place,
-            shift,
-        })
+        (factor != 1.0 || shift != 0.0).then_some(Self { factor, place, shift })
     }
 
     /// The time range (`from`, `to`), s, drawn over `width` points, after it; `time` is the instant at the place. No shorter

@@ -3,9 +3,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::ink::{
-    Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write,
-};
+use super::ink::{Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write};
 use super::labels::{Area, arrange};
 use super::ticks::Ruler;
 use super::{Chart, Colour, Marker, Series};
@@ -62,10 +60,7 @@ impl Sheet {
         // rise above its peaks.
         let (found, wanted) = (
             format!("width=\"{width}\" height=\"{height}\""),
-            format!(
-                "width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"",
-                self.size.0, self.size.1
-            ),
+            format!("width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"", self.size.0, self.size.1),
         );
         // XML allows no control characters, not even escaped ones.
         Ok(visible(&text).replacen(&found, &wanted, 1))
@@ -94,9 +89,7 @@ impl Sheet {
         let lines = self.charts.len().div_ceil(columns).max(1);
         let (w, h) = (width / columns as f64, (bottom - top) / lines as f64);
         if w < 160.0 || h < 120.0 {
-            return Err(SheetError(
-                "the page is too small for its charts".to_owned(),
-            ));
+            return Err(SheetError("the page is too small for its charts".to_owned()));
         }
         for (n, chart) in self.charts.iter().enumerate() {
             let (x, y) = ((n % columns) as f64 * w, top + (n / columns) as f64 * h);
@@ -145,16 +138,10 @@ fn draw_legend(root: &Canvas, row: &[&Series], width: f64, y: f64) -> Result<(),
     for series in row {
         if series.line {
             let ends = vec![(fine(x), fine(y)), (fine(x + SAMPLE), fine(y))];
-            root.draw(&PathElement::new(ends, stroke(series.colour)))
-                .map_err(failed)?;
+            root.draw(&PathElement::new(ends, stroke(series.colour))).map_err(failed)?;
         }
         if let Some(marker) = series.marker {
-            draw_marker(
-                root,
-                (fine(x + 0.5 * SAMPLE), fine(y)),
-                marker,
-                series.colour,
-            )?;
+            draw_marker(root, (fine(x + 0.5 * SAMPLE), fine(y)), marker, series.colour)?;
         }
         write(root, &series.label, (x + SAMPLE + 6.0, y), &style)?;
         x += entry_width(series);
@@ -180,17 +167,9 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         x.narrow(low.0, high.0);
         y.narrow(low.1, high.1);
     }
-    let beside = if chart.map.is_some() {
-        heat::SCALE_WIDTH
-    } else {
-        0.0
-    };
+    let beside = if chart.map.is_some() { heat::SCALE_WIDTH } else { 0.0 };
     // Room for the longest word on the left.
-    let longest = y
-        .ticks
-        .iter()
-        .map(|&tick| text_width(&y.word(tick), TEXT))
-        .fold(0.0, f64::max);
+    let longest = y.ticks.iter().map(|&tick| text_width(&y.word(tick), TEXT)).fold(0.0, f64::max);
     let heading = style(HEADING, INK, HPos::Left, VPos::Top);
     let mut plot: Plot = ChartBuilder::on(area)
         .margin_top(fine(6.0))
@@ -225,29 +204,20 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         heat::cells(root, &plot, map, &x, &y)?;
         let (xs, ys) = plot.plotting_area().get_pixel_range();
         let pixels = |at: i32| f64::from(at) / f64::from(FINE);
-        heat::scale(
-            root,
-            map,
-            pixels(xs.end) + 14.0,
-            pixels(ys.start) + 16.0,
-            pixels(ys.end),
-        )?;
+        heat::scale(root, map, pixels(xs.end) + 14.0, pixels(ys.start) + 16.0, pixels(ys.end))?;
     }
     draw_levels(root, &plot, chart, &x, &y, &mut taken)?;
     for series in &chart.series {
         if series.line {
             for part in series.points.split(|point| inside(point).is_none()) {
-                let path: Vec<(i32, i32)> = part
-                    .iter()
-                    .filter_map(|point| inside(point).map(|place| plot.backend_coord(&place)))
-                    .collect();
+                let path: Vec<(i32, i32)> =
+                    part.iter().filter_map(|point| inside(point).map(|place| plot.backend_coord(&place))).collect();
                 // Finer than a quarter of a pixel is invisible.
                 let path = thin::line(&path, 1.0);
                 if !chart.labels.is_empty() {
                     along(&path, &mut taken);
                 }
-                root.draw(&PathElement::new(path, stroke(series.colour)))
-                    .map_err(failed)?;
+                root.draw(&PathElement::new(path, stroke(series.colour))).map_err(failed)?;
             }
         }
     }
@@ -320,11 +290,7 @@ fn draw_levels(
         // Above the line, or below it near the top of the chart.
         let (_, top) = plot.backend_coord(&(x.from, y.to));
         let below = at - top < fine(TEXT + 4.0);
-        let (vertical, gap) = if below {
-            (VPos::Top, fine(3.0))
-        } else {
-            (VPos::Bottom, -fine(3.0))
-        };
+        let (vertical, gap) = if below { (VPos::Top, fine(3.0)) } else { (VPos::Bottom, -fine(3.0)) };
         let style = style(TEXT - 1.0, FAINT, HPos::Left, vertical);
         let text = Text::new(level.text.clone(), (left + fine(6.0), at + gap), style);
         root.draw(&text).map_err(failed)?;
@@ -361,19 +327,13 @@ fn draw_labels(
         .iter()
         .map(|(label, (x, y))| {
             let size = (fine(text_width(&label.text, TEXT)), fine(TEXT + 2.0));
-            (
-                (f64::from(*x), f64::from(*y)),
-                (f64::from(size.0), f64::from(size.1)),
-            )
+            ((f64::from(*x), f64::from(*y)), (f64::from(size.0), f64::from(size.1)))
         })
         .collect();
     let unit = f64::from(fine(MARKER + 3.0));
     let centre = style(TEXT, INK, HPos::Center, VPos::Center);
     for ((label, (x, y)), area) in labels.iter().zip(arrange(&wanted, taken, frame, unit)) {
-        let middle = (
-            (area.x + 0.5 * area.width) as i32,
-            (area.y + 0.5 * area.height) as i32,
-        );
+        let middle = ((area.x + 0.5 * area.width) as i32, (area.y + 0.5 * area.height) as i32);
         // A thin line connects a text to its point.
         let edge = (
             (*x).clamp(area.x as i32, (area.x + area.width) as i32),
@@ -388,19 +348,10 @@ fn draw_labels(
 }
 
 fn described(label: &str, unit: &str) -> String {
-    if unit.is_empty() {
-        label.to_owned()
-    } else {
-        format!("{label} ({unit})")
-    }
+    if unit.is_empty() { label.to_owned() } else { format!("{label} ({unit})") }
 }
 
-fn draw_marker(
-    root: &Canvas,
-    (x, y): (i32, i32),
-    marker: Marker,
-    colour: Colour,
-) -> Result<(), SheetError> {
+fn draw_marker(root: &Canvas, (x, y): (i32, i32), marker: Marker, colour: Colour) -> Result<(), SheetError> {
     let r = fine(MARKER);
     let filled = rgb(colour).filled();
     let around = |corners: &[(f64, f64)]| {
@@ -424,12 +375,7 @@ fn draw_marker(
         }
         Marker::Triangle => root.draw(&around(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)])),
         Marker::TriangleDown => root.draw(&around(&[(0.0, 1.2), (1.1, -0.8), (-1.1, -0.8)])),
-        Marker::Diamond => root.draw(&around(&[
-            (0.0, -1.25),
-            (1.25, 0.0),
-            (0.0, 1.25),
-            (-1.25, 0.0),
-        ])),
+        Marker::Diamond => root.draw(&around(&[(0.0, -1.25), (1.25, 0.0), (0.0, 1.25), (-1.25, 0.0)])),
         Marker::Cross => strokes([[(-r, -r), (r, r)], [(-r, r), (r, -r)]]),
         Marker::Plus => strokes([[(-r, 0), (r, 0)], [(0, -r), (0, r)]]),
     }

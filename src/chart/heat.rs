@@ -2,9 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::ink::{
-    Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write,
-};
+use super::ink::{Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write};
 use super::ticks::Ruler;
 use super::{Axis, Colour, Map, PALETTE};
 use plotters::style::text_anchor::{HPos, VPos};
@@ -21,11 +19,7 @@ pub(super) struct Legend {
 
 impl Legend {
     pub(super) fn new(map: &Map) -> Self {
-        let axis = Axis {
-            label: String::new(),
-            range: None,
-            ..map.scale.clone()
-        };
+        let axis = Axis { label: String::new(), range: None, ..map.scale.clone() };
         let mut ruler = Ruler::new(&axis, map.values.iter().copied());
         // The scale ends where the values do.
         let (from, to) = map
@@ -33,9 +27,7 @@ impl Legend {
             .iter()
             .map(|v| ruler.place(*v))
             .filter(|v| v.is_finite())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                (a.min(v), b.max(v))
-            });
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         if from < to {
             (ruler.from, ruler.to) = (from, to);
             ruler.ticks.retain(|t| (from..=to).contains(t));
@@ -52,8 +44,7 @@ impl Legend {
         if !place.is_finite() {
             return GROUND;
         }
-        let RGBColor(r, g, b) =
-            ViridisRGB.get_color_normalized(place, self.ruler.from, self.ruler.to);
+        let RGBColor(r, g, b) = ViridisRGB.get_color_normalized(place, self.ruler.from, self.ruler.to);
         (r, g, b)
     }
 }
@@ -75,29 +66,16 @@ fn edges(centres: &[f64]) -> Vec<f64> {
 pub(super) fn ends(map: &Map) -> Vec<(f64, f64)> {
     let (xs, ys) = (edges(&map.xs), edges(&map.ys));
     let corner = |(x, y): (Option<&f64>, Option<&f64>)| Some((*x?, *y?));
-    [(xs.first(), ys.first()), (xs.last(), ys.last())]
-        .into_iter()
-        .filter_map(corner)
-        .collect()
+    [(xs.first(), ys.first()), (xs.last(), ys.last())].into_iter().filter_map(corner).collect()
 }
 
 /// Draws the cells.
-pub(super) fn cells(
-    root: &Canvas,
-    plot: &Plot,
-    map: &Map,
-    x: &Ruler,
-    y: &Ruler,
-) -> Result<(), SheetError> {
+pub(super) fn cells(root: &Canvas, plot: &Plot, map: &Map, x: &Ruler, y: &Ruler) -> Result<(), SheetError> {
     let legend = Legend::new(map);
     let (xs, ys) = (edges(&map.xs), edges(&map.ys));
     for (j, rows) in ys.windows(2).enumerate() {
         for (i, columns) in xs.windows(2).enumerate() {
-            let value = map
-                .values
-                .get(j * map.xs.len() + i)
-                .copied()
-                .unwrap_or(f64::NAN);
+            let value = map.values.get(j * map.xs.len() + i).copied().unwrap_or(f64::NAN);
             let a = plot.backend_coord(&(x.place(columns[0]), y.place(rows[0])));
             let b = plot.backend_coord(&(x.place(columns[1]), y.place(rows[1])));
             let filled = rgb(legend.colour(map, value)).filled();
@@ -111,19 +89,12 @@ pub(super) fn cells(
 }
 
 /// Draws the scale in the column of width [`SCALE_WIDTH`] from `left`, between `top` and `bottom`, pixels.
-pub(super) fn scale(
-    root: &Canvas,
-    map: &Map,
-    left: f64,
-    top: f64,
-    bottom: f64,
-) -> Result<(), SheetError> {
+pub(super) fn scale(root: &Canvas, map: &Map, left: f64, top: f64, bottom: f64) -> Result<(), SheetError> {
     let legend = Legend::new(map);
     let words = style(TEXT, INK, HPos::Left, VPos::Center);
     let patch = |from: f64, to: f64, colour: Colour| {
         let corners = [(fine(left), fine(from)), (fine(left + BAR), fine(to))];
-        root.draw(&Rectangle::new(corners, rgb(colour).filled()))
-            .map_err(failed)
+        root.draw(&Rectangle::new(corners, rgb(colour).filled())).map_err(failed)
     };
     if !map.names.is_empty() {
         for (n, (code, name)) in map.names.iter().enumerate() {
@@ -137,22 +108,15 @@ pub(super) fn scale(
     let at = |share: f64| bottom + (top - bottom) * share;
     let ruler = &legend.ruler;
     for n in 0..PARTS {
-        let (a, b) = (
-            f64::from(n) / f64::from(PARTS),
-            f64::from(n + 1) / f64::from(PARTS),
-        );
+        let (a, b) = (f64::from(n) / f64::from(PARTS), f64::from(n + 1) / f64::from(PARTS));
         let place = ruler.from + (ruler.to - ruler.from) * 0.5 * (a + b);
         let RGBColor(r, g, bl) = ViridisRGB.get_color_normalized(place, ruler.from, ruler.to);
         patch((at(b) - 0.5).max(top), at(a), (r, g, bl))?;
     }
     for tick in &ruler.ticks {
         let y = at((tick - ruler.from) / (ruler.to - ruler.from));
-        let ends = vec![
-            (fine(left + BAR), fine(y)),
-            (fine(left + BAR + 4.0), fine(y)),
-        ];
-        root.draw(&PathElement::new(ends, rgb(FAINT).stroke_width(FINE)))
-            .map_err(failed)?;
+        let ends = vec![(fine(left + BAR), fine(y)), (fine(left + BAR + 4.0), fine(y))];
+        root.draw(&PathElement::new(ends, rgb(FAINT).stroke_width(FINE))).map_err(failed)?;
         write(root, &ruler.word(*tick), (left + BAR + 7.0, y), &words)?;
     }
     let unit = style(TEXT, INK, HPos::Left, VPos::Bottom);

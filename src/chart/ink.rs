@@ -36,11 +36,7 @@ impl Ranged for Ruler {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            self.minor.clone()
-        } else {
-            self.ticks.clone()
-        }
+        if hint.weight().allow_light_points() { self.minor.clone() } else { self.ticks.clone() }
     }
 
     fn range(&self) -> std::ops::Range<f64> {
@@ -60,12 +56,7 @@ pub(super) fn failed(error: impl std::fmt::Display) -> SheetError {
     SheetError(error.to_string())
 }
 
-pub(super) fn style(
-    size: f64,
-    colour: Colour,
-    horizontal: HPos,
-    vertical: VPos,
-) -> TextStyle<'static> {
+pub(super) fn style(size: f64, colour: Colour, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
     // The library takes a line height; letters are that divided by 1.24.
     TextStyle {
         font: ("sans-serif", 1.24 * size * f64::from(FINE)).into_font(),
@@ -74,13 +65,7 @@ pub(super) fn style(
     }
 }
 
-pub(super) fn write(
-    root: &Canvas,
-    text: &str,
-    (x, y): (f64, f64),
-    style: &TextStyle,
-) -> Result<(), SheetError> {
+pub(super) fn write(root: &Canvas, text: &str, (x, y): (f64, f64), style: &TextStyle) -> Result<(), SheetError> {
     let at = (fine(x), fine(y));
-    root.draw(&Text::new(text.to_owned(), at, style.clone()))
-        .map_err(failed)
+    root.draw(&Text::new(text.to_owned(), at, style.clone())).map_err(failed)
 }

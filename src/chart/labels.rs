@@ -22,12 +22,7 @@ impl Area {
 
 /// Places each text, of the given size, as near to its point as possible without covering anything in `taken`, inside
 /// `frame`.
-pub(super) fn arrange(
-    wanted: &[(Pair, Pair)],
-    mut taken: Vec<Area>,
-    frame: Area,
-    unit: f64,
-) -> Vec<Area> {
+pub(super) fn arrange(wanted: &[(Pair, Pair)], mut taken: Vec<Area>, frame: Area, unit: f64) -> Vec<Area> {
     let mut placed = Vec::new();
     for &((x, y), (width, height)) in wanted {
         let mut best: Option<(f64, Area)> = None;
@@ -46,12 +41,7 @@ pub(super) fn arrange(
                 (middle, below),
             ];
             for (x, y) in corners {
-                let area = Area {
-                    x,
-                    y,
-                    width,
-                    height,
-                };
+                let area = Area { x, y, width, height };
                 let outside = width * height - area.overlap(&frame);
                 let covered: f64 = taken.iter().map(|other| area.overlap(other)).sum();
                 // Distance breaks ties.
@@ -75,22 +65,10 @@ mod tests {
 
     #[test]
     fn texts_cover_neither_points_nor_each_other() {
-        let frame = Area {
-            x: 0.0,
-            y: 0.0,
-            width: 400.0,
-            height: 300.0,
-        };
+        let frame = Area { x: 0.0, y: 0.0, width: 400.0, height: 300.0 };
         let points = [(200.0, 150.0), (204.0, 152.0), (395.0, 5.0), (60.0, 150.0)];
-        let marks: Vec<Area> = points
-            .iter()
-            .map(|&(x, y)| Area {
-                x: x - 3.0,
-                y: y - 3.0,
-                width: 6.0,
-                height: 6.0,
-            })
-            .collect();
+        let marks: Vec<Area> =
+            points.iter().map(|&(x, y)| Area { x: x - 3.0, y: y - 3.0, width: 6.0, height: 6.0 }).collect();
         let wanted: Vec<_> = points.iter().map(|&p| (p, (50.0, 12.0))).collect();
         let placed = arrange(&wanted, marks.clone(), frame, 6.0);
         assert_eq!(placed.len(), points.len());

@@ -21,31 +21,18 @@ impl Sheet {
         fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
         // Provides glyphs that the first lacks, such as a raised minus sign.
         fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
-        let family = fonts
-            .faces()
-            .find_map(|face| face.families.first())
-            .map(|(name, _)| name.clone());
+        let family = fonts.faces().find_map(|face| face.families.first()).map(|(name, _)| name.clone());
         fonts.set_sans_serif_family(family.unwrap_or_default());
-        let options = Options {
-            fontdb: Arc::new(fonts),
-            ..Options::default()
-        };
+        let options = Options { fontdb: Arc::new(fonts), ..Options::default() };
         let tree = Tree::from_str(&self.svg()?, &options).map_err(|e| failed(&e))?;
         let (width, height) = (tree.size().width() * scale, tree.size().height() * scale);
         let fits = |edge: f32| (1.0..=LARGEST).contains(&edge);
-        let pixmap = (fits(width) && fits(height))
-            .then(|| Pixmap::new(width.round() as u32, height.round() as u32))
-            .flatten();
+        let pixmap =
+            (fits(width) && fits(height)).then(|| Pixmap::new(width.round() as u32, height.round() as u32)).flatten();
         let Some(mut pixmap) = pixmap else {
-            return Err(SheetError(format!(
-                "cannot make a picture of {width} by {height} pixels"
-            )));
+            return Err(SheetError(format!("cannot make a picture of {width} by {height} pixels")));
         };
-        resvg::render(
-            &tree,
-            Transform::from_scale(scale, scale),
-            &mut pixmap.as_mut(),
-        );
+        resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
         pixmap.encode_png().map_err(|e| failed(&e))
     }
 }

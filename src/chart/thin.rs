@@ -16,9 +16,8 @@ pub(super) fn line(path: &[Point], tolerance: f64) -> Vec<Point> {
     (keep[0], keep[last]) = (true, true);
     let mut open = vec![(0, last)];
     while let Some((from, to)) = open.pop() {
-        let far = (from + 1..to)
-            .map(|k| (distance(path[k], path[from], path[to]), k))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let far =
+            (from + 1..to).map(|k| (distance(path[k], path[from], path[to]), k)).max_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((most, k)) = far
             && most > tolerance
         {
@@ -35,20 +34,14 @@ fn distance(p: Point, a: Point, b: Point) -> f64 {
     let to = |q: Point| (f64::from(q.0 - a.0), f64::from(q.1 - a.1));
     let ((px, py), (bx, by)) = (to(p), to(b));
     let length = bx * bx + by * by;
-    let theta = if length > 0.0 {
-        ((px * bx + py * by) / length).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let theta = if length > 0.0 { ((px * bx + py * by) / length).clamp(0.0, 1.0) } else { 0.0 };
     (px - theta * bx).hypot(py - theta * by)
 }
 
 /// One point per cell of `cell` units: the first in it.
 pub(super) fn cloud(points: impl Iterator<Item = Point>, cell: i32) -> Vec<Point> {
     let mut seen = HashSet::new();
-    points
-        .filter(|p| seen.insert((p.0.div_euclid(cell), p.1.div_euclid(cell))))
-        .collect()
+    points.filter(|p| seen.insert((p.0.div_euclid(cell), p.1.div_euclid(cell)))).collect()
 }
 
 #[cfg(test)]

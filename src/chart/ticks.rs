@@ -30,9 +30,7 @@ impl Ruler {
             None => values
                 .map(place)
                 .filter(|v| v.is_finite())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-                    (a.min(v), b.max(v))
-                }),
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v))),
         };
         if !(from.is_finite() && to.is_finite()) {
             (from, to) = (0.0, 1.0);
@@ -64,9 +62,7 @@ impl Ruler {
             Scale::Logarithmic if step == 1.0 => {
                 let decades = multiples(1.0, from - 1.0, to);
                 let inside = |p: &f64| (from..=to).contains(p);
-                let all = decades
-                    .iter()
-                    .flat_map(|d| (2..10).map(move |n| d + f64::from(n).log10()));
+                let all = decades.iter().flat_map(|d| (2..10).map(move |n| d + f64::from(n).log10()));
                 all.filter(inside).collect()
             }
             _ => multiples(minor, from, to),
@@ -75,8 +71,8 @@ impl Ruler {
             // Fewer than two powers of ten: plain numbers at 1, 2 and 5 are more informative.
             let inside = |p: &f64| (from..=to).contains(p);
             let first = from.floor() as i32;
-            let places = (first..=to.ceil() as i32)
-                .flat_map(|d| [1.0, 2.0, 5.0].map(|m: f64| f64::from(d) + m.log10()));
+            let places =
+                (first..=to.ceil() as i32).flat_map(|d| [1.0, 2.0, 5.0].map(|m: f64| f64::from(d) + m.log10()));
             ruler.ticks = places.filter(inside).collect();
         }
         ruler
@@ -111,11 +107,7 @@ impl Ruler {
             }
             Scale::Linear => {
                 let decimals = (-self.step.log10().floor()).clamp(0.0, 12.0) as usize;
-                let tick = if tick.abs() < 1e-9 * self.step {
-                    0.0
-                } else {
-                    tick
-                };
+                let tick = if tick.abs() < 1e-9 * self.step { 0.0 } else { tick };
                 plain(tick, decimals)
             }
         }
@@ -142,10 +134,7 @@ fn multiples(step: f64, from: f64, to: f64) -> Vec<f64> {
 fn linear_step(span: f64) -> (f64, f64) {
     let least = span / MOST;
     let unit = 10f64.powf(least.log10().floor());
-    let factor = [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .find(|f| f * unit >= least)
-        .unwrap_or(10.0);
+    let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * unit >= least).unwrap_or(10.0);
     let parts = if factor == 2.0 { 4.0 } else { 5.0 };
     (factor * unit, factor * unit / parts)
 }
@@ -158,11 +147,7 @@ fn logarithmic_step(span: f64) -> (f64, f64) {
 
 fn plain(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    };
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
     // A true minus sign is as wide as a digit.
     text.replace('-', "\u{2212}")
 }
@@ -194,26 +179,11 @@ mod tests {
     #[test]
     fn ticks_are_round_numbers() {
         let linear = Axis::default();
-        assert_eq!(
-            words(&linear, &[0.0, 0.7]),
-            ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7"]
-        );
-        assert_eq!(
-            words(&linear, &[-300.0, 500.0]),
-            ["\u{2212}200", "0", "200", "400"]
-        );
-        let log = Axis {
-            scale: Scale::Logarithmic,
-            ..Axis::default()
-        };
-        assert_eq!(
-            words(&log, &[1e-3, 20.0]),
-            ["0.001", "0.01", "0.1", "1", "10"]
-        );
-        assert_eq!(
-            words(&log, &[1e-12, 1e-2]),
-            ["10⁻¹²", "10⁻¹⁰", "10⁻⁸", "10⁻⁶", "10⁻⁴", "10⁻²"]
-        );
+        assert_eq!(words(&linear, &[0.0, 0.7]), ["0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7"]);
+        assert_eq!(words(&linear, &[-300.0, 500.0]), ["\u{2212}200", "0", "200", "400"]);
+        let log = Axis { scale: Scale::Logarithmic, ..Axis::default() };
+        assert_eq!(words(&log, &[1e-3, 20.0]), ["0.001", "0.01", "0.1", "1", "10"]);
+        assert_eq!(words(&log, &[1e-12, 1e-2]), ["10⁻¹²", "10⁻¹⁰", "10⁻⁸", "10⁻⁶", "10⁻⁴", "10⁻²"]);
         assert_eq!(words(&log, &[3.0, 6.0]), ["5"]);
         assert_eq!(words(&log, &[3e5, 6e5]), ["5·10⁵"]);
     }
@@ -222,10 +192,7 @@ mod tests {
     fn an_axis_without_data_still_stands() {
         for values in [&[][..], &[f64::NAN], &[3.0], &[0.0], &[-1.0]] {
             for scale in [Scale::Linear, Scale::Logarithmic] {
-                let axis = Axis {
-                    scale,
-                    ..Axis::default()
-                };
+                let axis = Axis { scale, ..Axis::default() };
                 let ruler = Ruler::new(&axis, values.iter().copied());
                 assert!(ruler.to > ruler.from, "{values:?}");
                 assert!(!ruler.ticks.is_empty(), "{values:?} {scale:?}");

@@ -112,12 +112,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub duration: String,
     /// Interval between rows, e.g. `0.1ms`; the first row is at 0.
-    #[arg(
-        long,
-        value_name = "TIME",
-        allow_hyphen_values = true,
-        requires = "out"
-    )]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, requires = "out")]
     pub every: Option<String>,
     /// File to write; its ending chooses the format: .csv, .json or .npz.
     #[arg(long, value_name = "FILE", requires = "every")]
@@ -125,12 +120,7 @@ pub struct RunArguments {
     /// Write the time and these channels alone, e.g. `S1.force,rod1.pose,*.actuator`; `*` stands for any characters, `?` for
     /// one, and a name without its last parts for all that begin with it; may be repeated. `jointplay check SCENE
     /// --channels` lists them.
-    #[arg(
-        long,
-        value_name = "PATTERN,…",
-        value_delimiter = ',',
-        requires = "out"
-    )]
+    #[arg(long, value_name = "PATTERN,…", value_delimiter = ',', requires = "out")]
     pub channels: Vec<String>,
     /// File for one row per finished impact, with its effective restitution: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
@@ -176,12 +166,7 @@ pub struct SweepArguments {
     #[arg(long, value_enum, value_name = "WHERE", default_value = "phase")]
     pub section: SectionChoice,
     /// Drive phase of the sections: a fraction of the period, or an angle such as `90deg`.
-    #[arg(
-        long,
-        value_name = "PHASE",
-        default_value = "0",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "PHASE", default_value = "0", allow_hyphen_values = true)]
     pub phase: String,
     /// Where each point starts from.
     #[arg(long, value_enum, value_name = "START", default_value = "cold")]
@@ -251,20 +236,10 @@ pub struct RenderArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
     /// Instants to draw, e.g. `0s,7.85ms`.
-    #[arg(
-        long,
-        value_name = "TIME,…",
-        value_delimiter = ',',
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "TIME,…", value_delimiter = ',', allow_hyphen_values = true)]
     pub at: Vec<String>,
     /// Simulated time of a film, e.g. `0.1s`.
-    #[arg(
-        long,
-        value_name = "TIME",
-        requires = "fps",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "TIME", requires = "fps", allow_hyphen_values = true)]
     pub duration: Option<String>,
     /// Frames per second of film.
     #[arg(long, value_name = "N", requires = "duration")]
@@ -283,58 +258,25 @@ pub struct RenderArguments {
     #[arg(long, value_name = "FILE", requires = "duration")]
     pub film: Option<PathBuf>,
     /// Point of view to start from.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "VIEW",
-        default_value = "isometric",
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_enum, value_name = "VIEW", default_value = "isometric", help_heading = "Picture")]
     pub camera: CameraView,
     /// Turn about the vertical, e.g. `30deg`; 0 looks from the front.
-    #[arg(
-        long,
-        value_name = "ANGLE",
-        allow_hyphen_values = true,
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, help_heading = "Picture")]
     pub yaw: Option<String>,
     /// Elevation angle, e.g. `20deg`; positive looks down.
-    #[arg(
-        long,
-        value_name = "ANGLE",
-        allow_hyphen_values = true,
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, help_heading = "Picture")]
     pub pitch: Option<String>,
     /// Zoom in by this factor.
-    #[arg(
-        long,
-        value_name = "FACTOR",
-        default_value_t = 1.0,
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, help_heading = "Picture")]
     pub zoom: f32,
     /// Look at one ball joint from close up.
     #[arg(long, value_name = "BALL JOINT", help_heading = "Picture", conflicts_with_all = ["camera", "yaw", "pitch"])]
     pub close_up: Option<String>,
     /// Which contact forces to draw.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "WHICH",
-        default_value = "both",
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_enum, value_name = "WHICH", default_value = "both", help_heading = "Picture")]
     pub arrows: ArrowChoice,
     /// Scale of arrow length against force.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "SCALE",
-        default_value = "linear",
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_enum, value_name = "SCALE", default_value = "linear", help_heading = "Picture")]
     pub arrow_scale: ArrowScale,
     /// Force whose arrow has the reference length, e.g. `500N`; follows the forces if not given.
     #[arg(long, value_name = "FORCE", help_heading = "Picture")]
@@ -343,22 +285,10 @@ pub struct RenderArguments {
     #[arg(long, value_name = "FACTOR", help_heading = "Picture")]
     pub magnification: Option<f32>,
     /// Colours.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "THEME",
-        default_value = "light",
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_enum, value_name = "THEME", default_value = "light", help_heading = "Picture")]
     pub theme: ThemeChoice,
     /// Things to leave out, e.g. `floor,triad`.
-    #[arg(
-        long,
-        value_enum,
-        value_name = "THING,…",
-        value_delimiter = ',',
-        help_heading = "Picture"
-    )]
+    #[arg(long, value_enum, value_name = "THING,…", value_delimiter = ',', help_heading = "Picture")]
     pub hide: Vec<Hideable>,
     /// Colour the sockets' inner faces by their wear since the start, with a scale; balls become translucent.
     #[arg(long, value_enum, value_name = "WHAT", help_heading = "Picture")]
@@ -522,10 +452,7 @@ fn change(text: &str) -> Result<(String, String), String> {
 
 /// A whole number, also one like `1e3`; too large a number is reported where the period is known.
 fn periods(text: &str) -> Result<usize, String> {
-    let number = text
-        .parse::<f64>()
-        .ok()
-        .filter(|n| *n >= 0.0 && n.fract() == 0.0);
+    let number = text.parse::<f64>().ok().filter(|n| *n >= 0.0 && n.fract() == 0.0);
     let whole = text.parse().ok().or(number.map(|n| n as usize));
     whole.ok_or_else(|| "expected a whole number, e.g. 100".to_owned())
 }
@@ -534,29 +461,16 @@ fn periods(text: &str) -> Result<usize, String> {
 const LARGEST_EDGE: u32 = 8192;
 
 fn size(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || {
-        format!("expected WIDTHxHEIGHT in pixels, each from 16 to {LARGEST_EDGE}, e.g. 1280x720")
-    };
+    let wrong = || format!("expected WIDTHxHEIGHT in pixels, each from 16 to {LARGEST_EDGE}, e.g. 1280x720");
     let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
-    let edge = |text: &str| {
-        text.parse()
-            .ok()
-            .filter(|e| (16..=LARGEST_EDGE).contains(e))
-            .ok_or_else(wrong)
-    };
+    let edge = |text: &str| text.parse().ok().filter(|e| (16..=LARGEST_EDGE).contains(e)).ok_or_else(wrong);
     Ok((edge(width)?, edge(height)?))
 }
 
 impl Default for ViewArguments {
     /// As if no command were given.
     fn default() -> Self {
-        Self {
-            scene: super::DEFAULT_SCENE.into(),
-            changes: Vec::new(),
-            link: None,
-            lesson: None,
-            page: None,
-        }
+        Self { scene: super::DEFAULT_SCENE.into(), changes: Vec::new(), link: None, lesson: None, page: None }
     }
 }
 

@@ -9,16 +9,10 @@ use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::Simulation;
 
 /// A body moved or turned by more than this is not where its scene puts it: m, rad.
-const FAR: Placement = Placement {
-    moved: 5e-3,
-    turned: 5.0 * DEGREE,
-};
+const FAR: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
 
 /// A body moved and turned by less than this counts as not moved: m, rad.
-const NEAR: Placement = Placement {
-    moved: 1e-6,
-    turned: 1e-3 * DEGREE,
-};
+const NEAR: Placement = Placement { moved: 1e-6, turned: 1e-3 * DEGREE };
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -34,11 +28,7 @@ fn exceeds(a: &Placement, b: &Placement) -> bool {
 }
 
 fn words(placement: &Placement) -> String {
-    format!(
-        "moved {} mm, turned {}°",
-        significant(placement.moved * 1e3, 4),
-        significant(placement.turned / DEGREE, 4)
-    )
+    format!("moved {} mm, turned {}°", significant(placement.moved * 1e3, 4), significant(placement.turned / DEGREE, 4))
 }
 
 /// Label and text of each line about the assembly.
@@ -46,39 +36,18 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
     let scene = simulation.scene();
     let assembly = simulation.mechanism().assembly();
     let Some((joint, gap)) = assembly.widest else {
-        return vec![(
-            "Assembly".to_owned(),
-            "none: no joint starts closed".to_owned(),
-        )];
+        return vec![("Assembly".to_owned(), "none: no joint starts closed".to_owned())];
     };
-    let guess = if assembly.closed_form {
-        "in the drives' closed form"
-    } else {
-        "as given"
-    };
-    let mode = if assembly.other_mode {
-        "; another assembly mode than the guess's"
-    } else {
-        ""
-    };
+    let guess = if assembly.closed_form { "in the drives' closed form" } else { "as given" };
+    let mode = if assembly.other_mode { "; another assembly mode than the guess's" } else { "" };
     let gap = if gap > NEAR.moved {
-        format!(
-            "largest gap {guess} {} at {}",
-            format_quantity_digits(gap, "mm", 4),
-            cut_joint(scene, joint)
-        )
+        format!("largest gap {guess} {} at {}", format_quantity_digits(gap, "mm", 4), cut_joint(scene, joint))
     } else {
         format!("no gap {guess}")
     };
-    let turned = assembly
-        .most_turned
-        .filter(|(_, turned)| *turned > NEAR.turned);
+    let turned = assembly.most_turned.filter(|(_, turned)| *turned > NEAR.turned);
     let turned = turned.map_or_else(String::new, |(joint, turned)| {
-        format!(
-            "; turned most {} at {}",
-            format_quantity_digits(turned, "deg", 4),
-            cut_joint(scene, joint)
-        )
+        format!("; turned most {} at {}", format_quantity_digits(turned, "deg", 4), cut_joint(scene, joint))
     });
     let mut lines = vec![("Assembly".to_owned(), gap + &turned + mode)];
     let bodies = || scene.bodies.iter().zip(&assembly.bodies);
@@ -87,11 +56,7 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
     }
     let still = bodies().filter(|(_, p)| !exceeds(p, &NEAR)).count();
     if still > 0 {
-        let who = if still == scene.bodies.len() {
-            "  every body"
-        } else {
-            "  every other body"
-        };
+        let who = if still == scene.bodies.len() { "  every body" } else { "  every other body" };
         let text = "moved less than 0.001 mm, turned less than 0.001°";
         lines.push((who.to_owned(), text.to_owned()));
     }
@@ -104,17 +69,11 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     let assembly = simulation.mechanism().assembly();
     let far = scene.bodies.iter().zip(&assembly.bodies);
     let far = far.filter(|(_, placement)| exceeds(placement, &FAR));
-    let far: Vec<String> = far
-        .map(|(body, placement)| format!("{} {}", body.name, words(placement)))
-        .collect();
+    let far: Vec<String> = far.map(|(body, placement)| format!("{} {}", body.name, words(placement))).collect();
     let mut warnings = Vec::new();
     if !far.is_empty() {
         let gap = assembly.widest.map_or_else(String::new, |(joint, gap)| {
-            format!(
-                " {} was {} open.",
-                cut_joint(scene, joint),
-                format_quantity_digits(gap, "mm", 4)
-            )
+            format!(" {} was {} open.", cut_joint(scene, joint), format_quantity_digits(gap, "mm", 4))
         });
         warnings.push(format!(
             "assembling the start took bodies far from where the scene has them: {}.{gap} Look for a wrong axis, point or \
@@ -181,9 +140,7 @@ impl Start {
         facts.insert("assembly".into(), self.assembly.clone());
         let loose = json!({"reactions": self.reactions, "actuators": self.actuators});
         facts.insert("not_unique".into(), loose);
-        let loose = self
-            .not_unique()
-            .map(|words| ("Not unique".to_owned(), words));
+        let loose = self.not_unique().map(|words| ("Not unique".to_owned(), words));
         for (label, words) in self.lines.iter().chain(&loose) {
             summary::line(text, label, words);
         }

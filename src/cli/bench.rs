@@ -34,17 +34,7 @@ fn yes(met: bool) -> String {
 }
 
 fn text(rows: &[Reach], machines: &[Speed], growth: f64) -> String {
-    let head = [
-        "span",
-        "method",
-        "speed",
-        "asked",
-        "rk4 at 10 us",
-        "ratio",
-        "error",
-        "of",
-        "reached",
-    ];
+    let head = ["span", "method", "speed", "asked", "rk4 at 10 us", "ratio", "error", "of", "reached"];
     let mut lines = vec![head.map(str::to_owned).to_vec()];
     for row in rows {
         lines.push(vec![
@@ -67,19 +57,8 @@ fn text(rows: &[Reach], machines: &[Speed], growth: f64) -> String {
          All joints ideal  no differential equation is solved, so that a stepper has no part in it\n\n",
     );
     out.push_str(&grid(&lines));
-    let _ = writeln!(
-        out,
-        "\nMany loose joints, automatic at the loosest tolerance with good peaks\n"
-    );
-    let head = [
-        "machine",
-        "span",
-        "tolerance",
-        "error",
-        "speed",
-        "asked",
-        "reached",
-    ];
+    let _ = writeln!(out, "\nMany loose joints, automatic at the loosest tolerance with good peaks\n");
+    let head = ["machine", "span", "tolerance", "error", "speed", "asked", "reached"];
     let mut lines = vec![head.map(str::to_owned).to_vec()];
     for row in machines {
         lines.push(vec![

@@ -11,9 +11,7 @@ use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::Summary;
-use crate::scene::{
-    BallJoint, Body, Formulation, Joint, JointKind, Scene, format_quantity, to_display,
-};
+use crate::scene::{BallJoint, Body, Formulation, Joint, JointKind, Scene, format_quantity, to_display};
 use crate::simulate::{Frame, Listed, Simulation, channels_of};
 
 /// Runs `check`.
@@ -40,19 +38,12 @@ fn channels(all: &[Listed]) -> String {
     let name = width(|channel| channel.name.len());
     let column = width(|channel| channel.column.len());
     let mut out = String::new();
-    for (unasked, title) in [
-        (true, "Written without --channels"),
-        (false, "Written if asked for"),
-    ] {
+    for (unasked, title) in [(true, "Written without --channels"), (false, "Written if asked for")] {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{title}:");
         for channel in all.iter().filter(|channel| channel.unasked == unasked) {
             let Listed { unit, help, .. } = channel;
-            let _ = writeln!(
-                out,
-                "  {:<name$}  {unit:<6}  {:<column$}  {help}",
-                channel.name, channel.column
-            );
+            let _ = writeln!(out, "  {:<name$}  {unit:<6}  {:<column$}  {help}", channel.name, channel.column);
         }
     }
     out
@@ -62,12 +53,7 @@ fn is_ideal(joint: &BallJoint) -> bool {
     joint.contact.clearance == 0.0
 }
 
-fn report(
-    scene: &Scene,
-    contents: &Summary,
-    begun: &Start,
-    start: &Frame,
-) -> Result<String, Failure> {
+fn report(scene: &Scene, contents: &Summary, begun: &Start, start: &Frame) -> Result<String, Failure> {
     let mut out = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{}: {}", scene.name, scene.title);
@@ -77,14 +63,7 @@ fn report(
     let mut line = |label: &str, value: &str| {
         let _ = writeln!(out, "{label:<22}{value}");
     };
-    line(
-        "Bodies",
-        &format!(
-            "{} moving: {}",
-            scene.bodies.len(),
-            names(scene.bodies.iter().map(|body| &body.name))
-        ),
-    );
+    line("Bodies", &format!("{} moving: {}", scene.bodies.len(), names(scene.bodies.iter().map(|body| &body.name))));
     for body in scene.bodies.iter().filter(|body| body.density.is_some()) {
         line(&format!("  {}", body.name), &of_its_shapes(body));
     }
@@ -102,33 +81,17 @@ fn report(
         );
         line(&format!("  {}", joint.name), &words);
     }
-    line(
-        "Ball joints",
-        &format!(
-            "{} with clearance, {} ideal",
-            contents.contacts, contents.ideal_joints
-        ),
-    );
+    line("Ball joints", &format!("{} with clearance, {} ideal", contents.contacts, contents.ideal_joints));
     for (joint, report) in scene.ball_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
-            &ball_joint(
-                joint,
-                report.normal_force.norm(),
-                !begun.reactions.contains(&joint.name),
-            ),
+            &ball_joint(joint, report.normal_force.norm(), !begun.reactions.contains(&joint.name)),
         );
     }
-    begun
-        .lines
-        .iter()
-        .for_each(|(label, words)| line(label, words));
+    begun.lines.iter().for_each(|(label, words)| line(label, words));
     line("Degrees of freedom", &freedoms(contents));
     line("Constraint rows", &rows(contents));
-    begun
-        .not_unique()
-        .iter()
-        .for_each(|words| line("Not unique", words));
+    begun.not_unique().iter().for_each(|words| line("Not unique", words));
     line(
         "Equations",
         &format!(
@@ -188,15 +151,8 @@ fn joints(all: &[Joint]) -> String {
             let count = alike().count();
             if count > 0 {
                 let word = kind.word();
-                let word = if driven {
-                    format!("driven {word}")
-                } else {
-                    word.to_owned()
-                };
-                parts.push(format!(
-                    "{count} {word} ({})",
-                    names(alike().map(|joint| &joint.name))
-                ));
+                let word = if driven { format!("driven {word}") } else { word.to_owned() };
+                parts.push(format!("{count} {word} ({})", names(alike().map(|joint| &joint.name))));
             }
         }
     }
@@ -214,10 +170,7 @@ fn ball_joint(joint: &BallJoint, force: f64, unique: bool) -> String {
     }
     let friction = match contact.friction_law {
         FrictionLaw::None => "no friction".to_owned(),
-        law => format!(
-            "friction {} ({law}, {})",
-            contact.friction, contact.friction_velocity
-        ),
+        law => format!("friction {} ({law}, {})", contact.friction, contact.friction_velocity),
     };
     format!(
         "clearance {} mm, ball radius {} mm, {}, restitution {}, {friction}",
@@ -247,14 +200,8 @@ fn freedoms(contents: &Summary) -> String {
 fn rows(contents: &Summary) -> String {
     match contents.dependent_rows {
         0 => contents.constraint_rows.to_string(),
-        1 => format!(
-            "{}, one of which the others imply",
-            contents.constraint_rows
-        ),
-        more => format!(
-            "{}, {more} of which the others imply",
-            contents.constraint_rows
-        ),
+        1 => format!("{}, one of which the others imply", contents.constraint_rows),
+        more => format!("{}, {more} of which the others imply", contents.constraint_rows),
     }
 }
 
@@ -273,10 +220,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
         } else {
             String::new()
         };
-        format!(
-            "{method}, relative tolerance {}, first step {step} us{alone}",
-            significant(scene.solver.tolerance, 3)
-        )
+        format!("{method}, relative tolerance {}, first step {step} us{alone}", significant(scene.solver.tolerance, 3))
     } else {
         format!("{method}, step {step} us")
     }
@@ -284,32 +228,17 @@ fn method(scene: &Scene, contents: &Summary) -> String {
 
 /// What the run will compute, and what it need not.
 fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
-    let with = |ideal| {
-        names(
-            scene
-                .ball_joints
-                .iter()
-                .filter(move |j| is_ideal(j) == ideal)
-                .map(|j| &j.name),
-        )
-    };
+    let with = |ideal| names(scene.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
     let (mut computed, mut left_out) = (Vec::new(), Vec::new());
     let mut sort = |needed: bool, yes: String, no: &str| {
-        if needed {
-            computed.push(yes)
-        } else {
-            left_out.push(no.to_owned())
-        }
+        if needed { computed.push(yes) } else { left_out.push(no.to_owned()) }
     };
     sort(
         contents.solves_differential_equation,
         match contents.degrees_of_freedom as u64 {
             // Purely kinematic, but with a number of constraint rows that differs from that of the coordinates.
             0 => "the motion that the drives prescribe, step by step, closed after each".to_owned(),
-            free => format!(
-                "differential equations of {} of freedom",
-                count(free, "degree")
-            ),
+            free => format!("differential equations of {} of freedom", count(free, "degree")),
         },
         "differential equations: nothing is free, the drives prescribe the motion",
     );
@@ -319,22 +248,10 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         "contact forces: no ball joint has clearance",
     );
     let rubs = |joint: &&BallJoint| {
-        !is_ideal(joint)
-            && joint.contact.friction > 0.0
-            && joint.contact.friction_law != FrictionLaw::None
+        !is_ideal(joint) && joint.contact.friction > 0.0 && joint.contact.friction_law != FrictionLaw::None
     };
-    let rubbing = || {
-        scene
-            .ball_joints
-            .iter()
-            .filter(rubs)
-            .map(|joint| &joint.name)
-    };
-    sort(
-        rubbing().next().is_some(),
-        format!("friction at {}", names(rubbing())),
-        "friction: no contact has any",
-    );
+    let rubbing = || scene.ball_joints.iter().filter(rubs).map(|joint| &joint.name);
+    sort(rubbing().next().is_some(), format!("friction at {}", names(rubbing())), "friction: no contact has any");
     sort(
         contents.ideal_joints > 0,
         format!("reactions of the ideal joints at {}", with(true)),
@@ -342,18 +259,11 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     );
     if contents.closing_joints > 0 {
         let closing = names(scene.closing_joints.iter().map(|joint| &joint.name));
-        sort(
-            true,
-            format!("reactions of the joints that close loops at {closing}"),
-            "",
-        );
+        sort(true, format!("reactions of the joints that close loops at {closing}"), "");
     }
     sort(
         contents.drives > 0,
-        format!(
-            "actuator forces at {}",
-            names(scene.driven().map(|(joint, _)| &joint.name))
-        ),
+        format!("actuator forces at {}", names(scene.driven().map(|(joint, _)| &joint.name))),
         "actuator forces: nothing is driven",
     );
     (computed, left_out)
@@ -379,10 +289,7 @@ pub(super) enum NearSingular {
 impl std::fmt::Display for NearSingular {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Stuck(time) => write!(
-                f,
-                "the ideal mechanism has a singular pose near t = {time:.3} s"
-            ),
+            Self::Stuck(time) => write!(f, "the ideal mechanism has a singular pose near t = {time:.3} s"),
             Self::Loaded(largest, when) => write!(
                 f,
                 "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} N at \

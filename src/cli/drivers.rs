@@ -21,11 +21,7 @@ pub fn restart_with_runtime_dir() {
     };
     let mut arguments = std::env::args_os();
     let name = arguments.next().unwrap_or_else(|| program.clone().into());
-    let error = Command::new(program)
-        .arg0(name)
-        .args(arguments)
-        .env(FOLDER, Path::new("/nonexistent"))
-        .exec();
+    let error = Command::new(program).arg0(name).args(arguments).env(FOLDER, Path::new("/nonexistent")).exec();
     // Then continue with the complaints.
     log::info!("cannot begin again: {error}");
 }

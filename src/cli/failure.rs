@@ -27,10 +27,7 @@ impl Failure {
 
     /// A failure with the given code.
     pub fn new(code: u8, message: impl Into<String>) -> Self {
-        Self {
-            code,
-            message: message.into(),
-        }
+        Self { code, message: message.into() }
     }
 
     /// Something could not be read or written.
@@ -46,11 +43,7 @@ impl Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
-        let code = if error.unreadable {
-            Self::INPUT_OUTPUT
-        } else {
-            Self::USAGE
-        };
+        let code = if error.unreadable { Self::INPUT_OUTPUT } else { Self::USAGE };
         Self::new(code, error.to_string())
     }
 }

@@ -43,12 +43,7 @@ impl ImpactsFile {
     /// # Errors
     /// As [`RowsFile::claim`].
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
-        Ok(Self {
-            file: RowsFile::claim(path, force)?,
-            impacts: Vec::new(),
-            since: 0.0,
-            latest: Vec::new(),
-        })
+        Ok(Self { file: RowsFile::claim(path, force)?, impacts: Vec::new(), since: 0.0, latest: Vec::new() })
     }
 
     /// Collects only impacts that end at `time`, s, or later.
@@ -73,11 +68,7 @@ impl ImpactsFile {
     ///
     /// # Errors
     /// As [`RowsFile::fill`].
-    pub fn fill(
-        self,
-        scene: &Scene,
-        mut meta: Map<String, Json>,
-    ) -> Result<(usize, Vec<PendingFile>), Failure> {
+    pub fn fill(self, scene: &Scene, mut meta: Map<String, Json>) -> Result<(usize, Vec<PendingFile>), Failure> {
         let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
         meta.insert("rows".into(), json!(self.impacts.len()));
         // Indices in the column `joint`, from 0.
@@ -123,9 +114,7 @@ impl Restitution {
     pub fn of(impacts: &[Impact], joint: usize) -> Self {
         let own = || impacts.iter().filter(|impact| impact.joint == joint);
         let clean = own().filter(|impact| !impact.disturbed && !impact.floored);
-        let mut excess: Vec<f64> = clean
-            .map(|impact| impact.achieved() - impact.asked)
-            .collect();
+        let mut excess: Vec<f64> = clean.map(|impact| impact.achieved() - impact.asked).collect();
         excess.sort_by(f64::total_cmp);
         let n = excess.len();
         Self {

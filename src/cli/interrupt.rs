@@ -60,9 +60,7 @@ fn catch(mut told: impl FnMut() + Send + 'static) -> std::io::Result<()> {
     if !outlives_its_terminal() {
         signals.add_signal(SIGHUP)?;
     }
-    std::thread::Builder::new()
-        .name("signals".to_owned())
-        .spawn(move || signals.forever().for_each(|_| told()))?;
+    std::thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(|_| told()))?;
     Ok(())
 }
 

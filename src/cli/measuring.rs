@@ -24,24 +24,17 @@ pub fn measure<T>(
     let mut clock = clock();
     let mut progress = |done: f64| {
         bar.set_position((done * PARTS) as u64);
-        if interrupt::asked() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let result = analysis(&mut RunContext::new(&mut clock, &mut progress));
     bar.finish_and_clear();
     result.map_err(|error| match (error, scene) {
-        (AnalysisError::Cancelled, _) => Failure::new(
-            Failure::INTERRUPTED,
-            "interrupted; nothing was written".to_owned(),
-        ),
+        (AnalysisError::Cancelled, _) => {
+            Failure::new(Failure::INTERRUPTED, "interrupted; nothing was written".to_owned())
+        }
         (AnalysisError::Start(error), Some(scene)) => error.located(scene).into(),
         (AnalysisError::Setting(ChangeError::Scene(error)), _) => error.into(),
-        (error @ AnalysisError::Stopped(_), _) => {
-            Failure::new(Failure::DIVERGED, error.to_string())
-        }
+        (error @ AnalysisError::Stopped(_), _) => Failure::new(Failure::DIVERGED, error.to_string()),
         (error, _) => Failure::usage(error.to_string()),
     })
 }
@@ -71,11 +64,7 @@ mod tests {
     #[test]
     fn only_a_run_that_was_stopped_counts_as_diverged() {
         let code = |error| measure::<()>(true, None, |_| Err(error)).map_err(|f| f.code);
-        let stopped = Stopped {
-            time: 0.1,
-            fault: StopFault::SingularLoops,
-            advice: StopAdvice::Dependent,
-        };
+        let stopped = Stopped { time: 0.1, fault: StopFault::SingularLoops, advice: StopAdvice::Dependent };
         assert_eq!(code(stopped.into()), Err(Failure::DIVERGED));
         let too_long = AnalysisError::TooLong { evaluations: 1 };
         assert_eq!(code(too_long), Err(Failure::USAGE));

@@ -115,8 +115,7 @@ fn view(arguments: &ViewArguments) -> Result<(), Failure> {
         };
         // The window system's own message does not say what works instead.
         let message = if matches!(error, WindowError::Window(_)) && no_display() {
-            "cannot open a window: there is no display; `jointplay render` draws frames without one"
-                .to_owned()
+            "cannot open a window: there is no display; `jointplay render` draws frames without one".to_owned()
         } else {
             error.to_string()
         };
@@ -137,9 +136,7 @@ fn view(_arguments: &ViewArguments) -> Result<(), Failure> {
 
 #[cfg(not(feature = "gui"))]
 fn no_graphics() -> Failure {
-    Failure::usage(
-        "this program was built without graphics; build it with the default features to see anything",
-    )
+    Failure::usage("this program was built without graphics; build it with the default features to see anything")
 }
 
 fn scenes() -> Result<String, Failure> {
@@ -196,13 +193,10 @@ fn print(text: &str) -> Result<(), Failure> {
 #[cfg(not(test))]
 fn print_out(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    match out
-        .write_all(visible(text).as_bytes())
-        .and_then(|()| out.flush())
-    {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::io(format!(
-            "cannot write to standard output: {error}"
-        ))),
+    match out.write_all(visible(text).as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::io(format!("cannot write to standard output: {error}")))
+        }
         _ => Ok(()),
     }
 }

@@ -21,9 +21,8 @@ fn choose(option: Option<&str>, variable: Option<String>) -> Result<String, Fail
     };
     let page = page.trim();
     let is_address = ["https://", "http://"].iter().any(|scheme| {
-        page.strip_prefix(scheme).is_some_and(|rest| {
-            !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace())
-        })
+        page.strip_prefix(scheme)
+            .is_some_and(|rest| !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace()))
     });
     if page.is_empty() || is_address {
         return Ok(page.to_owned());
@@ -45,18 +44,10 @@ mod tests {
         assert_eq!(of(None, None).expect("none"), "");
         assert_eq!(of(None, Some(other)).expect("an address"), other);
         assert_eq!(of(Some(lab), Some("nonsense")).expect("an address"), lab);
-        for bad in [
-            "example.org/lab",
-            "https://",
-            "https://a.b/#x",
-            "https://a b/",
-        ] {
+        for bad in ["example.org/lab", "https://", "https://a.b/#x", "https://a b/"] {
             let error = of(None, Some(bad)).expect_err("no address");
             assert_eq!(error.code, Failure::USAGE);
-            assert!(
-                error.to_string().contains(&format!("{PAGE} {bad}: ")),
-                "{error}"
-            );
+            assert!(error.to_string().contains(&format!("{PAGE} {bad}: ")), "{error}");
         }
     }
 }

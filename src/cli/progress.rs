@@ -22,16 +22,12 @@ pub fn bar(wanted: bool, length: u64) -> ProgressBar {
             start.elapsed()
         };
         // Without the thread the command continues silently.
-        let _ = thread::Builder::new()
-            .name("progress".to_owned())
-            .spawn(move || tell(&told, wait, super::complain));
+        let _ = thread::Builder::new().name("progress".to_owned()).spawn(move || tell(&told, wait, super::complain));
         return bar;
     }
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
     // Without the style the bar keeps its default look.
-    if let Ok(style) =
-        ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} to go")
-    {
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} to go") {
         bar.set_style(style);
     }
     bar
@@ -101,10 +97,6 @@ mod tests {
     fn nothing_is_said_of_work_that_is_finished_at_the_first_look() {
         let bar = ProgressBar::with_draw_target(Some(10), ProgressDrawTarget::hidden());
         bar.finish_and_clear();
-        tell(
-            &bar.downgrade(),
-            || INTERVAL,
-            |line| panic!("it says {line}"),
-        );
+        tell(&bar.downgrade(), || INTERVAL, |line| panic!("it says {line}"));
     }
 }

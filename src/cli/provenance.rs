@@ -15,11 +15,7 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
     meta.insert("scene".into(), json!(scene.name));
     meta.insert("scene_file".into(), json!(scene.source.file));
     // The last change of a key wins, here as in the scene.
-    let changed: Map<String, Json> = scene
-        .changes
-        .iter()
-        .map(|(key, value)| (key.clone(), json!(value)))
-        .collect();
+    let changed: Map<String, Json> = scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
     meta.insert("changed_parameters".into(), Json::Object(changed));
     // Its presence tells that the file of the scene is not all of it.
     let checksum = |text: &str| json!(format!("{:08x}", crc32fast::hash(&file_bytes(text))));
@@ -59,11 +55,7 @@ pub fn parameters(scene: &Scene) -> Result<Json, Failure> {
         let value = scene.get(parameter.key)?;
         all.insert(parameter.key.to_owned(), json!(parameter.write(&value)));
     }
-    for (key, value) in scene
-        .changes
-        .iter()
-        .filter(|(key, _)| key.starts_with("joint."))
-    {
+    for (key, value) in scene.changes.iter().filter(|(key, _)| key.starts_with("joint.")) {
         all.insert(key.clone(), json!(value));
     }
     Ok(Json::Object(all))

@@ -9,17 +9,13 @@ use crate::simulate::LONGEST_RUN;
 /// # Errors
 /// Usage: no time, no unit, negative, or too long.
 pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
-    let seconds = parse_quantity(text, Dimension::Time)
-        .map_err(|error| Failure::usage(format!("{option} {text}: {error}")))?;
+    let seconds =
+        parse_quantity(text, Dimension::Time).map_err(|error| Failure::usage(format!("{option} {text}: {error}")))?;
     if seconds < 0.0 {
-        return Err(Failure::usage(format!(
-            "{option} {text}: a time here is 0 or greater"
-        )));
+        return Err(Failure::usage(format!("{option} {text}: a time here is 0 or greater")));
     }
     if seconds > LONGEST_RUN {
-        return Err(Failure::usage(format!(
-            "{option} {text}: the longest time here is {LONGEST_RUN:e} s"
-        )));
+        return Err(Failure::usage(format!("{option} {text}: the longest time here is {LONGEST_RUN:e} s")));
     }
     Ok(seconds)
 }
@@ -30,8 +26,7 @@ pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
 /// Usage: no angle, or no unit.
 #[cfg(feature = "gui")]
 pub fn angle(option: &str, text: &str) -> Result<f64, Failure> {
-    parse_quantity(text, Dimension::Angle)
-        .map_err(|error| Failure::usage(format!("{option} {text}: {error}")))
+    parse_quantity(text, Dimension::Angle).map_err(|error| Failure::usage(format!("{option} {text}: {error}")))
 }
 
 /// A force greater than 0, N. No scene parameter is a force, so the unit table has none.
@@ -40,22 +35,14 @@ pub fn angle(option: &str, text: &str) -> Result<f64, Failure> {
 /// Usage: no force, no unit, or not positive.
 #[cfg(feature = "gui")]
 pub fn force(option: &str, text: &str) -> Result<f64, Failure> {
-    let wrong = || {
-        Failure::usage(format!(
-            "{option} {text}: expected a force greater than 0 in N or kN, e.g. 500N"
-        ))
-    };
+    let wrong = || Failure::usage(format!("{option} {text}: expected a force greater than 0 in N or kN, e.g. 500N"));
     let number = text.trim().strip_suffix('N').ok_or_else(wrong)?;
     let (number, factor) = match number.strip_suffix('k') {
         Some(number) => (number, 1e3),
         None => (number, 1.0),
     };
     let force = factor * number.trim().parse::<f64>().map_err(|_| wrong())?;
-    if force.is_finite() && force > 0.0 {
-        Ok(force)
-    } else {
-        Err(wrong())
-    }
+    if force.is_finite() && force > 0.0 { Ok(force) } else { Err(wrong()) }
 }
 
 #[cfg(test)]
@@ -78,16 +65,10 @@ mod tests {
         assert_eq!(duration("--duration", "20ms"), Ok(0.02));
         assert_eq!(duration("--at", "0"), Ok(0.0));
         assert_eq!(duration("--duration", "1e6s"), Ok(1e6));
-        for bad in [
-            "20", "-1ms", "20mm", "soon", "", "inf s", "nan", "1e300s", "1000001s",
-        ] {
+        for bad in ["20", "-1ms", "20mm", "soon", "", "inf s", "nan", "1e300s", "1000001s"] {
             let failure = duration("--duration", bad).unwrap_err();
             assert_eq!(failure.code, crate::cli::Failure::USAGE, "{bad}");
-            assert!(
-                failure.message.starts_with("--duration"),
-                "{}",
-                failure.message
-            );
+            assert!(failure.message.starts_with("--duration"), "{}", failure.message);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! `reference`: the page of the scene format, whose tables follow from the rows by which the reader goes.
 
 use crate::scene::{
-    ABOVE_ZERO, Absent, DRIVE_KINDS, Dimension, ELEMENT_KINDS, FILE, FileKey, FileTable, Kind,
-    Takes, Variants, dimension_name, file_tables, find, format_quantity, si_unit, unit_table,
+    ABOVE_ZERO, Absent, DRIVE_KINDS, Dimension, ELEMENT_KINDS, FILE, FileKey, FileTable, Kind, Takes, Variants,
+    dimension_name, file_tables, find, format_quantity, si_unit, unit_table,
 };
 
 /// The page as it was when the program was built.
@@ -58,11 +58,7 @@ fn is_element(table: &FileTable) -> bool {
 
 /// A Markdown table.
 fn markdown(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut out = format!(
-        "| {} |\n|{}\n",
-        heads.join(" | "),
-        "---|".repeat(heads.len())
-    );
+    let mut out = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
     for row in rows {
         out += &format!("| {} |\n", row.join(" | "));
     }
@@ -80,9 +76,7 @@ fn keys(table: &FileTable) -> String {
     let columns = [true, !by.is_empty(), true, true, framed, true];
     let shown = |cells: [String; 6]| {
         let cells = cells.into_iter().zip(columns);
-        cells
-            .filter_map(|(cell, shown)| shown.then_some(cell))
-            .collect::<Vec<_>>()
+        cells.filter_map(|(cell, shown)| shown.then_some(cell)).collect::<Vec<_>>()
     };
     let heads = ["key", by, "value", "if left out", "frame", "what it is"].map(str::to_owned);
     let heads = shown(heads);
@@ -102,14 +96,7 @@ fn keys(table: &FileTable) -> String {
         let any = format!("any key of {}", called(also));
         let there = || "as there".to_owned();
         let own = String::new;
-        rows.push(shown([
-            any,
-            own(),
-            there(),
-            there(),
-            own(),
-            "For this one alone".to_owned(),
-        ]));
+        rows.push(shown([any, own(), there(), there(), own(), "For this one alone".to_owned()]));
     }
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     markdown(&heads, rows)
@@ -176,15 +163,13 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         Takes::Joint => "name of a joint".to_owned(),
         Takes::File => "name of a file".to_owned(),
         Takes::Word(of) => words(of),
-        Takes::Parameter(name) => {
-            find(name).map_or_else(String::new, |parameter| match parameter.kind {
-                Kind::Number { dimension: of, .. } => {
-                    format!("{}, {}", dimension(of), parameter.range())
-                }
-                Kind::Count { .. } => format!("whole number, {}", parameter.range()),
-                Kind::Choice(of) => words(of),
-            })
-        }
+        Takes::Parameter(name) => find(name).map_or_else(String::new, |parameter| match parameter.kind {
+            Kind::Number { dimension: of, .. } => {
+                format!("{}, {}", dimension(of), parameter.range())
+            }
+            Kind::Count { .. } => format!("whole number, {}", parameter.range()),
+            Kind::Choice(of) => words(of),
+        }),
         Takes::Table(of) => called(of),
         Takes::List(of, _) if table.head.starts_with("[[") && of.head.starts_with("[[") => {
             format!("`[[{}.{}]]`", table.name, key.name)
@@ -192,12 +177,9 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         Takes::List(of, _) if of.head.starts_with("[[") => called(of),
         Takes::List(_, many) => format!("list of {}", many.what),
         Takes::Vectors(of, _) => format!("list of vectors, {}", number(of)),
-        Takes::Pairs([first, second], many) => format!(
-            "list of pairs, {} and {}, at most {}",
-            dimension(first),
-            number(second),
-            many.most
-        ),
+        Takes::Pairs([first, second], many) => {
+            format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), many.most)
+        }
         Takes::Files(_) => "list of names of files".to_owned(),
     }
 }
@@ -242,8 +224,7 @@ pub fn absent(key: &FileKey) -> String {
 
 /// The laws of drives.
 fn laws() -> String {
-    let row =
-        |kind: &crate::scene::DriveKind| vec![format!("`{}`", kind.word), kind.help.to_owned()];
+    let row = |kind: &crate::scene::DriveKind| vec![format!("`{}`", kind.word), kind.help.to_owned()];
     markdown(&["law", "motion"], DRIVE_KINDS.iter().map(row))
 }
 

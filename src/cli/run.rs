@@ -35,23 +35,13 @@ impl Times {
     /// An interval that is not positive.
     fn new(duration: f64, every: f64) -> Result<Self, Failure> {
         if every <= 0.0 {
-            return Err(Failure::usage(
-                "--every 0: the interval between rows must be greater than 0",
-            ));
+            return Err(Failure::usage("--every 0: the interval between rows must be greater than 0"));
         }
         // 20 ms by 0.1 ms is 200 intervals, however the two round.
         let intervals = duration / every;
         let whole = intervals.round();
-        let last = if (intervals - whole).abs() <= 1e-9 * whole {
-            whole
-        } else {
-            intervals.floor()
-        };
-        Ok(Self {
-            every,
-            last: last as u64,
-            duration,
-        })
+        let last = if (intervals - whole).abs() <= 1e-9 * whole { whole } else { intervals.floor() };
+        Ok(Self { every, last: last as u64, duration })
     }
 
     /// Time of row `k`, s.
@@ -95,21 +85,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),
         None => None,
     };
-    let mut names = vec![(
-        "the scene".to_owned(),
-        PathBuf::from(&arguments.scene.scene),
-    )];
-    for (option, path) in [
-        ("--out", &arguments.out),
-        ("--impacts", &arguments.impacts),
-        ("--wear", &arguments.wear),
-    ] {
+    let mut names = vec![("the scene".to_owned(), PathBuf::from(&arguments.scene.scene))];
+    for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts), ("--wear", &arguments.wear)] {
         names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
     }
-    for (option, path) in [
-        ("--save-state", &arguments.save_state),
-        ("--from-state", &arguments.from_state),
-    ] {
+    for (option, path) in [("--save-state", &arguments.save_state), ("--from-state", &arguments.from_state)] {
         names.extend(path.iter().map(|path| (option.to_owned(), path.clone())));
     }
     check_distinct(&names)?;
@@ -163,9 +143,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
     if !arguments.quiet {
         if times.is_some_and(|times| !times.reach_the_end()) {
-            warn(
-                "the duration is not a whole number of intervals: the last row lies before the end",
-            );
+            warn("the duration is not a whole number of intervals: the last row lies before the end");
         }
         if wear_begins && arguments.from_state.is_some() {
             warn("the wear map begins at the saved state, which has none");
@@ -185,10 +163,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         (from, duration),
         times,
         &mut table,
-        &mut Keepers {
-            impacts: impacts.as_mut(),
-            state: state.as_mut(),
-        },
+        &mut Keepers { impacts: impacts.as_mut(), state: state.as_mut() },
         &mut frame,
         &mut stopwatch,
         &progress,
@@ -210,16 +185,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     begun.describe(&mut facts, &mut text);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
-        summary::line(
-            &mut text,
-            "No probe error",
-            &format!("the ideal mechanism {fault}"),
-        );
+        summary::line(&mut text, "No probe error", &format!("the ideal mechanism {fault}"));
     }
-    facts.insert(
-        "probe_fault".into(),
-        json!(fault.map(|fault| fault.to_string())),
-    );
+    facts.insert("probe_fault".into(), json!(fault.map(|fault| fault.to_string())));
     facts.insert("rows".into(), json!(table.len()));
     if let Some(path) = &arguments.from_state {
         let words = format!("{} s, from {}", significant(from, 9), path.display());
@@ -241,10 +209,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if !arguments.channels.is_empty() {
             meta.insert("channels".into(), json!(arguments.channels));
         }
-        meta.insert(
-            "contact_states".into(),
-            json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}),
-        );
+        meta.insert("contact_states".into(), json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}));
         files.extend(file.fill(&table, meta)?);
         facts.insert("out".into(), json!(path.display().to_string()));
         summary::written(&mut text, table.len(), "row", &path);
@@ -289,12 +254,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
 ///
 /// # Errors
 /// As [`state::read`]; a `duration`, s, that is over by then.
-fn go_on(
-    simulation: &mut Simulation,
-    path: &Path,
-    scene: &Scene,
-    duration: f64,
-) -> Result<f64, Failure> {
+fn go_on(simulation: &mut Simulation, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
     let Begun { state, time } = state::read(path, scene)?;
     if duration < time {
         return Err(Failure::usage(format!(
@@ -342,9 +302,7 @@ fn simulate(
                             status: Status::Diverged,
                             failure: Some(Failure::new(
                                 Failure::DIVERGED,
-                                format!(
-                                    "stopped: {error}; try a smaller solver.step or solver.tolerance"
-                                ),
+                                format!("stopped: {error}; try a smaller solver.step or solver.tolerance"),
                             )),
                         });
                     }
@@ -353,10 +311,7 @@ fn simulate(
             }
         }
         if simulation.time() >= duration {
-            return Ok(End {
-                status: Status::Done,
-                failure: None,
-            });
+            return Ok(End { status: Status::Done, failure: None });
         }
         progress.set_position(position(simulation.time()));
         if interrupt::asked() {
@@ -364,16 +319,11 @@ fn simulate(
                 status: Status::Interrupted,
                 failure: Some(Failure::new(
                     Failure::INTERRUPTED,
-                    format!(
-                        "interrupted at t = {:.6e} s of {duration:.6e} s",
-                        simulation.time()
-                    ),
+                    format!("interrupted at t = {:.6e} s of {duration:.6e} s", simulation.time()),
                 )),
             });
         }
-        let row = times
-            .filter(|times| next <= times.last)
-            .map_or(duration, |times| times.at(next));
+        let row = times.filter(|times| next <= times.last).map_or(duration, |times| times.at(next));
         let started = Instant::now();
         let outcome = step_some(simulation, row, duration, keepers);
         *stopwatch += started.elapsed();
@@ -433,14 +383,8 @@ mod tests {
             assert!(times.at(times.last) <= duration, "{duration} by {every}");
         }
         let times = Times::new(0.7, 0.1).unwrap();
-        assert_eq!(
-            [0.0, 0.05, 0.1, 0.3, 0.7].map(|from| times.first(from, 0.0)),
-            [0, 1, 1, 3, 7]
-        );
-        assert_eq!(
-            [0.3, 0.35, 0.71].map(|time| times.first(0.3, time)),
-            [3, 4, 8]
-        );
+        assert_eq!([0.0, 0.05, 0.1, 0.3, 0.7].map(|from| times.first(from, 0.0)), [0, 1, 1, 3, 7]);
+        assert_eq!([0.3, 0.35, 0.71].map(|time| times.first(0.3, time)), [3, 4, 8]);
         assert!(Times::new(0.7, 0.1).unwrap().reach_the_end());
         assert!(Times::new(0.0, 0.1).unwrap().reach_the_end());
         assert!(!Times::new(1.0, 0.3).unwrap().reach_the_end());

@@ -5,8 +5,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::reference::{absent, capital, value};
 use crate::scene::{
-    ABOVE_ZERO, Absent, Dimension, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables,
-    find, unit_names,
+    ABOVE_ZERO, Absent, Dimension, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables, find, unit_names,
 };
 
 /// The schema as text.
@@ -22,9 +21,7 @@ fn schema() -> Json {
     });
     merge(&mut schema, of_table(&FILE));
     let others = file_tables().into_iter().skip(1);
-    let definitions: Map<String, Json> = others
-        .map(|table| (table.name.to_owned(), of_table(table)))
-        .collect();
+    let definitions: Map<String, Json> = others.map(|table| (table.name.to_owned(), of_table(table))).collect();
     schema["definitions"] = definitions.into();
     schema
 }
@@ -99,9 +96,7 @@ fn of_variant(table: &FileTable, word: &'static str) -> Json {
 
 /// Which of `keys` must be given.
 fn needs(keys: &[&FileKey]) -> Json {
-    let needed = keys
-        .iter()
-        .filter(|key| matches!(key.absent, Absent::Fault));
+    let needed = keys.iter().filter(|key| matches!(key.absent, Absent::Fault));
     let needed: Vec<&str> = needed.map(|key| key.name).collect();
     let either = keys.iter().filter_map(|key| match key.absent {
         Absent::Or(other) => Some(json!({
@@ -166,12 +161,7 @@ fn of_value(key: &FileKey) -> Json {
         Takes::Text | Takes::Body | Takes::Joint | Takes::File => text(),
         Takes::Word(words) => json!({ "enum": words }),
         Takes::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
-            Some(Kind::Number {
-                dimension,
-                min,
-                max,
-                ..
-            }) => number(dimension, (min, max)),
+            Some(Kind::Number { dimension, min, max, .. }) => number(dimension, (min, max)),
             Some(Kind::Count { min, max }) => whole(min, max),
             // "x" stands for "+x".
             Some(Kind::Choice(words)) => {

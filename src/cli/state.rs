@@ -99,22 +99,14 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
         .map_err(|cause| Failure::io(format!("--from-state: cannot read {name}: {cause}")))?;
     let refuse = |why: String| Failure::usage(format!("--from-state {name}: {why}"));
     if text.len() as u64 > LARGEST {
-        return Err(refuse(format!(
-            "larger than {} GiB: not a state that `run --save-state` wrote",
-            LARGEST >> 30
-        )));
+        return Err(refuse(format!("larger than {} GiB: not a state that `run --save-state` wrote", LARGEST >> 30)));
     }
-    let mut content: Map<String, Json> = serde_json::from_slice(&text).map_err(|cause| {
-        refuse(format!(
-            "not a state that `run --save-state` wrote, or a damaged one: {cause}"
-        ))
-    })?;
+    let mut content: Map<String, Json> = serde_json::from_slice(&text)
+        .map_err(|cause| refuse(format!("not a state that `run --save-state` wrote, or a damaged one: {cause}")))?;
     let told = content.shift_remove("crc32");
     let meta = |key: &str| &content.get("meta").unwrap_or(&Json::Null)[key];
     if meta("program") != PROGRAM || meta("state_format").is_null() {
-        return Err(refuse(
-            "not a state that `run --save-state` wrote".to_owned(),
-        ));
+        return Err(refuse("not a state that `run --save-state` wrote".to_owned()));
     }
     if *meta("version") != crate::VERSION || *meta("state_format") != FORMAT {
         return Err(refuse(format!(
@@ -162,23 +154,14 @@ fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
             visible_line(name)
         ));
     }
-    let (changed, now) = (
-        &meta["changed_parameters"],
-        &provenance::meta(scene)["changed_parameters"],
-    );
+    let (changed, now) = (&meta["changed_parameters"], &provenance::meta(scene)["changed_parameters"]);
     if changed == now {
         return Ok(());
     }
     let options = |changes: &Json| {
         let changes = changes.as_object().into_iter().flatten();
-        let options: Vec<String> = changes
-            .map(|(key, value)| format!("--set {key}={}", word(value)))
-            .collect();
-        if options.is_empty() {
-            "no --set".to_owned()
-        } else {
-            options.join(" ")
-        }
+        let options: Vec<String> = changes.map(|(key, value)| format!("--set {key}={}", word(value))).collect();
+        if options.is_empty() { "no --set".to_owned() } else { options.join(" ") }
     };
     Err(format!(
         "saved with {}, and here the scene has {}: a run goes on only with the parameters with which it began",
@@ -189,9 +172,7 @@ fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
 
 /// A value as messages quote it.
 fn word(value: &Json) -> String {
-    value
-        .as_str()
-        .map_or_else(|| value.to_string(), str::to_owned)
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// CRC-32 of the content in the shortest form, which does not depend on how a file was laid out: eight hexadecimal digits.

@@ -53,11 +53,7 @@ pub fn json(
     let time = simulation.time();
     let by_joint = |value: &dyn Fn(usize) -> Json| -> Json {
         let entries = scene.ball_joints.iter().enumerate();
-        Json::Object(
-            entries
-                .map(|(i, joint)| (joint.name.clone(), value(i)))
-                .collect(),
-        )
+        Json::Object(entries.map(|(i, joint)| (joint.name.clone(), value(i))).collect())
     };
     let mut summary = provenance::meta(scene);
     let own = json!({
@@ -110,12 +106,7 @@ fn energy(ledger: &Ledger) -> Json {
 }
 
 /// The summary as text; `impacts` if all of them were collected.
-pub fn text(
-    simulation: &Simulation,
-    status: Status,
-    stepping: Stepping,
-    impacts: Option<&[Impact]>,
-) -> String {
+pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts: Option<&[Impact]>) -> String {
     let scene = simulation.scene();
     let statistics = simulation.statistics();
     let time = simulation.time();
@@ -135,18 +126,11 @@ pub fn text(
     line("Method", format!("{method}, {formulation} formulation"));
     line(
         "Steps",
-        format!(
-            "{} ({} rejected), {} evaluations",
-            statistics.steps, statistics.rejected, statistics.evaluations
-        ),
+        format!("{} ({} rejected), {} evaluations", statistics.steps, statistics.rejected, statistics.evaluations),
     );
     for (i, joint) in scene.ball_joints.iter().enumerate() {
         let (force, at) = simulation.peak(i);
-        let peak = format!(
-            "peak {} N at {} s",
-            significant(force, 6),
-            significant(at, 6)
-        );
+        let peak = format!("peak {} N at {} s", significant(force, 6), significant(at, 6));
         let story = if joint.contact.clearance == 0.0 {
             format!("ideal, {peak}")
         } else if force == 0.0 {

@@ -32,13 +32,10 @@ fn whole_or_told(old: &Tree, new: &Tree, found: &Tree) -> bool {
         let Some(rows) = name.strip_suffix(".meta.json") else {
             // Rows always have their metadata.
             let account = format!("{name}.meta.json");
-            return (is(old, name) || is(new, name))
-                && (!name.ends_with(".csv") || found.contains_key(&account));
+            return (is(old, name) || is(new, name)) && (!name.ends_with(".csv") || found.contains_key(&account));
         };
         let meta: Json = serde_json::from_slice(content).unwrap();
-        let checksum = found
-            .get(rows)
-            .map(|rows| format!("{:08x}", crc32fast::hash(rows)));
+        let checksum = found.get(rows).map(|rows| format!("{:08x}", crc32fast::hash(rows)));
         let told = checksum.is_some_and(|checksum| meta["rows_crc32"] == checksum.as_str());
         let whole = [old, new].iter().any(|of| is(of, name) && is(of, rows));
         (is(old, name) || is(new, name)) && whole == told
@@ -61,10 +58,7 @@ fn rows_and_impacts_survive_in_every_format() {
     let all = "--out @/a.csv --impacts @/b.csv --wear @/c.csv --save-state @/d";
     check(&[], &format!("{run} {all}"));
     let old = format!("{run} --set contact.friction=0.3 --out @/a.csv --impacts @/b.csv");
-    check(
-        &[&old],
-        &format!("{run} --out @/a.csv --impacts @/b.csv --force"),
-    );
+    check(&[&old], &format!("{run} --out @/a.csv --impacts @/b.csv --force"));
     for ending in ["json", "npz"] {
         check(&[], &format!("{run} --out @/a.{ending}"));
     }
@@ -75,10 +69,7 @@ fn sweeps_and_merges_survive() {
     let sweep = "sweep spcmm --set spcmm.frequency=20Hz --vary contact.clearance=0.2mm..0.3mm:3 --periods 1 --discard 0 --no-exponent --threads 1 --quiet";
     check(&[], &format!("{sweep} --out @/a.npz"));
     let shard = |k: usize| format!("{sweep} --shard {k}/2 --out @/{k}.npz");
-    check(
-        &[&shard(1), &shard(2)],
-        "merge @/1.npz @/2.npz --out @/a.npz",
-    );
+    check(&[&shard(1), &shard(2)], "merge @/1.npz @/2.npz --out @/a.npz");
 }
 
 #[test]
@@ -97,10 +88,7 @@ fn two_writers_at_once_leave_one_whole_pair() {
         scope.spawn(|| write("0.2"));
     });
     let found = crate::files::faults::tree(folder.path());
-    assert_eq!(
-        found.keys().collect::<Vec<_>>(),
-        ["a.csv", "a.csv.meta.json"]
-    );
+    assert_eq!(found.keys().collect::<Vec<_>>(), ["a.csv", "a.csv.meta.json"]);
     assert!(whole_or_told(&found, &found, &found));
 }
 
@@ -116,10 +104,7 @@ fn an_account_that_lost_its_rows_stands_in_no_way() {
     std::fs::remove_file(at("a.csv")).unwrap();
     std::fs::write(at("a.csv.meta.json"), "{}").unwrap();
     let failure = command(folder.path(), line).unwrap_err();
-    assert!(
-        failure.message.contains("a.csv.meta.json already exists"),
-        "{failure}"
-    );
+    assert!(failure.message.contains("a.csv.meta.json already exists"), "{failure}");
     assert!(!at("a.csv").exists());
 }
 
@@ -142,11 +127,7 @@ fn frames_survive() {
         }
 
         fn draw(&mut self, _instant: f64, _frame_time: Option<f64>) -> Result<Image, Failure> {
-            Ok(Image {
-                width: 16,
-                height: 16,
-                rgba: vec![self.0.statistics().steps as u8; 4 * 16 * 16],
-            })
+            Ok(Image { width: 16, height: 16, rgba: vec![self.0.statistics().steps as u8; 4 * 16 * 16] })
         }
 
         fn fix_arrow_scale(&mut self, _reference: f32) {}
@@ -164,8 +145,7 @@ fn frames_survive() {
         let line = format!("jointplay render pendulum --size 16x16 --quiet --force {at}");
         let words = line.split_whitespace();
         let words = words.map(|word| word.replace('@', &folder.display().to_string()));
-        let Some(Command::Render(arguments)) = Arguments::try_parse_from(words).unwrap().command
-        else {
+        let Some(Command::Render(arguments)) = Arguments::try_parse_from(words).unwrap().command else {
             panic!("not a command to render");
         };
         let scene = Scene::load("pendulum", &[]).unwrap();
@@ -176,12 +156,7 @@ fn frames_survive() {
     };
     let whole = |old: &Tree, new: &Tree, found: &Tree| found == old || found == new;
     let old = |folder: &Path| render(folder, "--at 0s,1ms,3ms --out @/out").unwrap();
-    survive(
-        Kind::default(),
-        &old,
-        &|folder| outcome(render(folder, "--at 0s,2ms --out @/out")),
-        &whole,
-    );
+    survive(Kind::default(), &old, &|folder| outcome(render(folder, "--at 0s,2ms --out @/out")), &whole);
     // A film and its metadata are two files: the one tells whether it belongs to the other.
     let told = |old: &Tree, new: &Tree, found: &Tree| {
         let is = |of: &Tree, name: &str| of.get(name) == found.get(name);
@@ -192,9 +167,7 @@ fn frames_survive() {
                 let account = found.get("a.mp4.meta.json");
                 let account: Json = serde_json::from_slice(account.unwrap()).unwrap();
                 let checksum = format!("{:08x}", crc32fast::hash(film));
-                let whole = [old, new]
-                    .iter()
-                    .any(|of| is(of, "a.mp4") && is(of, "a.mp4.meta.json"));
+                let whole = [old, new].iter().any(|of| is(of, "a.mp4") && is(of, "a.mp4.meta.json"));
                 whole == (account["film_crc32"] == checksum.as_str())
             })
     };

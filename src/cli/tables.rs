@@ -24,10 +24,8 @@ pub fn fill(page: &str, gaps: &[(&str, String)]) -> String {
 /// An HTML table whose cells are already mark-up. Heads are separated by bars; ` .` after a head gives the class of the cells
 /// below: `Run | Largest force (N) .n`. The class of numbers, `n`, also applies to the head.
 pub fn html(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let heads: Vec<(&str, &str)> = heads
-        .split(" | ")
-        .map(|head| head.rsplit_once(" .").unwrap_or((head, "")))
-        .collect();
+    let heads: Vec<(&str, &str)> =
+        heads.split(" | ").map(|head| head.rsplit_once(" .").unwrap_or((head, ""))).collect();
     let cell = |tag: &str, class: &str, text: &str| match class {
         "" => format!("<{tag}>{text}</{tag}>"),
         _ => format!("<{tag} class=\"{class}\">{text}</{tag}>"),
@@ -39,9 +37,7 @@ pub fn html(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String 
     out += "</tr></thead>\n<tbody>\n";
     for row in rows {
         let cells = heads.iter().zip(&row);
-        let cells: String = cells
-            .map(|((_, class), text)| cell("td", class, text))
-            .collect();
+        let cells: String = cells.map(|((_, class), text)| cell("td", class, text)).collect();
         // Writing to a String cannot fail.
         let _ = writeln!(out, "<tr>{cells}</tr>");
     }
@@ -70,11 +66,7 @@ pub fn csv(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
 }
 
 fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 /// A number in CSV; empty if there is none.
@@ -99,10 +91,7 @@ mod tests {
         let table = html("Joint | v. of it (m/s) .n", [row()]);
         let head = "<th>Joint</th><th class=\"n\">v. of it (m/s)</th>";
         assert!(table.contains(head), "{table}");
-        assert!(
-            table.contains("<tr><td>S1</td><td class=\"n\">0.5</td></tr>\n"),
-            "{table}"
-        );
+        assert!(table.contains("<tr><td>S1</td><td class=\"n\">0.5</td></tr>\n"), "{table}");
     }
 
     #[test]
@@ -113,10 +102,7 @@ mod tests {
 
     #[test]
     fn what_csv_cannot_hold_plainly_is_quoted() {
-        let rows = [
-            vec!["a \"b\"".to_owned(), number(1.5)],
-            vec!["c, d".to_owned(), number(None)],
-        ];
+        let rows = [vec!["a \"b\"".to_owned(), number(1.5)], vec!["c, d".to_owned(), number(None)]];
         assert_eq!(csv("x,y", rows), "x,y\n\"a \"\"b\"\"\",1.5\n\"c, d\",\n");
     }
 }

@@ -57,10 +57,7 @@ pub fn fill(
         let grid = map.grid_from_body(j);
         let axis = |i: usize| [0, 1, 2].map(|k| grid[(i, k)]);
         let body = joint.socket.body.map(|b| scene.bodies[b].name.as_str());
-        axes.insert(
-            joint.name.clone(),
-            json!({"body": body, "x": axis(0), "y": axis(1), "z": axis(2)}),
-        );
+        axes.insert(joint.name.clone(), json!({"body": body, "x": axis(0), "y": axis(1), "z": axis(2)}));
     }
     let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
     meta.insert("rows".into(), json!(rows.len()));

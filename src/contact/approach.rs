@@ -66,10 +66,7 @@ mod tests {
 
     #[test]
     fn pieces_are_the_rule_and_damping_stays_below_chi() {
-        let parameters = Parameters {
-            approach_speed: ApproachSpeed::Largest,
-            ..Parameters::default()
-        };
+        let parameters = Parameters { approach_speed: ApproachSpeed::Largest, ..Parameters::default() };
         let c = Coefficients::new(&parameters, 3e-4);
         let remembered = 0.05;
         for rate in [-0.2, 0.0, 0.01, 0.05, 0.0501, 0.4] {
@@ -82,13 +79,7 @@ mod tests {
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }
         let start = Coefficients::new(&Parameters::default(), 3e-4);
-        assert_eq!(
-            start.approach_piece_at(remembered, 0.4),
-            ApproachPiece::Unsplit
-        );
-        assert_eq!(
-            start.approach(ApproachPiece::Unsplit, remembered, 0.4),
-            remembered
-        );
+        assert_eq!(start.approach_piece_at(remembered, 0.4), ApproachPiece::Unsplit);
+        assert_eq!(start.approach(ApproachPiece::Unsplit, remembered, 0.4), remembered);
     }
 }

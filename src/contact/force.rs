@@ -59,13 +59,7 @@ impl Stiffness {
 
     /// For any force that acts between two points.
     pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
-        Self {
-            by_displacement,
-            by_rate,
-            by_slip: Mat3::zeros(),
-            by_clearance: Vec3::zeros(),
-            normal: Mat3::zeros(),
-        }
+        Self { by_displacement, by_rate, by_slip: Mat3::zeros(), by_clearance: Vec3::zeros(), normal: Mat3::zeros() }
     }
 }
 
@@ -81,26 +75,14 @@ impl Coefficients {
             // A ball exactly at the centre leaves it in its direction of motion.
             (Vec3::zeros(), velocity.norm())
         };
-        Separation {
-            distance,
-            normal,
-            penetration: distance - self.clearance,
-            rate: opening - self.clearance_rate,
-        }
+        Separation { distance, normal, penetration: distance - self.clearance, rate: opening - self.clearance_rate }
     }
 
     /// Velocity of the ball's contact point relative to the socket's, m/s, from de/dt and the angular velocities of both.
     #[inline]
-    pub fn surface_velocity(
-        &self,
-        normal: &Vec3,
-        velocity: &Vec3,
-        ball: &Vec3,
-        socket: &Vec3,
-    ) -> Vec3 {
+    pub fn surface_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
         let radius = self.ball_radius;
-        velocity + ball.cross(&(normal * radius))
-            - socket.cross(&(normal * (radius + self.clearance)))
+        velocity + ball.cross(&(normal * radius)) - socket.cross(&(normal * (radius + self.clearance)))
     }
 
     /// Derivative of [`Self::friction_reads`] with respect to the normal, m/s. The play is so small that a ball which moves a
@@ -118,13 +100,7 @@ impl Coefficients {
     /// Relative velocity used by friction, not yet projected onto the tangent plane, m/s; arguments as in
     /// [`Self::surface_velocity`].
     #[inline]
-    pub fn friction_reads(
-        &self,
-        normal: &Vec3,
-        velocity: &Vec3,
-        ball: &Vec3,
-        socket: &Vec3,
-    ) -> Vec3 {
+    pub fn friction_reads(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
         match self.friction_velocity {
             FrictionVelocity::Centres | FrictionVelocity::Printed => *velocity,
             FrictionVelocity::Surface => self.surface_velocity(normal, velocity, ball, socket),
@@ -185,12 +161,7 @@ impl Coefficients {
         force: &Force,
         slope: Slope,
     ) -> Stiffness {
-        let Separation {
-            distance,
-            normal: n,
-            penetration,
-            rate,
-        } = *gap;
+        let Separation { distance, normal: n, penetration, rate } = *gap;
         let approach = memory.approach(self, rate);
         let tangent = Mat3::identity() - n * n.transpose();
         let turning = tangent / distance;
@@ -285,18 +256,12 @@ mod tests {
     use super::*;
     use crate::contact::{ApproachPiece, Parameters};
 
-    const VELOCITIES: [FrictionVelocity; 3] = [
-        FrictionVelocity::Centres,
-        FrictionVelocity::Surface,
-        FrictionVelocity::Printed,
-    ];
+    const VELOCITIES: [FrictionVelocity; 3] =
+        [FrictionVelocity::Centres, FrictionVelocity::Surface, FrictionVelocity::Printed];
 
     /// A ball pressed 2 µm into its wall that slides at `speed` m/s and sinks further at 5 mm/s while its clearance ramps.
     fn pressed(friction_velocity: FrictionVelocity, speed: f64) -> (Coefficients, Vec3, Vec3) {
-        let parameters = Parameters {
-            friction_velocity,
-            ..Parameters::default()
-        };
+        let parameters = Parameters { friction_velocity, ..Parameters::default() };
         let mut c = Coefficients::new(&parameters, 3e-4);
         c.move_clearance(&parameters, 3e-4, -2e-3);
         let n = Vec3::new(2.0, -1.0, 2.0) / 3.0;
@@ -305,13 +270,7 @@ mod tests {
     }
 
     fn memory(slip: FrictionPiece, pace: ApproachPiece) -> Memory {
-        Memory {
-            active: true,
-            approach_speed: 4e-3,
-            friction_piece: slip,
-            approach_piece: pace,
-            ..Memory::default()
-        }
+        Memory { active: true, approach_speed: 4e-3, friction_piece: slip, approach_piece: pace, ..Memory::default() }
     }
 
     const BALL: Vec3 = Vec3::new(0.3, -0.2, 0.5);
@@ -328,11 +287,9 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_central_differences() {
         for friction_velocity in VELOCITIES {
-            for (slip, speed) in [
-                (FrictionPiece::Ramp, 3e-5),
-                (FrictionPiece::Full, 0.04),
-                (FrictionPiece::Unsplit, 0.04),
-            ] {
+            for (slip, speed) in
+                [(FrictionPiece::Ramp, 3e-5), (FrictionPiece::Full, 0.04), (FrictionPiece::Unsplit, 0.04)]
+            {
                 for pace in [ApproachPiece::Held, ApproachPiece::Rising] {
                     // The printed velocity is so much smaller that it takes a higher speed to get there.
                     let speed = match friction_velocity {
@@ -356,20 +313,14 @@ mod tests {
                             / (2.0 * d);
                         let got: Vec3 = s.by_displacement.column(k).into();
                         let off = (got - difference).norm() / s.by_displacement.norm();
-                        assert!(
-                            off < 1e-5,
-                            "{friction_velocity:?} {slip:?} {pace:?} e{k}: {off:e}"
-                        );
+                        assert!(off < 1e-5, "{friction_velocity:?} {slip:?} {pace:?} e{k}: {off:e}");
                         let d = 1e-8 * speed;
                         let difference = (on_ball(&c, &memory, &e, &(v + unit * d))
                             - on_ball(&c, &memory, &e, &(v - unit * d)))
                             / (2.0 * d);
                         let got: Vec3 = by_velocity.column(k).into();
                         let off = (got - difference).norm() / by_velocity.norm();
-                        assert!(
-                            off < 1e-5,
-                            "{friction_velocity:?} {slip:?} {pace:?} v{k}: {off:e}"
-                        );
+                        assert!(off < 1e-5, "{friction_velocity:?} {slip:?} {pace:?} v{k}: {off:e}");
                     }
                 }
             }
@@ -391,11 +342,7 @@ mod tests {
         let ends = c.slip_low * at.distance / at.penetration;
         for (part, sticks) in [(0.999, true), (1.001, false)] {
             let slow = tangential.normalize() * (part * ends);
-            let force = c.force(
-                &memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit),
-                &at,
-                || slow,
-            );
+            let force = c.force(&memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit), &at, || slow);
             assert_eq!(force.friction == Vec3::zeros(), sticks, "{part}");
         }
     }

@@ -195,28 +195,15 @@ mod tests {
 
     /// Rebound over approach speed of a unit mass against the law's own force, by Runge-Kutta 4 in small steps.
     fn simulated_restitution(law: NormalLaw, ce: f64) -> f64 {
-        let parameters = Parameters {
-            normal_law: law,
-            restitution: ce,
-            ..Parameters::default()
-        };
-        let c = Coefficients {
-            stiffness: 1e10,
-            ..Coefficients::new(&parameters, 3e-4)
-        };
+        let parameters = Parameters { normal_law: law, restitution: ce, ..Parameters::default() };
+        let c = Coefficients { stiffness: 1e10, ..Coefficients::new(&parameters, 3e-4) };
         let v0 = 0.1;
         let force = |x: f64, v: f64| -c.normal_force(x, v, v0);
         let (mut x, mut v, h) = (0.0, v0, 2e-9);
         loop {
             let (k1x, k1v) = (v, force(x, v));
-            let (k2x, k2v) = (
-                v + 0.5 * h * k1v,
-                force(x + 0.5 * h * k1x, v + 0.5 * h * k1v),
-            );
-            let (k3x, k3v) = (
-                v + 0.5 * h * k2v,
-                force(x + 0.5 * h * k2x, v + 0.5 * h * k2v),
-            );
+            let (k2x, k2v) = (v + 0.5 * h * k1v, force(x + 0.5 * h * k1x, v + 0.5 * h * k1v));
+            let (k3x, k3v) = (v + 0.5 * h * k2v, force(x + 0.5 * h * k2x, v + 0.5 * h * k2v));
             let (k4x, k4v) = (v + h * k3v, force(x + h * k3x, v + h * k3v));
             x += h / 6.0 * (k1x + 2.0 * k2x + 2.0 * k3x + k4x);
             v += h / 6.0 * (k1v + 2.0 * k2v + 2.0 * k3v + k4v);
@@ -239,10 +226,7 @@ mod tests {
                 let chi = damping_factor(law, ce);
                 let expected = undisturbed_restitution(chi);
                 let got = simulated_restitution(law, ce);
-                assert!(
-                    (got - expected).abs() < 2e-5,
-                    "{law:?} ce {ce}: {got} against {expected}"
-                );
+                assert!((got - expected).abs() < 2e-5, "{law:?} ce {ce}: {got} against {expected}");
             }
         }
     }
@@ -286,13 +270,7 @@ mod tests {
 
     #[test]
     fn force_never_pulls() {
-        let c = Coefficients::new(
-            &Parameters {
-                restitution: 0.0,
-                ..Parameters::default()
-            },
-            3e-4,
-        );
+        let c = Coefficients::new(&Parameters { restitution: 0.0, ..Parameters::default() }, 3e-4);
         assert_eq!(c.normal_force(1e-6, -1.0, 1e-3), 0.0);
         assert_eq!(c.normal_force(-1e-6, 1.0, 1e-3), 0.0);
     }

@@ -23,29 +23,17 @@ pub struct Memory {
 impl Memory {
     /// Memory of a contact that begins at `rate` (m/s).
     pub fn begun(c: &Coefficients, rate: f64) -> Self {
-        Self {
-            active: true,
-            approach_speed: c.floored(rate),
-            floored: rate < c.speed_floor,
-            ..Self::default()
-        }
+        Self { active: true, approach_speed: c.floored(rate), floored: rate < c.speed_floor, ..Self::default() }
     }
 
     /// Memory of a contact that begins and ends within a step: its approach speed is the rate at each instant.
     pub fn passing(c: &Coefficients) -> Self {
-        Self {
-            approach_piece: ApproachPiece::Rising,
-            ..Self::begun(c, c.speed_floor)
-        }
+        Self { approach_piece: ApproachPiece::Rising, ..Self::begun(c, c.speed_floor) }
     }
 
     /// The same on the whole laws.
     pub fn unsplit(self) -> Self {
-        Self {
-            friction_piece: FrictionPiece::Unsplit,
-            approach_piece: ApproachPiece::Unsplit,
-            ..self
-        }
+        Self { friction_piece: FrictionPiece::Unsplit, approach_piece: ApproachPiece::Unsplit, ..self }
     }
 
     /// Raises the largest rate so far, if it counts, by a step that ends at the rate `end`; `fastest` is the largest over the
@@ -76,11 +64,7 @@ impl Memory {
     /// memory.
     #[inline]
     pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
-        if self.active {
-            c.approach(self.approach_piece, self.approach_speed, rate)
-        } else {
-            c.floored(rate)
-        }
+        if self.active { c.approach(self.approach_piece, self.approach_speed, rate) } else { c.floored(rate) }
     }
 
     /// Whether that is the rate itself, so that the damping term does not depend on it.

@@ -9,8 +9,8 @@ mod slip;
 pub use approach::ApproachPiece;
 pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
-    Coefficients, damping_factor, hertz_stiffness, impact_duration, settled_half_period,
-    settled_penetration, undisturbed_restitution,
+    Coefficients, damping_factor, hertz_stiffness, impact_duration, settled_half_period, settled_penetration,
+    undisturbed_restitution,
 };
 pub use memory::Memory;
 pub use slip::FrictionPiece;

@@ -56,11 +56,7 @@ impl Coefficients {
             FrictionPiece::DeadBand => 0.0,
             FrictionPiece::Ramp => {
                 let low = self.slip_low;
-                let start = if low > 0.0 {
-                    low * inverse(speed, low).0
-                } else {
-                    0.0
-                };
+                let start = if low > 0.0 { low * inverse(speed, low).0 } else { 0.0 };
                 self.friction / (self.slip_high - low) * (1.0 - start)
             }
             FrictionPiece::Full => self.friction * inverse(speed, self.slip_high).0,
@@ -72,20 +68,12 @@ impl Coefficients {
         match slip {
             FrictionPiece::Unsplit => {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
-                if speed > 0.0 {
-                    (slope - ratio / speed) / speed
-                } else {
-                    0.0
-                }
+                if speed > 0.0 { (slope - ratio / speed) / speed } else { 0.0 }
             }
             FrictionPiece::DeadBand => 0.0,
             FrictionPiece::Ramp => {
                 let low = self.slip_low;
-                let start = if low > 0.0 {
-                    low * inverse(speed, low).1
-                } else {
-                    0.0
-                };
+                let start = if low > 0.0 { low * inverse(speed, low).1 } else { 0.0 };
                 -self.friction / (self.slip_high - low) * start
             }
             FrictionPiece::Full => self.friction * inverse(speed, self.slip_high).1,
@@ -102,10 +90,7 @@ fn inverse(speed: f64, corner: f64) -> (f64, f64) {
     }
     let x = speed / join;
     let u = x * x;
-    (
-        (1.875 - 1.25 * u + 0.375 * u * u) / join,
-        (-2.5 + 1.5 * u) * x / (join * join),
-    )
+    ((1.875 - 1.25 * u + 0.375 * u * u) / join, (-2.5 + 1.5 * u) * x / (join * join))
 }
 
 #[cfg(test)]
@@ -144,9 +129,8 @@ mod tests {
             for n in 1..400 {
                 let speed = f64::from(n) * 0.5e-6;
                 let d = 1e-4 * speed;
-                let difference = (c.friction_per_speed(slip, speed + d)
-                    - c.friction_per_speed(slip, speed - d))
-                    / (2.0 * d);
+                let difference =
+                    (c.friction_per_speed(slip, speed + d) - c.friction_per_speed(slip, speed - d)) / (2.0 * d);
                 let slope = c.friction_per_speed_slope(slip, speed);
                 assert!(
                     (slope - difference).abs() <= 1e-3 * slope.abs() + 1.0,
@@ -158,10 +142,7 @@ mod tests {
 
     #[test]
     fn no_dead_band_leaves_a_ramp_that_is_smooth_through_rest() {
-        let c = Coefficients {
-            slip_low: 0.0,
-            ..coefficients()
-        };
+        let c = Coefficients { slip_low: 0.0, ..coefficients() };
         assert_eq!(c.friction_piece_at(0.0), FrictionPiece::Ramp);
         assert!(c.beyond(FrictionPiece::Ramp, 0.0) < 0.0);
         assert!(c.friction_per_speed(FrictionPiece::Ramp, 0.0).is_finite());

@@ -73,9 +73,7 @@ impl Gate {
                 (state.dead, state.torn) = (true, true);
                 Err(io::Error::other("killed"))
             }
-            _ if call == Call::Exchange && kind.no_exchange => {
-                Err(io::ErrorKind::Unsupported.into())
-            }
+            _ if call == Call::Exchange && kind.no_exchange => Err(io::ErrorKind::Unsupported.into()),
             _ => Ok(()),
         }
     }
@@ -89,17 +87,12 @@ impl Gate {
 
     /// Whether `path` exists under another spelling of its name.
     pub(super) fn folded(&self, path: &Path) -> bool {
-        let folds = self
-            .0
-            .as_deref()
-            .is_some_and(|(_, kind, _)| kind.folds_case);
+        let folds = self.0.as_deref().is_some_and(|(_, kind, _)| kind.folds_case);
         let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
             return false;
         };
         let alike = |other: &std::ffi::OsStr| other.eq_ignore_ascii_case(name);
-        folds
-            && std::fs::read_dir(folder)
-                .is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| alike(&e.file_name()))))
+        folds && std::fs::read_dir(folder).is_ok_and(|mut all| all.any(|e| e.is_ok_and(|e| alike(&e.file_name()))))
     }
 }
 
@@ -145,9 +138,7 @@ fn relative(folder: &Path, path: &Path) -> String {
 /// What users see of `tree`: no scratch, nothing that a later run resumes from.
 fn results(tree: &Tree) -> Tree {
     let mut results = tree.clone();
-    results.retain(|name, _| {
-        !name.starts_with(".jointplay-") && !name.ends_with(".partial") && name != "/"
-    });
+    results.retain(|name, _| !name.starts_with(".jointplay-") && !name.ends_with(".partial") && name != "/");
     results
 }
 
@@ -159,9 +150,8 @@ fn most() -> usize {
 
 /// Some of 1..=`count`, including both ends.
 fn some(count: usize, most: usize) -> Vec<usize> {
-    let mut all: Vec<usize> = (0..most.min(count))
-        .map(|k| 1 + k * (count - 1) / (most.min(count) - 1).max(1))
-        .collect();
+    let mut all: Vec<usize> =
+        (0..most.min(count)).map(|k| 1 + k * (count - 1) / (most.min(count) - 1).max(1)).collect();
     all.dedup();
     all
 }
@@ -196,26 +186,16 @@ pub fn survive(
             let found = tree(folder.path());
             if call != Call::Remove {
                 let resumable = |name: &String| name.ends_with(".partial") || name == "/";
-                let stray = found
-                    .keys()
-                    .find(|k| !old.contains_key(*k) && !new.contains_key(*k));
+                let stray = found.keys().find(|k| !old.contains_key(*k) && !new.contains_key(*k));
                 assert!(stray.is_none_or(resumable), "{what} left {stray:?}");
             }
             if result.is_ok() {
                 assert!(results(&found) == new, "{what}: {:?}", found.keys());
                 continue;
             }
-            assert!(
-                results(&found) == results(&old),
-                "{what}: {:?}",
-                found.keys()
-            );
+            assert!(results(&found) == results(&old), "{what}: {:?}", found.keys());
             work(folder.path()).unwrap_or_else(|again| panic!("{what}, then {again}"));
-            assert!(
-                tree(folder.path()) == new,
-                "{what}, then {:?}",
-                tree(folder.path()).keys()
-            );
+            assert!(tree(folder.path()) == new, "{what}, then {:?}", tree(folder.path()).keys());
         }
     }
     for n in some(total, most()) {
@@ -234,10 +214,7 @@ pub fn survive(
         } else {
             assert!(after == new, "{what}, then {:?}", after.keys());
         }
-        assert!(
-            !after.keys().any(|name| name.contains(".jointplay-")),
-            "{what}"
-        );
+        assert!(!after.keys().any(|name| name.contains(".jointplay-")), "{what}");
     }
 }
 

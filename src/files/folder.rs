@@ -68,13 +68,7 @@ impl Folder {
         }
         let scratch = ScratchFolder::new(parent(&place)).map_err(failed)?;
         disk::create_folder(&scratch.join(NEW)).map_err(failed)?;
-        Ok(Self {
-            path: path.to_owned(),
-            place,
-            replace,
-            scratch,
-            files: RefCell::default(),
-        })
+        Ok(Self { path: path.to_owned(), place, replace, scratch, files: RefCell::default() })
     }
 
     /// A file to be written in it.
@@ -132,8 +126,7 @@ impl Folder {
             });
         }
         let old = self.scratch.put_aside(&self.place).map_err(failed)?;
-        let renamed = check_own(&self.path, &old)
-            .and_then(|()| disk::rename(&new, &self.place).map_err(failed));
+        let renamed = check_own(&self.path, &old).and_then(|()| disk::rename(&new, &self.place).map_err(failed));
         renamed.inspect_err(|_| {
             // Best effort: the first error is the one to report.
             let _ = disk::rename(&old, &self.place);
@@ -174,15 +167,8 @@ fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
     if more > 0 {
         names += &format!(" and {more} more");
     }
-    let why = if own {
-        "something other than earlier results"
-    } else {
-        "no results of this program"
-    };
-    Err(FileError::cannot(
-        path,
-        format!("the folder holds {why} ({names}); it is left alone, choose another folder"),
-    ))
+    let why = if own { "something other than earlier results" } else { "no results of this program" };
+    Err(FileError::cannot(path, format!("the folder holds {why} ({names}); it is left alone, choose another folder")))
 }
 
 /// Calls `tell` with the names of all files under `folder`, and of empty folders.

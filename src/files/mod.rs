@@ -48,10 +48,7 @@ pub enum FileError {
 impl FileError {
     /// `path` cannot be written because of `cause`.
     pub fn cannot(path: &Path, cause: impl std::fmt::Display) -> Self {
-        Self::Cannot {
-            path: path.to_owned(),
-            cause: cause.to_string(),
-        }
+        Self::Cannot { path: path.to_owned(), cause: cause.to_string() }
     }
 
     fn of(path: &Path, error: &io::Error) -> Self {

@@ -21,8 +21,7 @@ pub(super) fn place(path: &Path) -> io::Result<PathBuf> {
         match fs::read_link(&path) {
             Ok(target) => path = parent(&path).join(target).components().collect(),
             Err(_) => {
-                let ends_in_name =
-                    matches!(path.components().next_back(), Some(Component::Normal(_)));
+                let ends_in_name = matches!(path.components().next_back(), Some(Component::Normal(_)));
                 return match path.file_name() {
                     Some(name) if ends_in_name => Ok(fs::canonicalize(parent(&path))?.join(name)),
                     _ => fs::canonicalize(&path),
@@ -49,16 +48,10 @@ pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
     let beside = |other: &&Path| {
         let other = place(other).ok()?;
         let together = one_folder(parent(&own), parent(&other));
-        other
-            .file_name()
-            .filter(|_| together)
-            .map(ToOwned::to_owned)
+        other.file_name().filter(|_| together).map(ToOwned::to_owned)
     };
     let beside: Vec<_> = others.iter().map(beside).collect();
-    if let Some(same) = beside
-        .iter()
-        .position(|other| other.as_deref() == Some(name))
-    {
+    if let Some(same) = beside.iter().position(|other| other.as_deref() == Some(name)) {
         return Some(same);
     }
     if beside.iter().all(Option::is_none) {
@@ -68,9 +61,7 @@ pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
     let trial = ScratchFolder::new(parent(&own)).ok()?;
     let at = |name: &std::ffi::OsStr| trial.path().join(name);
     File::create_new(&at(name)).ok()?;
-    let is_there = |other: &Option<std::ffi::OsString>| {
-        other.as_deref().is_some_and(|name| disk::exists(&at(name)))
-    };
+    let is_there = |other: &Option<std::ffi::OsString>| other.as_deref().is_some_and(|name| disk::exists(&at(name)));
     beside.iter().position(is_there)
 }
 

@@ -173,11 +173,7 @@ fn clear_folder(folder: &Path, scratch: &Path) {
         return;
     };
     // Killed between two renames: what was moved aside gets its name back.
-    for old in fs::read_dir(scratch.join(OLD))
-        .into_iter()
-        .flatten()
-        .flatten()
-    {
+    for old in fs::read_dir(scratch.join(OLD)).into_iter().flatten().flatten() {
         let name = folder.join(old.file_name());
         if !disk::exists(&name) && disk::rename(&old.path(), &name).is_err() {
             return;
@@ -208,10 +204,7 @@ fn machine() -> &'static [String; 2] {
     MACHINE.get_or_init(|| {
         let tag = |bytes: &[u8]| format!("{:08x}", crc32fast::hash(bytes));
         let start = fs::read("/proc/sys/kernel/random/boot_id");
-        [
-            tag(&host_name()),
-            tag(&start.unwrap_or_else(|_| host_name())),
-        ]
+        [tag(&host_name()), tag(&start.unwrap_or_else(|_| host_name()))]
     })
 }
 
@@ -222,9 +215,7 @@ fn host_name() -> Vec<u8> {
 
 #[cfg(not(unix))]
 fn host_name() -> Vec<u8> {
-    std::env::var("COMPUTERNAME")
-        .unwrap_or_default()
-        .into_bytes()
+    std::env::var("COMPUTERNAME").unwrap_or_default().into_bytes()
 }
 
 fn is_of_this_machine(name: &str) -> bool {

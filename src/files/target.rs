@@ -35,26 +35,15 @@ impl OutputFile {
             return Err(FileError::Exists(path.to_owned()));
         }
         if path.metadata().is_ok_and(|it| !it.is_file()) {
-            return Err(FileError::cannot(
-                path,
-                "it exists and is not a regular file",
-            ));
+            return Err(FileError::cannot(path, "it exists and is not a regular file"));
         }
         ScratchFile::new(folder).map_err(|error| FileError::of(path, &error))?;
-        Ok(Self {
-            path: path.to_owned(),
-            place,
-            replace,
-        })
+        Ok(Self { path: path.to_owned(), place, replace })
     }
 
     /// A file in a folder that has not appeared yet.
     pub(super) fn within(path: PathBuf, place: PathBuf) -> Self {
-        Self {
-            path,
-            place,
-            replace: false,
-        }
+        Self { path, place, replace: false }
     }
 
     /// The requested name.
@@ -66,10 +55,7 @@ impl OutputFile {
     ///
     /// # Errors
     /// Input/output.
-    pub fn fill(
-        self,
-        fill: impl FnOnce(&mut Sink) -> io::Result<()>,
-    ) -> Result<PendingFile, FileError> {
+    pub fn fill(self, fill: impl FnOnce(&mut Sink) -> io::Result<()>) -> Result<PendingFile, FileError> {
         let content = || {
             let scratch = ScratchFile::new(parent(&self.place))?;
             Sink::fill(scratch.file(), fill)?;
@@ -77,10 +63,7 @@ impl OutputFile {
             Ok(scratch)
         };
         match content() {
-            Ok(scratch) => Ok(PendingFile {
-                target: self,
-                scratch,
-            }),
+            Ok(scratch) => Ok(PendingFile { target: self, scratch }),
             Err(error) => Err(FileError::of(&self.path, &error)),
         }
     }
@@ -98,8 +81,7 @@ impl OutputFile {
     /// # Errors
     /// Input/output.
     pub fn spool(&self) -> Result<Spool, FileError> {
-        let mut scratch = ScratchFile::new(parent(&self.place))
-            .map_err(|error| FileError::of(&self.path, &error))?;
+        let mut scratch = ScratchFile::new(parent(&self.place)).map_err(|error| FileError::of(&self.path, &error))?;
         scratch.forget_name();
         Ok(Spool(scratch))
     }
@@ -206,12 +188,7 @@ impl<'a> Sink<'a> {
     /// # Errors
     /// The first failure of the file; otherwise that of `fill`.
     fn fill(file: &'a File, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
-        let mut sink = Self {
-            inner: BufWriter::new(file),
-            failure: None,
-            position: 0,
-            end: 0,
-        };
+        let mut sink = Self { inner: BufWriter::new(file), failure: None, position: 0, end: 0 };
         let outcome = fill(&mut sink).and_then(|()| sink.flush());
         sink.failure.map_or(outcome, Err)
     }

@@ -29,10 +29,7 @@ fn a_file_appears_only_when_it_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rows.csv");
     let target = OutputFile::claim(&path, false).unwrap();
-    assert!(
-        tree(folder.path()).contains_key("/"),
-        "claiming leaves nothing"
-    );
+    assert!(tree(folder.path()).contains_key("/"), "claiming leaves nothing");
     let failure = target.write(|file| {
         file.write_all(b"half")?;
         Err(std::io::Error::other("disk full"))
@@ -62,10 +59,7 @@ fn an_existing_file_is_replaced_only_where_that_is_allowed() {
 fn an_unwritable_place_is_refused_at_once() {
     let folder = tempfile::tempdir().unwrap();
     for bad in ["no/such/folder/rows.csv", "", ".", ".."] {
-        assert!(
-            OutputFile::claim(&folder.path().join(bad), true).is_err(),
-            "{bad}"
-        );
+        assert!(OutputFile::claim(&folder.path().join(bad), true).is_err(), "{bad}");
     }
     #[cfg(unix)]
     assert!(OutputFile::claim(Path::new("/dev/null"), true).is_err());
@@ -86,16 +80,10 @@ fn a_file_that_fails_leaves_everything_as_it_was() {
     };
     // After a kill one of the two may be there, never part of one.
     let each = |old: &Tree, new: &Tree, found: &Tree| {
-        let known =
-            |(name, content)| old.get(name) == Some(content) || new.get(name) == Some(content);
+        let known = |(name, content)| old.get(name) == Some(content) || new.get(name) == Some(content);
         found.iter().all(known)
     };
-    survive(
-        Kind::default(),
-        &old,
-        &|f| two(f).map_err(|e| e.to_string()),
-        &each,
-    );
+    survive(Kind::default(), &old, &|f| two(f).map_err(|e| e.to_string()), &each);
 }
 
 #[test]
@@ -104,21 +92,13 @@ fn a_folder_that_fails_leaves_the_old_or_the_new() {
     let new = |folder: &Path| fill(&folder.join("out"), "new", true).map_err(|e| e.to_string());
     let old = |folder: &Path| fill(&folder.join("out"), "old", false).unwrap();
     survive(Kind::default(), &|_| (), &new, &whole);
-    survive(
-        Kind::default(),
-        &|folder| fs::create_dir(folder.join("out")).unwrap(),
-        &new,
-        &|old, new, found| whole(old, new, found),
-    );
+    survive(Kind::default(), &|folder| fs::create_dir(folder.join("out")).unwrap(), &new, &|old, new, found| {
+        whole(old, new, found)
+    });
     survive(Kind::default(), &old, &new, &whole);
     // Where names cannot be swapped, a kill may leave neither; the next run brings the old one back.
-    let kind = Kind {
-        no_exchange: true,
-        ..Kind::default()
-    };
-    survive(kind, &old, &new, &|old, new, found| {
-        found.is_empty() || whole(old, new, found)
-    });
+    let kind = Kind { no_exchange: true, ..Kind::default() };
+    survive(kind, &old, &new, &|old, new, found| found.is_empty() || whole(old, new, found));
 }
 
 #[test]
@@ -126,10 +106,7 @@ fn a_folder_replaces_what_this_program_wrote_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     fill(&out, "1", false).unwrap();
-    assert_eq!(
-        fill(&out, "2", false),
-        Err(FileError::NotEmpty(out.clone()))
-    );
+    assert_eq!(fill(&out, "2", false), Err(FileError::NotEmpty(out.clone())));
     fill(&out, "2", true).unwrap();
     assert_eq!(fs::read(out.join("a.txt")).unwrap(), b"2");
     // Foreign files are named and left alone, whenever they appeared.
@@ -137,10 +114,7 @@ fn a_folder_replaces_what_this_program_wrote_and_nothing_else() {
     fs::create_dir_all(out.join("data/notes")).unwrap();
     fs::write(out.join("film.mp4"), "x").unwrap();
     let before = tree(&out);
-    for error in [
-        early.finish(Map::new()).unwrap_err(),
-        fill(&out, "3", true).unwrap_err(),
-    ] {
+    for error in [early.finish(Map::new()).unwrap_err(), fill(&out, "3", true).unwrap_err()] {
         let text = error.to_string();
         assert!(text.contains("(data/notes, film.mp4)"), "{text}");
     }
@@ -153,11 +127,7 @@ fn a_folder_replaces_what_this_program_wrote_and_nothing_else() {
         let text = Folder::claim(&photos, true).unwrap_err().to_string();
         assert!(text.contains("holiday.png"), "{text}");
     }
-    assert_eq!(
-        fs::read_dir(folder.path()).unwrap().count(),
-        3,
-        "nothing is left beside"
-    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3, "nothing is left beside");
 }
 
 #[test]
@@ -186,21 +156,14 @@ fn links_are_followed() {
     fill(&at("out"), "2", true).unwrap();
     assert_eq!(fs::read(at("disk/out/a.txt")).unwrap(), b"2");
     symlink("disk/rows", at("rows")).unwrap();
-    assert!(
-        write(&at("rows"), "1", false).is_err(),
-        "a link is something"
-    );
+    assert!(write(&at("rows"), "1", false).is_err(), "a link is something");
     write(&at("rows"), "1", true).unwrap();
     assert_eq!(fs::read(at("disk/rows")).unwrap(), b"1");
     assert!(fs::symlink_metadata(at("out")).unwrap().is_symlink());
     assert!(fs::symlink_metadata(at("rows")).unwrap().is_symlink());
     symlink("round", at("round")).unwrap();
     assert!(write(&at("round"), "1", true).is_err() && fill(&at("round"), "1", true).is_err());
-    assert_eq!(
-        fs::read_dir(at("disk")).unwrap().count(),
-        2,
-        "nothing is left beside"
-    );
+    assert_eq!(fs::read_dir(at("disk")).unwrap().count(), 2, "nothing is left beside");
 }
 
 #[test]
@@ -217,14 +180,8 @@ fn one_file_is_one_under_all_its_names() {
         std::os::unix::fs::symlink(".", at("here")).unwrap();
         assert!(same("x.csv", "link.csv") && same("x.csv", "here/x.csv"));
     }
-    assert_eq!(
-        same("x.csv", "X.csv"),
-        cfg!(any(windows, target_os = "macos"))
-    );
-    let folds = Kind {
-        folds_case: true,
-        ..Kind::default()
-    };
+    assert_eq!(same("x.csv", "X.csv"), cfg!(any(windows, target_os = "macos")));
+    let folds = Kind { folds_case: true, ..Kind::default() };
     assert!(with(Fault::None, folds, || same("x.csv", "./X.CSV")).0);
     assert!(!with(Fault::None, folds, || same("x.csv", "xx.csv")).0);
     assert!(!tree(folder.path()).keys().any(|name| name.starts_with('.')));
@@ -235,27 +192,14 @@ fn scratch_of_a_killed_run_goes_and_that_of_a_live_one_stays() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let live = Folder::claim(&at("live"), false).unwrap();
-    let filled = OutputFile::claim(&at("b"), false)
-        .unwrap()
-        .fill(|file| file.write_all(b"b"))
-        .unwrap();
+    let filled = OutputFile::claim(&at("b"), false).unwrap().fill(|file| file.write_all(b"b")).unwrap();
     // From another machine, or not ours.
-    let names = [
-        ".jointplay-00000000-00000000-0123456789abcdef",
-        ".jointplay-notes",
-        ".other",
-    ];
-    names
-        .iter()
-        .for_each(|name| fs::write(at(name), "x").unwrap());
+    let names = [".jointplay-00000000-00000000-0123456789abcdef", ".jointplay-notes", ".other"];
+    names.iter().for_each(|name| fs::write(at(name), "x").unwrap());
     let count = || fs::read_dir(folder.path()).unwrap().count();
     let before = count();
-    let _ = with(Fault::Kills(3), Kind::default(), || {
-        write(&at("a"), "a", false)
-    });
-    let _ = with(Fault::Kills(9), Kind::default(), || {
-        fill(&at("c"), "c", false)
-    });
+    let _ = with(Fault::Kills(3), Kind::default(), || write(&at("a"), "a", false));
+    let _ = with(Fault::Kills(9), Kind::default(), || fill(&at("c"), "c", false));
     assert!(count() > before, "{:?}", tree(folder.path()).keys());
     write(&at("d"), "d", false).unwrap();
     assert_eq!(count(), before + 1, "{:?}", tree(folder.path()).keys());

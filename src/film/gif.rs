@@ -26,12 +26,7 @@ pub struct Gif {
 /// # Errors
 /// More than a GIF holds.
 pub fn check([width, height]: [u32; 2], rate: f64) -> Result<[u16; 2], FilmError> {
-    let too_much = |limit| FilmError::TooMuch {
-        width,
-        height,
-        rate,
-        limit,
-    };
+    let too_much = |limit| FilmError::TooMuch { width, height, rate, limit };
     if !(rate > 0.0 && rate <= MOST_RATE) {
         return Err(too_much("a GIF shows at most 50 frames a second"));
     }
@@ -70,9 +65,7 @@ impl Gif {
                 continue;
             }
             let differs = |x: &usize| now[4 * x..4 * x + 4] != before[4 * x..4 * x + 4];
-            let (Some(first), Some(last)) =
-                ((0..width).find(differs), (0..width).rev().find(differs))
-            else {
+            let (Some(first), Some(last)) = ((0..width).find(differs), (0..width).rev().find(differs)) else {
                 continue;
             };
             let [left, top, right, _] = bounds.unwrap_or([first, y, last, y]);
@@ -91,14 +84,12 @@ impl Encode for Gif {
         self.changed.clear();
         for y in top..top + down {
             let from = 4 * (y * width + left);
-            self.changed
-                .extend_from_slice(&rgba[from..from + 4 * across]);
+            self.changed.extend_from_slice(&rgba[from..from + 4 * across]);
         }
         for pixel in self.changed.chunks_exact_mut(4) {
             pixel[3] = 255;
         }
-        let mut frame =
-            Frame::from_rgba_speed(across as u16, down as u16, &mut self.changed, SPEED);
+        let mut frame = Frame::from_rgba_speed(across as u16, down as u16, &mut self.changed, SPEED);
         (frame.left, frame.top) = (left as u16, top as u16);
         // Rounded times, not rounded intervals: the film as a whole keeps its pace.
         let hundredths = |frames: u64| (100.0 * frames as f64 / self.rate).round();
@@ -115,9 +106,7 @@ impl Encode for Gif {
     }
 
     fn finish(self: Box<Self>) -> Result<Vec<u8>, FilmError> {
-        self.encoder
-            .into_inner()
-            .map_err(|error| FilmError::Encoder(error.to_string()))
+        self.encoder.into_inner().map_err(|error| FilmError::Encoder(error.to_string()))
     }
 }
 

@@ -83,8 +83,7 @@ impl H264 {
         config.preset = Preset::Balanced;
         // Otherwise it would hold back the frames of two seconds.
         config.mbtree = false;
-        let encoder =
-            Encoder::new(config).map_err(|error| FilmError::Encoder(error.to_string()))?;
+        let encoder = Encoder::new(config).map_err(|error| FilmError::Encoder(error.to_string()))?;
         Ok(Self {
             encoder,
             frame: YuvFrame::black(width as usize, height as usize),
@@ -98,10 +97,7 @@ impl H264 {
         to_yuv(rgba, &mut self.frame);
         let key = self.frames.is_multiple_of(self.key_every);
         self.frames += 1;
-        let unit = self
-            .encoder
-            .try_encode(&self.frame)
-            .map_err(|error| FilmError::Encoder(error.to_string()))?;
+        let unit = self.encoder.try_encode(&self.frame).map_err(|error| FilmError::Encoder(error.to_string()))?;
         Ok((unit, key))
     }
 }
@@ -131,8 +127,7 @@ fn to_yuv(rgba: &[u8], frame: &mut YuvFrame) {
                 }
             }
             let luma = luma(mean);
-            let difference =
-                |part: f32, range: f32| 128.5 + (part - luma) / range * (224.0 / 255.0);
+            let difference = |part: f32, range: f32| 128.5 + (part - luma) / range * (224.0 / 255.0);
             let at = y * (width / 2) + x;
             frame.u[at] = difference(mean[2], 2.0 * (1.0 - BLUE)) as u8;
             frame.v[at] = difference(mean[0], 2.0 * (1.0 - RED)) as u8;

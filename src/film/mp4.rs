@@ -3,8 +3,7 @@
 use std::num::NonZeroU32;
 
 use shiguredo_mp4::bitstream::h264::{
-    H264NalUnitType, H264SampleEntryConfig, LengthSize, build_avc1_box_from_annexb,
-    parse_annexb_nal_units,
+    H264NalUnitType, H264SampleEntryConfig, LengthSize, build_avc1_box_from_annexb, parse_annexb_nal_units,
 };
 use shiguredo_mp4::boxes::{SampleEntry, UnknownBox};
 use shiguredo_mp4::mux::{Mp4FileMuxer, Sample};
@@ -51,19 +50,14 @@ impl Encode for Mp4 {
         let parts = parse_annexb_nal_units(&unit).map_err(refused)?;
         for part in &parts {
             // These stand in the sample entry.
-            if !matches!(
-                part.nal_unit_type,
-                H264NalUnitType::Sps | H264NalUnitType::Pps
-            ) {
+            if !matches!(part.nal_unit_type, H264NalUnitType::Sps | H264NalUnitType::Pps) {
                 let length = part.data.len() as u32;
                 self.file.extend_from_slice(&length.to_be_bytes());
                 self.file.extend_from_slice(part.data);
             }
         }
         let sample_entry = if self.samples == 0 {
-            let config = H264SampleEntryConfig {
-                length_size: LengthSize::FourBytes,
-            };
+            let config = H264SampleEntryConfig { length_size: LengthSize::FourBytes };
             let mut entry = build_avc1_box_from_annexb(&unit, &config).map_err(refused)?;
             entry.unknown_boxes.push(UnknownBox {
                 box_type: BoxType::Normal(*b"colr"),

@@ -14,10 +14,7 @@ pub struct Controller {
 impl Controller {
     /// For a pair whose lower order is `order`.
     pub fn new(order: u32) -> Self {
-        Self {
-            exponent: f64::from(order) + 1.0,
-            previous: 1e-4,
-        }
+        Self { exponent: f64::from(order) + 1.0, previous: 1e-4 }
     }
 
     /// Factor for the next step after an accepted one with relative error `error` <= 1.

@@ -9,38 +9,13 @@ const A: [[f64; 5]; 5] = [
     [0.2, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0],
     [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0],
-    [
-        19372.0 / 6561.0,
-        -25360.0 / 2187.0,
-        64448.0 / 6561.0,
-        -212.0 / 729.0,
-        0.0,
-    ],
-    [
-        9017.0 / 3168.0,
-        -355.0 / 33.0,
-        46732.0 / 5247.0,
-        49.0 / 176.0,
-        -5103.0 / 18656.0,
-    ],
+    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0],
+    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
 ];
 /// Weights of k1, k3, k4, k5, k6.
-const B: [f64; 5] = [
-    35.0 / 384.0,
-    500.0 / 1113.0,
-    125.0 / 192.0,
-    -2187.0 / 6784.0,
-    11.0 / 84.0,
-];
+const B: [f64; 5] = [35.0 / 384.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];
 /// Fifth minus fourth order weights of k1, k3, k4, k5, k6, k7.
-const E: [f64; 6] = [
-    71.0 / 57600.0,
-    -71.0 / 16695.0,
-    71.0 / 1920.0,
-    -17253.0 / 339200.0,
-    22.0 / 525.0,
-    -1.0 / 40.0,
-];
+const E: [f64; 6] = [71.0 / 57600.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 /// Continuous extension: weights of k1, k3, k4, k5, k6, k7.
 const D: [f64; 6] = [
     -12715105075.0 / 11282082432.0,
@@ -90,40 +65,17 @@ impl DormandPrince {
 
     /// Components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the
     /// derivative there.
-    pub fn interpolate(
-        &self,
-        part: Range<usize>,
-        theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        out: &mut [f64],
-    ) {
+    pub fn interpolate(&self, part: Range<usize>, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
         let (theta, h) = (theta * self.kept, h / self.kept);
         let s = 1.0 - theta;
-        let Self {
-            k3,
-            k4,
-            k5,
-            k6,
-            raw_end: y_end,
-            raw_k_end: k_end,
-            ..
-        } = self;
-        let [y, k, k3, k4, k5, k6, y_end, k_end] =
-            [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[part.clone()]);
+        let Self { k3, k4, k5, k6, raw_end: y_end, raw_k_end: k_end, .. } = self;
+        let [y, k, k3, k4, k5, k6, y_end, k_end] = [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[part.clone()]);
         let out = &mut out[part];
         for i in 0..out.len() {
             let d = y_end[i] - y[i];
             let b = h * k[i] - d;
             let c = d - h * k_end[i] - b;
-            let e = h
-                * (D[0] * k[i]
-                    + D[1] * k3[i]
-                    + D[2] * k4[i]
-                    + D[3] * k5[i]
-                    + D[4] * k6[i]
-                    + D[5] * k_end[i]);
+            let e = h * (D[0] * k[i] + D[1] * k3[i] + D[2] * k4[i] + D[3] * k5[i] + D[4] * k6[i] + D[5] * k_end[i]);
             out[i] = y[i] + theta * (d + s * (b + theta * (c + s * e)));
         }
     }
@@ -137,11 +89,7 @@ impl DormandPrince {
             rate += dk * dk;
             distance += dy * dy;
         }
-        if distance > 0.0 && self.kept == 1.0 {
-            h * (rate / distance).sqrt()
-        } else {
-            0.0
-        }
+        if distance > 0.0 && self.kept == 1.0 { h * (rate / distance).sqrt() } else { 0.0 }
     }
 }
 
@@ -156,17 +104,7 @@ impl Stepper for DormandPrince {
         y_end: &mut [f64],
         k_end: &mut [f64],
     ) -> f64 {
-        let Self {
-            k2,
-            k3,
-            k4,
-            k5,
-            k6,
-            stage,
-            raw_end,
-            raw_k_end,
-            kept,
-        } = self;
+        let Self { k2, k3, k4, k5, k6, stage, raw_end, raw_k_end, kept } = self;
         *kept = 1.0;
         let [a2, a3, a4, a5, a6] = &A;
         combine(system.moving(), stage, y, h, [(a2[0], k)]);
@@ -179,13 +117,7 @@ impl Stepper for DormandPrince {
         let terms = [(a5[0], k), (a5[1], k2), (a5[2], k3), (a5[3], k4)];
         combine(system.moving(), stage, y, h, terms);
         system.derivative(t + C[3] * h, stage, k5);
-        let terms = [
-            (a6[0], k),
-            (a6[1], k2),
-            (a6[2], k3),
-            (a6[3], k4),
-            (a6[4], k5),
-        ];
+        let terms = [(a6[0], k), (a6[1], k2), (a6[2], k3), (a6[3], k4), (a6[4], k5)];
         combine(system.moving(), stage, y, h, terms);
         system.derivative(t + C[4] * h, stage, k6);
         let terms = [(B[0], k), (B[1], k3), (B[2], k4), (B[3], k5), (B[4], k6)];
@@ -199,13 +131,7 @@ impl Stepper for DormandPrince {
                 [k, k3, k4, k5, k6, k_end, system.scale()].map(|x| &x[part.clone()]);
             for i in 0..part.len() {
                 let e = h
-                    * (E[0] * k[i]
-                        + E[1] * k3[i]
-                        + E[2] * k4[i]
-                        + E[3] * k5[i]
-                        + E[4] * k6[i]
-                        + E[5] * k_end[i])
-                        .abs();
+                    * (E[0] * k[i] + E[1] * k3[i] + E[2] * k4[i] + E[3] * k5[i] + E[4] * k6[i] + E[5] * k_end[i]).abs();
                 let e = e / scale[i];
                 // `max` would drop a NaN.
                 if e > error || e.is_nan() {

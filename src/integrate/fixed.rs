@@ -10,9 +10,7 @@ pub struct SemiImplicitEuler {
 impl SemiImplicitEuler {
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
-        Self {
-            rate: vec![0.0; dimension],
-        }
+        Self { rate: vec![0.0; dimension] }
     }
 }
 
@@ -50,21 +48,11 @@ pub struct ImexEuler {
 impl ImexEuler {
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
-        Self {
-            rate: vec![0.0; dimension],
-            push: vec![0.0; dimension],
-        }
+        Self { rate: vec![0.0; dimension], push: vec![0.0; dimension] }
     }
 
     /// As [`Stepper::attempt`]; needs no derivative at the start and leaves none at the end.
-    pub fn attempt<S: ContactSystem>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        y_end: &mut [f64],
-    ) -> f64 {
+    pub fn attempt<S: ContactSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64], y_end: &mut [f64]) -> f64 {
         let positions = system.positions();
         let Self { rate, push } = self;
         system.derivative_without_contacts(t, y, rate);
@@ -103,12 +91,7 @@ impl RungeKutta4 {
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
         let zeros = || vec![0.0; dimension];
-        Self {
-            k2: zeros(),
-            k3: zeros(),
-            k4: zeros(),
-            stage: zeros(),
-        }
+        Self { k2: zeros(), k3: zeros(), k4: zeros(), stage: zeros() }
     }
 }
 

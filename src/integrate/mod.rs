@@ -59,10 +59,7 @@ impl Method {
 
     /// Whether the step size is controlled by an error estimate.
     pub fn is_adaptive(self) -> bool {
-        !matches!(
-            self,
-            Self::SemiImplicitEuler | Self::ImexEuler | Self::RungeKutta4
-        )
+        !matches!(self, Self::SemiImplicitEuler | Self::ImexEuler | Self::RungeKutta4)
     }
 }
 
@@ -138,36 +135,20 @@ pub trait Stepper {
 }
 
 /// Cubic Hermite interpolation between two states with their derivatives; error O(h^4).
-pub fn hermite(
-    theta: f64,
-    h: f64,
-    y: &[f64],
-    k: &[f64],
-    y_end: &[f64],
-    k_end: &[f64],
-    out: &mut [f64],
-) {
+pub fn hermite(theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
     let s = 1.0 - theta;
     let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[..out.len()]);
     for i in 0..out.len() {
         let d = y_end[i] - y[i];
         out[i] = s * y[i]
             + theta * y_end[i]
-            + theta
-                * (theta - 1.0)
-                * ((1.0 - 2.0 * theta) * d + (theta - 1.0) * h * k[i] + theta * h * k_end[i]);
+            + theta * (theta - 1.0) * ((1.0 - 2.0 * theta) * d + (theta - 1.0) * h * k[i] + theta * h * k_end[i]);
     }
 }
 
 /// `out` = y + h (a_1 k_1 + a_2 k_2 + …) for the `terms` (a, k), in these `parts`. All of one length as far as the compiler
 /// knows, so that it takes several components at a time.
-fn combine<const N: usize>(
-    parts: &[Range<usize>],
-    out: &mut [f64],
-    y: &[f64],
-    h: f64,
-    terms: [(f64, &[f64]); N],
-) {
+fn combine<const N: usize>(parts: &[Range<usize>], out: &mut [f64], y: &[f64], h: f64, terms: [(f64, &[f64]); N]) {
     for part in parts {
         let (out, y) = (&mut out[part.clone()], &y[part.clone()]);
         let terms = terms.map(|(a, k)| (a, &k[part.clone()]));
@@ -257,9 +238,7 @@ mod tests {
             stepper.attempt(&mut Oscillator, t, h, &y, &k, &mut y1, &mut k1);
             y = y1;
         }
-        (y[0] - libm::cos(2.0))
-            .abs()
-            .max((y[1] + libm::sin(2.0)).abs())
+        (y[0] - libm::cos(2.0)).abs().max((y[1] + libm::sin(2.0)).abs())
     }
 
     fn observed_order(stepper: &mut impl Stepper, steps: u32) -> f64 {
@@ -297,17 +276,12 @@ mod tests {
         Oscillator.derivative(0.0, &y, &mut k);
         stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
         stepper.interpolate(0..2, 0.37, h, &y, &k, &mut out);
-        (out[0] - libm::cos(0.37 * h))
-            .abs()
-            .max((out[1] + libm::sin(0.37 * h)).abs())
+        (out[0] - libm::cos(0.37 * h)).abs().max((out[1] + libm::sin(0.37 * h)).abs())
     }
 
     #[test]
     fn dormand_prince_interpolates_to_fourth_order() {
         let order = libm::log2(interpolation_error(0.4) / interpolation_error(0.2));
-        assert!(
-            order > 4.5,
-            "local order {order}: a continuous extension of order 4 has 5"
-        );
+        assert!(order > 4.5, "local order {order}: a continuous extension of order 4 has 5");
     }
 }

@@ -99,11 +99,7 @@ impl Tableau {
         let mut worst = vec![0.0_f64; order];
         for tree in trees(order, fat) {
             let n = tree.order();
-            let wanted = if tree.has_fat() {
-                0.0
-            } else {
-                theta.powi(n as i32) / tree.density()
-            };
+            let wanted = if tree.has_fat() { 0.0 } else { theta.powi(n as i32) / tree.density() };
             let got = dot(weights, &tree.stages(&self.alpha, &self.gamma));
             worst[n - 1] = worst[n - 1].max((got - wanted).abs());
         }
@@ -113,10 +109,7 @@ impl Tableau {
     /// Asserts that the weights have this order to rounding, and none higher.
     fn assert_order(&self, what: &str, weights: &[f64], theta: f64, order: usize, fat: bool) {
         let defects = self.defects(weights, theta, order + 1, fat);
-        assert!(
-            defects[..order].iter().all(|d| *d < ROUNDING),
-            "{what}: {defects:?}"
-        );
+        assert!(defects[..order].iter().all(|d| *d < ROUNDING), "{what}: {defects:?}");
         assert!(defects[order] > 1e-6, "{what}: more than {order}");
     }
 }
@@ -156,21 +149,13 @@ impl Probe {
 
     /// Each stage a unit vector.
     fn units(stages: usize, dimension: usize) -> Self {
-        let unit = |i: usize| {
-            (0..dimension)
-                .map(|j| f64::from(u8::from(i == j)))
-                .collect()
-        };
+        let unit = |i: usize| (0..dimension).map(|j| f64::from(u8::from(i == j))).collect();
         Self::new((0..stages).map(unit).collect())
     }
 
     /// Rows of the coefficient matrix, whose sums are the times of the evaluations.
     fn rows(&self, stages: usize) -> Vec<Vec<f64>> {
-        let rows: Vec<Vec<f64>> = self
-            .asked
-            .iter()
-            .map(|(_, y)| y[..stages].to_vec())
-            .collect();
+        let rows: Vec<Vec<f64>> = self.asked.iter().map(|(_, y)| y[..stages].to_vec()).collect();
         for ((time, _), row) in self.asked.iter().zip(&rows) {
             let sum: f64 = row.iter().sum();
             assert!((time - sum).abs() < ROUNDING, "{time} {row:?}");
@@ -235,11 +220,7 @@ fn explicit(stepper: &mut impl Stepper, stages: usize) -> (Tableau, Vec<f64>) {
 }
 
 /// Error estimate where the stages are the elementary weights of a tree: zero up to the order of the embedded method.
-fn estimate(
-    tree: &Tree,
-    tableau: &Tableau,
-    attempt: impl FnOnce(&mut Probe, &[f64]) -> f64,
-) -> f64 {
+fn estimate(tree: &Tree, tableau: &Tableau, attempt: impl FnOnce(&mut Probe, &[f64]) -> f64) -> f64 {
     let weights = tree.stages(&tableau.alpha, &tableau.gamma);
     let mut probe = Probe::new(weights.iter().map(|w| vec![*w]).collect());
     let k = probe.slopes[0].clone();
@@ -262,19 +243,12 @@ fn kutta_has_order_four_and_the_cubic_through_its_ends_three() {
     let (tableau, weights) = explicit(&mut RungeKutta4::new(5), 5);
     tableau.assert_order("rk4", &weights, 1.0, 4, false);
     // The fifth stage is the derivative at the end.
-    let unit = |i: usize| {
-        (0..5)
-            .map(|j| f64::from(u8::from(i == j)))
-            .collect::<Vec<f64>>()
-    };
+    let unit = |i: usize| (0..5).map(|j| f64::from(u8::from(i == j))).collect::<Vec<f64>>();
     for theta in PARTS {
         let mut at = vec![0.0; 5];
         hermite(theta, 1.0, &[0.0; 5], &unit(0), &weights, &unit(4), &mut at);
         let defects = tableau.defects(&at, theta, 3, false);
-        assert!(
-            defects.iter().all(|d| *d < ROUNDING),
-            "{theta}: {defects:?}"
-        );
+        assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
 }
 
@@ -288,10 +262,7 @@ fn dormand_and_prince_have_order_five_four_inside_and_four_embedded() {
         let mut at = vec![0.0; 7];
         stepper.interpolate(0..7, theta, 1.0, &[0.0; 7], &k, &mut at);
         let defects = tableau.defects(&at, theta, 4, false);
-        assert!(
-            defects.iter().all(|d| *d < ROUNDING),
-            "{theta}: {defects:?}"
-        );
+        assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
     let mut largest = [0.0_f64; 5];
     for tree in trees(5, false) {
@@ -329,21 +300,14 @@ fn ros34pw2_has_order_three_with_any_matrix_and_two_embedded() {
     }
     longer.alpha.push([&weights[..], &[0.0]].concat());
     longer.gamma.push(vec![0.0; 5]);
-    let unit = |i: usize| {
-        (0..5)
-            .map(|j| f64::from(u8::from(i == j)))
-            .collect::<Vec<f64>>()
-    };
+    let unit = |i: usize| (0..5).map(|j| f64::from(u8::from(i == j))).collect::<Vec<f64>>();
     // f at the start is k_1 minus its product with the matrix: for trees without fat vertices the two are the same.
     for theta in PARTS {
         let mut at = vec![0.0; 5];
         let end = [&weights[..], &[0.0]].concat();
         hermite(theta, 1.0, &[0.0; 5], &unit(0), &end, &unit(4), &mut at);
         let defects = longer.defects(&at, theta, 3, false);
-        assert!(
-            defects.iter().all(|d| *d < ROUNDING),
-            "{theta}: {defects:?}"
-        );
+        assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
 }
 
@@ -356,17 +320,12 @@ fn the_code_of_ros34pw2_is_its_tableau() {
     let mut stepper = Rosenbrock::new(8);
     stepper.attempt(&mut probe, 0.0, 1.0, &[0.0; 8], &k, &mut end, &mut k_end);
     let rows = probe.rows(4);
-    let through_gamma = |row: &[f64], j: usize| -> f64 {
-        (0..4).map(|i| row[i] * rosenbrock::GAMMA_IJ[i][j]).sum()
-    };
+    let through_gamma = |row: &[f64], j: usize| -> f64 { (0..4).map(|i| row[i] * rosenbrock::GAMMA_IJ[i][j]).sum() };
     for (i, row) in rosenbrock::ALPHA_IJ.iter().enumerate() {
         for j in 0..4 {
             assert!((rows[i][j] - row[j]).abs() < ROUNDING, "alpha {i} {j}");
             let product = probe.asked[i].1[4 + j];
-            assert!(
-                (product - through_gamma(row, j)).abs() < ROUNDING,
-                "{i} {j}"
-            );
+            assert!((product - through_gamma(row, j)).abs() < ROUNDING, "{i} {j}");
         }
     }
     for j in 0..4 {
@@ -396,10 +355,7 @@ fn radau_has_order_five_three_inside_and_three_embedded() {
     for theta in PARTS {
         let at = radau::weights_within(theta, &a);
         let defects = tableau.defects(&at, theta, 3, false);
-        assert!(
-            defects.iter().all(|d| *d < ROUNDING),
-            "{theta}: {defects:?}"
-        );
+        assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
     // The embedded one has the derivative at the start as a stage before the others.
     let mut rows = vec![vec![0.0; 4]];
@@ -435,13 +391,7 @@ impl ContactSystem for Falling {
     fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
     }
-    fn contact_velocity_change(
-        &mut self,
-        _t: f64,
-        _h: f64,
-        _y: &mut [f64],
-        _dv: &mut [f64],
-    ) -> bool {
+    fn contact_velocity_change(&mut self, _t: f64, _h: f64, _y: &mut [f64], _dv: &mut [f64]) -> bool {
         false
     }
 }

@@ -12,44 +12,20 @@ use std::ops::Range;
 const SQRT6: f64 = 2.449_489_742_783_178;
 pub(super) const C: [f64; 3] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
 /// Weights of the stages in the embedded error estimate.
-const ERROR: [f64; 3] = [
-    -(13.0 + 7.0 * SQRT6) / 3.0,
-    (-13.0 + 7.0 * SQRT6) / 3.0,
-    -1.0 / 3.0,
-];
+const ERROR: [f64; 3] = [-(13.0 + 7.0 * SQRT6) / 3.0, (-13.0 + 7.0 * SQRT6) / 3.0, -1.0 / 3.0];
 /// Eigenvalues of the inverse of the coefficient matrix: one real, one complex pair.
 const REAL: f64 = 3.637_834_252_744_496;
 const PAIR: (f64, f64) = (2.681_082_873_627_752, 3.050_430_199_247_411);
 /// Transformation to those eigenvalues, and its inverse.
 const T: [[f64; 3]; 3] = [
-    [
-        0.091_232_394_870_892_94,
-        -0.141_255_295_020_954_2,
-        -0.030_029_194_105_147_424,
-    ],
-    [
-        0.241_717_932_707_107,
-        0.204_129_352_293_799_93,
-        0.382_942_112_757_261_9,
-    ],
+    [0.091_232_394_870_892_94, -0.141_255_295_020_954_2, -0.030_029_194_105_147_424],
+    [0.241_717_932_707_107, 0.204_129_352_293_799_93, 0.382_942_112_757_261_9],
     [0.966_048_182_615_093, 1.0, 0.0],
 ];
 const T_INVERSE: [[f64; 3]; 3] = [
-    [
-        4.325_579_890_063_155,
-        0.339_199_251_815_809_87,
-        0.541_770_539_935_874_9,
-    ],
-    [
-        -4.178_718_591_551_905,
-        -0.327_682_820_761_062_4,
-        0.476_623_554_500_550_45,
-    ],
-    [
-        -0.502_872_634_945_786_9,
-        2.571_926_949_855_605,
-        -0.596_039_204_828_224_9,
-    ],
+    [4.325_579_890_063_155, 0.339_199_251_815_809_87, 0.541_770_539_935_874_9],
+    [-4.178_718_591_551_905, -0.327_682_820_761_062_4, 0.476_623_554_500_550_45],
+    [-0.502_872_634_945_786_9, 2.571_926_949_855_605, -0.596_039_204_828_224_9],
 ];
 const MOST_ITERATIONS: u32 = 7;
 /// The previous step's polynomial says nothing of a step so many times as long.
@@ -121,13 +97,7 @@ impl Radau {
             contraction: 0.0,
             growth: f64::INFINITY,
             factorisations: 0,
-            previous: Polynomial {
-                h: 0.0,
-                end: 0.0,
-                z: triple(),
-                contraction: 1.0,
-                held: None,
-            },
+            previous: Polynomial { h: 0.0, end: 0.0, z: triple(), contraction: 1.0, held: None },
         }
     }
 
@@ -206,11 +176,9 @@ impl Radau {
     /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
     /// Returns whether it is the former: an attempt may have failed because it went astray.
     fn begin(&mut self, moving: &[Range<usize>], t: f64, h: f64) -> bool {
-        let again =
-            self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
-        let follows = self.previous.h > 0.0
-            && (self.previous.end - t).abs() <= 1e-9 * h
-            && h <= FURTHEST * self.previous.h;
+        let again = self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
+        let follows =
+            self.previous.h > 0.0 && (self.previous.end - t).abs() <= 1e-9 * h && h <= FURTHEST * self.previous.h;
         if !again && !follows {
             for j in 0..3 {
                 self.z[j].fill(0.0);
@@ -254,14 +222,7 @@ impl Radau {
     }
 
     /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
-    fn iterate<S: StiffSystem>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        h: f64,
-        y: &[f64],
-        tolerance: f64,
-    ) -> bool {
+    fn iterate<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64], tolerance: f64) -> bool {
         // The iteration's own error stays well below the step's.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(LEFT));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
@@ -501,12 +462,7 @@ mod tests {
 
     impl VanDerPol {
         fn new(epsilon: f64) -> Self {
-            Self {
-                epsilon,
-                j: Matrix2::zeros(),
-                real: Matrix2::zeros(),
-                pair: Matrix2::zeros(),
-            }
+            Self { epsilon, j: Matrix2::zeros(), real: Matrix2::zeros(), pair: Matrix2::zeros() }
         }
     }
 
@@ -532,17 +488,11 @@ mod tests {
 
     impl StiffSystem for VanDerPol {
         fn linearise(&mut self, _t: f64, y: &[f64]) {
-            self.j = Matrix2::new(
-                0.0,
-                1.0,
-                (-2.0 * y[0] * y[1] - 1.0) / self.epsilon,
-                (1.0 - y[0] * y[0]) / self.epsilon,
-            );
+            self.j =
+                Matrix2::new(0.0, 1.0, (-2.0 * y[0] * y[1] - 1.0) / self.epsilon, (1.0 - y[0] * y[0]) / self.epsilon);
         }
         fn factor_shifted(&mut self, shift: f64) {
-            self.real = (Matrix2::identity() * shift - self.j)
-                .try_inverse()
-                .unwrap();
+            self.real = (Matrix2::identity() * shift - self.j).try_inverse().unwrap();
         }
         fn solve_shifted(&mut self, b: &mut [f64]) {
             let x = self.real * Vector2::new(b[0], b[1]);
@@ -550,13 +500,10 @@ mod tests {
         }
         fn factor_shifted_pair(&mut self, real: f64, imaginary: f64) {
             let shift = Matrix2::identity() * Complex::new(real, imaginary);
-            self.pair = (shift - self.j.map(|x| Complex::new(x, 0.0)))
-                .try_inverse()
-                .unwrap();
+            self.pair = (shift - self.j.map(|x| Complex::new(x, 0.0))).try_inverse().unwrap();
         }
         fn solve_shifted_pair(&mut self, re: &mut [f64], im: &mut [f64]) {
-            let x =
-                self.pair * Vector2::new(Complex::new(re[0], im[0]), Complex::new(re[1], im[1]));
+            let x = self.pair * Vector2::new(Complex::new(re[0], im[0]), Complex::new(re[1], im[1]));
             for i in 0..2 {
                 (re[i], im[i]) = (x[i].re, x[i].im);
             }

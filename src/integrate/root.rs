@@ -25,11 +25,7 @@ pub fn find_root(
         let x = b - fb * (b - a) / (fb - fa);
         // Keeps off the ends, where regula falsi would stall.
         let inset = 1e-3 * (b - a);
-        let x = if x.is_finite() {
-            x.clamp(a + inset, b - inset)
-        } else {
-            0.5 * (a + b)
-        };
+        let x = if x.is_finite() { x.clamp(a + inset, b - inset) } else { 0.5 * (a + b) };
         let fx = f(x);
         if (fx > 0.0) == (fb > 0.0) {
             b = x;

@@ -18,31 +18,12 @@ pub(super) const ALPHA_IJ: [[f64; STAGES]; STAGES] = [
 pub(super) const GAMMA_IJ: [[f64; STAGES]; STAGES] = [
     [GAMMA, 0.0, 0.0, 0.0],
     [-0.871_733_043_016_918, GAMMA, 0.0, 0.0],
-    [
-        -0.903_380_570_130_440_8,
-        0.054_180_672_388_095_326,
-        GAMMA,
-        0.0,
-    ],
-    [
-        0.242_123_807_060_953_46,
-        -1.223_250_583_904_514_7,
-        0.545_260_255_335_102_1,
-        GAMMA,
-    ],
+    [-0.903_380_570_130_440_8, 0.054_180_672_388_095_326, GAMMA, 0.0],
+    [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 0.545_260_255_335_102_1, GAMMA],
 ];
-pub(super) const WEIGHTS: [f64; STAGES] = [
-    0.242_123_807_060_953_46,
-    -1.223_250_583_904_514_7,
-    1.545_260_255_335_102,
-    GAMMA,
-];
-pub(super) const EMBEDDED: [f64; STAGES] = [
-    0.378_109_031_458_193_7,
-    -0.096_042_292_212_423_18,
-    0.5,
-    0.5 * GAMMA,
-];
+pub(super) const WEIGHTS: [f64; STAGES] =
+    [0.242_123_807_060_953_46, -1.223_250_583_904_514_7, 1.545_260_255_335_102, GAMMA];
+pub(super) const EMBEDDED: [f64; STAGES] = [0.378_109_031_458_193_7, -0.096_042_292_212_423_18, 0.5, 0.5 * GAMMA];
 
 /// Coefficients in the variables U.
 struct Tableau {
@@ -68,15 +49,12 @@ impl Tableau {
                 inverse[i][j] = sum / GAMMA;
             }
         }
-        let times_inverse = |row: &[f64; STAGES]| {
-            std::array::from_fn(|j| (0..STAGES).map(|k| row[k] * inverse[k][j]).sum::<f64>())
-        };
+        let times_inverse =
+            |row: &[f64; STAGES]| std::array::from_fn(|j| (0..STAGES).map(|k| row[k] * inverse[k][j]).sum::<f64>());
         let difference: [f64; STAGES] = std::array::from_fn(|i| WEIGHTS[i] - EMBEDDED[i]);
         Self {
             a: std::array::from_fn(|i| times_inverse(&ALPHA_IJ[i])),
-            c: std::array::from_fn(|i| {
-                std::array::from_fn(|j| if i == j { 0.0 } else { -inverse[i][j] })
-            }),
+            c: std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 0.0 } else { -inverse[i][j] })),
             weights: times_inverse(&WEIGHTS),
             error: times_inverse(&difference),
             alpha: std::array::from_fn(|i| ALPHA_IJ[i].iter().sum()),
@@ -133,13 +111,7 @@ impl Rosenbrock {
             self.linearised_at = Some(t);
         }
         system.factor_shifted(1.0 / (GAMMA * h));
-        let Self {
-            table,
-            u,
-            stage,
-            rate,
-            ..
-        } = self;
+        let Self { table, u, stage, rate, .. } = self;
         for i in 0..STAGES {
             let (done, rest) = u.split_at_mut(i);
             let target = &mut rest[0];
@@ -248,13 +220,7 @@ mod tests {
 
     fn end_error(stiffness: f64, exact: bool, steps: u32) -> f64 {
         let end = |steps: u32| {
-            let mut problem = Problem {
-                stiffness,
-                exact,
-                j: [0.0; 2],
-                shift: 0.0,
-                ft: [0.0; 2],
-            };
+            let mut problem = Problem { stiffness, exact, j: [0.0; 2], shift: 0.0, ft: [0.0; 2] };
             let mut method = Rosenbrock::new(2);
             let (mut y, mut k, mut y1, mut k1) = ([0.0, 0.5], [0.0; 2], [0.0; 2], [0.0; 2]);
             let h = 1.0 / f64::from(steps);
@@ -267,9 +233,7 @@ mod tests {
             y
         };
         let (got, fine) = (end(steps), end(4096));
-        (got[0] - libm::sin(1.0))
-            .abs()
-            .max((got[1] - fine[1]).abs())
+        (got[0] - libm::sin(1.0)).abs().max((got[1] - fine[1]).abs())
     }
 
     #[test]
@@ -283,13 +247,7 @@ mod tests {
     #[test]
     fn what_does_not_move_is_not_looked_at() {
         let step = |y: &[f64], k: &[f64]| {
-            let mut problem = Problem {
-                stiffness: 50.0,
-                exact: true,
-                j: [0.0; 2],
-                shift: 0.0,
-                ft: [0.0; 2],
-            };
+            let mut problem = Problem { stiffness: 50.0, exact: true, j: [0.0; 2], shift: 0.0, ft: [0.0; 2] };
             let (mut k, mut end, mut k_end) = (k.to_vec(), y.to_vec(), k.to_vec());
             problem.derivative(0.0, y, &mut k);
             let mut method = Rosenbrock::new(y.len());
@@ -353,11 +311,7 @@ mod tests {
     #[test]
     fn a_jacobian_that_is_far_too_large_or_by_a_third_too_small_leaves_it_stable() {
         let amplification = |rate: f64, off: f64| {
-            let mut system = Off {
-                rate,
-                off,
-                shift: 0.0,
-            };
+            let mut system = Off { rate, off, shift: 0.0 };
             let (y, mut k, mut end, mut rate_end) = ([1.0], [0.0], [0.0], [0.0]);
             system.derivative(0.0, &y, &mut k);
             Rosenbrock::new(1).attempt(&mut system, 0.0, 1.0, &y, &k, &mut end, &mut rate_end);

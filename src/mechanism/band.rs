@@ -14,10 +14,7 @@ pub struct Band {
 impl Band {
     /// With room for so many rows of blocks, none further than `reach` from the diagonal.
     pub fn with_room(size: usize, reach: usize) -> Self {
-        Self {
-            filled: Vec::with_capacity(Self::places(size, reach)),
-            ..Self::default()
-        }
+        Self { filled: Vec::with_capacity(Self::places(size, reach)), ..Self::default() }
     }
 
     /// Takes a matrix of `size` rows, whose blocks (i, j) differ from zero on the diagonal and, at most `reach` away from it, where
@@ -82,9 +79,7 @@ impl Band {
     /// Factors `blocks`; they become NaN where a diagonal block is singular.
     pub fn factor(&self, blocks: &mut [Mat3]) {
         for k in 0..self.size {
-            let inverse = blocks[self.at(k, k)]
-                .try_inverse()
-                .unwrap_or_else(|| Mat3::from_element(f64::NAN));
+            let inverse = blocks[self.at(k, k)].try_inverse().unwrap_or_else(|| Mat3::from_element(f64::NAN));
             blocks[self.at(k, k)] = inverse;
             for i in k + 1..self.end(k) {
                 let lower = self.at(i, k);
@@ -142,9 +137,7 @@ mod tests {
                     }
                 }
             }
-            let b: Vec<Vec3> = (0..size)
-                .map(|i| Vec3::from_fn(|a, _| number(3 * i + a)))
-                .collect();
+            let b: Vec<Vec3> = (0..size).map(|i| Vec3::from_fn(|a, _| number(3 * i + a))).collect();
             let (mut factors, mut x) = (blocks.clone(), b.clone());
             band.factor(&mut factors);
             band.solve(&factors, &mut x);

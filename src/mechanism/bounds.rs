@@ -152,10 +152,7 @@ impl Cost {
             let at = rows.len() as u64;
             let mut first = at;
             let [ball, socket] = bodies.map(block_of);
-            for block in [ball, socket.filter(|_| socket != ball)]
-                .into_iter()
-                .flatten()
-            {
+            for block in [ball, socket.filter(|_| socket != ball)].into_iter().flatten() {
                 let n = model.blocks[block].n as u64;
                 first_on[block] = first_on[block].min(at);
                 first = first.min(first_on[block]);
@@ -209,10 +206,7 @@ impl Cost {
         let band = joints * (2 * reach + 1);
         // Entries: three 3 x 3 blocks; three columns, and ten numbers for what a coordinate moves.
         // Products: one elimination, and the blocks.
-        Self {
-            entries: 27 * band + 13 * width,
-            products: 40 * joints * (reach + 1) * (reach + 1) + 250 * band,
-        }
+        Self { entries: 27 * band + 13 * width, products: 40 * joints * (reach + 1) * (reach + 1) + 250 * band }
     }
 
     /// Rejects a cost beyond a limit; `of` says what it is the cost of.
@@ -227,13 +221,7 @@ impl Cost {
         } else {
             return Ok(());
         };
-        Err(MechanismError::TooCostly {
-            of,
-            what,
-            needed,
-            most,
-            advice,
-        })
+        Err(MechanismError::TooCostly { of, what, needed, most, advice })
     }
 }
 
@@ -282,9 +270,7 @@ pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
     }
     let helps = |form: &Formulation| *form != scene.formulation && cost(*form).fits();
     let other = Formulation::ALL.into_iter().find(helps);
-    let advice = other
-        .filter(|_| assembly.fits())
-        .map_or(Advice::Smaller, Advice::Formulation);
+    let advice = other.filter(|_| assembly.fits()).map_or(Advice::Smaller, Advice::Formulation);
     own.check(CostOf::Formulation(scene.formulation), advice)?;
     assembly.check(CostOf::Assembly, advice)
 }
@@ -321,10 +307,7 @@ mod tests {
                 let ratio = |a: u64, b: u64| b.max(1) as f64 / a.max(1) as f64;
                 let got = [ratio(a.entries, b.entries), ratio(a.products, b.products)];
                 for (got, at_most) in got.into_iter().zip(growth) {
-                    assert!(
-                        got < 1.1 * at_most,
-                        "{kind}, form {form}: {got} of {at_most}"
-                    );
+                    assert!(got < 1.1 * at_most, "{kind}, form {form}: {got} of {at_most}");
                 }
             }
         }
@@ -349,15 +332,9 @@ mod tests {
             ("hinges on one body", "tree", "hinges on one free body"),
             ("hinges on one body", "lagrange", "hinges on one free body"),
             ("balls of one body", "tree", "bodies on ideal ball joints"),
-            (
-                "balls of one body",
-                "lagrange",
-                "bodies on ideal ball joints",
-            ),
+            ("balls of one body", "lagrange", "bodies on ideal ball joints"),
         ] {
-            let line = page
-                .lines()
-                .find(|line| line.starts_with(&format!("| {row}")));
+            let line = page.lines().find(|line| line.starts_with(&format!("| {row}")));
             let column = 2 + usize::from(formulation == "lagrange");
             let said = line.expect(row).split('|').nth(column).map(str::trim);
             let said: usize = said.and_then(|most| most.parse().ok()).expect("a number");

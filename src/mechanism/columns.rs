@@ -20,10 +20,7 @@ pub struct Column {
 
 /// Centres of ball and socket, in that order, each with its radius to the wall, m.
 pub fn contact_sides(joint: &BallJoint, c: &Coefficients) -> [(Anchor, f64); 2] {
-    [
-        (joint.ball, c.ball_radius),
-        (joint.socket, c.ball_radius + c.clearance),
-    ]
+    [(joint.ball, c.ball_radius), (joint.socket, c.ball_radius + c.clearance)]
 }
 
 /// Fills `columns`: how each coordinate moves the first of two points relative to the second, and likewise the points of
@@ -40,29 +37,19 @@ pub fn collect_columns(
         let m = &equations.motion()[anchor.body];
         let centre = m.position + m.rotation * anchor.offset;
         let to_surface = n * *radius;
-        equations.visit_columns(
-            model,
-            anchor.body,
-            &centre,
-            &mut |coordinate, velocity, omega| {
-                let centre = velocity * sign;
-                let surface = (velocity + omega.cross(&to_surface)) * sign;
-                let turn = omega * (*radius * sign);
-                // A coordinate that is an ancestor of both bodies moves both.
-                if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
-                    column.centre += centre;
-                    column.surface += surface;
-                    column.turn += turn;
-                } else {
-                    columns.push(Column {
-                        coordinate,
-                        centre,
-                        surface,
-                        turn,
-                    });
-                }
-            },
-        );
+        equations.visit_columns(model, anchor.body, &centre, &mut |coordinate, velocity, omega| {
+            let centre = velocity * sign;
+            let surface = (velocity + omega.cross(&to_surface)) * sign;
+            let turn = omega * (*radius * sign);
+            // A coordinate that is an ancestor of both bodies moves both.
+            if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
+                column.centre += centre;
+                column.surface += surface;
+                column.turn += turn;
+            } else {
+                columns.push(Column { coordinate, centre, surface, turn });
+            }
+        });
     }
 }
 
@@ -80,28 +67,21 @@ pub fn collect_relative_columns(
         let m = &equations.motion()[anchor.body];
         let point = m.position + m.rotation * anchor.offset;
         let of_first = columns.len();
-        equations.visit_columns(
-            model,
-            anchor.body,
-            &point,
-            &mut |coordinate, velocity, omega| {
-                // Both walks go down to the root: what they share comes in the same order.
-                let own = columns[shared..of_first]
-                    .iter()
-                    .position(|c| c.coordinate == coordinate);
-                if let Some(at) = own {
-                    columns[shared + at].coordinate = SHARED;
-                    shared += at + 1;
-                    return;
-                }
-                columns.push(Column {
-                    coordinate,
-                    centre: velocity * sign,
-                    surface: velocity * sign,
-                    turn: omega * (*radius * sign),
-                });
-            },
-        );
+        equations.visit_columns(model, anchor.body, &point, &mut |coordinate, velocity, omega| {
+            // Both walks go down to the root: what they share comes in the same order.
+            let own = columns[shared..of_first].iter().position(|c| c.coordinate == coordinate);
+            if let Some(at) = own {
+                columns[shared + at].coordinate = SHARED;
+                shared += at + 1;
+                return;
+            }
+            columns.push(Column {
+                coordinate,
+                centre: velocity * sign,
+                surface: velocity * sign,
+                turn: omega * (*radius * sign),
+            });
+        });
     }
     columns.retain(|column| column.coordinate != SHARED);
 }

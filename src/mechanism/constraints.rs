@@ -122,9 +122,8 @@ impl Constraints {
                 });
             }
         }
-        let block_of = |b: BodyIndex| {
-            (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b])
-        };
+        let block_of =
+            |b: BodyIndex| (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b]);
         let balls = joints.iter().map(|&j| {
             let joint = &model.joints[j];
             [joint.ball.body, joint.socket.body]
@@ -142,11 +141,7 @@ impl Constraints {
                     .into_iter()
                     .map(|block| {
                         let n = model.blocks[block].n;
-                        let side = Side {
-                            block,
-                            offset: total,
-                            n,
-                        };
+                        let side = Side { block, offset: total, n };
                         total += 3 * n;
                         side
                     })
@@ -187,11 +182,7 @@ impl Constraints {
             multipliers: vec![0.0; count],
             scratch: vec![0.0; count],
             step: vec![0.0; model.nv],
-            square: if count == model.nv {
-                vec![0.0; model.nv * model.nv]
-            } else {
-                Vec::new()
-            },
+            square: if count == model.nv { vec![0.0; model.nv * model.nv] } else { Vec::new() },
             time: None,
             positions: vec![0.0; model.nq],
             least_pivot: f64::INFINITY,
@@ -205,11 +196,7 @@ impl Constraints {
     }
 
     /// The same for a subset of as many rows as coordinates: `place` maps a row to its place in the square matrix.
-    pub fn is_minor_positive(
-        &mut self,
-        model: &Model,
-        place: impl Fn(usize) -> Option<usize>,
-    ) -> bool {
+    pub fn is_minor_positive(&mut self, model: &Model, place: impl Fn(usize) -> Option<usize>) -> bool {
         let n = model.nv;
         let a = &mut self.square;
         a.resize(n * n, 0.0);
@@ -308,13 +295,7 @@ impl Constraints {
     }
 
     /// Adds what `multipliers` of all rows exert on the bodies to `wrench`.
-    pub fn load(
-        &self,
-        model: &Model,
-        multipliers: &[f64],
-        motion: &[Kinematics],
-        wrench: &mut [Wrench],
-    ) {
+    pub fn load(&self, model: &Model, multipliers: &[f64], motion: &[Kinematics], wrench: &mut [Wrench]) {
         let mut push = |body: BodyIndex, arm: Vec3, force: Vec3| {
             let w = &mut wrench[body];
             w.force += force;
@@ -369,17 +350,11 @@ impl Constraints {
                     continue;
                 };
                 let [x, y, z] = side.rows_mut(&mut self.jacobian);
-                visit_columns(
-                    model,
-                    &tree.motion,
-                    anchor.body,
-                    &point,
-                    |column, velocity, _| {
-                        x[column] += sign * velocity.x;
-                        y[column] += sign * velocity.y;
-                        z[column] += sign * velocity.z;
-                    },
-                );
+                visit_columns(model, &tree.motion, anchor.body, &point, |column, velocity, _| {
+                    x[column] += sign * velocity.x;
+                    y[column] += sign * velocity.y;
+                    z[column] += sign * velocity.z;
+                });
             }
         }
         self.add_unit_columns(model, &tree.motion);
@@ -491,13 +466,7 @@ impl Constraints {
 
     /// The same for the three rows of these sides.
     #[inline(always)]
-    fn add_weighted_rows(
-        &self,
-        model: &Model,
-        sides: &[Side],
-        &[x1, x2, x3]: &[f64; 3],
-        v: &mut [f64],
-    ) {
+    fn add_weighted_rows(&self, model: &Model, sides: &[Side], &[x1, x2, x3]: &[f64; 3], v: &mut [f64]) {
         for side in sides {
             let v = &mut v[model.blocks[side.block].v..][..side.n];
             let [w1, w2, w3] = side.rows(&self.weighted);
@@ -513,10 +482,7 @@ impl Constraints {
         let mut largest: f64 = 0.0;
         for unit in &mut self.units {
             unit.measure(model, motion);
-            for (x, state) in self.multipliers[unit.first..]
-                .iter_mut()
-                .zip(&unit.state[..unit.count])
-            {
+            for (x, state) in self.multipliers[unit.first..].iter_mut().zip(&unit.state[..unit.count]) {
                 *x = -state[order];
                 largest = largest.max(x.abs());
             }
@@ -587,8 +553,7 @@ impl Constraints {
             // Newton converges quadratically: stop once another step would only change rounding errors.
             // Dependent rows leave a residual: the inconsistency of the parts' dimensions.
             let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };
-            if largest <= 1e-15 || (largest < stirred && largest >= 0.5 * error) || largest.is_nan()
-            {
+            if largest <= 1e-15 || (largest < stirred && largest >= 0.5 * error) || largest.is_nan() {
                 error = largest;
                 break;
             }

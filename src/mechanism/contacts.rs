@@ -26,11 +26,7 @@ impl Ramp {
     /// Clearance and its rate at `t`.
     pub fn at(&self, t: f64) -> (f64, f64) {
         let value = self.from + self.rate * (t - self.start);
-        if (self.rate < 0.0) == (value <= self.to) {
-            (self.to, 0.0)
-        } else {
-            (value, self.rate)
-        }
+        if (self.rate < 0.0) == (value <= self.to) { (self.to, 0.0) } else { (value, self.rate) }
     }
 }
 

@@ -82,13 +82,7 @@ pub(super) trait Equations: Send {
 
     /// Calls `visit(coordinate, velocity, angular velocity)`, both per unit rate, for each coordinate that moves the point of
     /// `body` located at `point`.
-    fn visit_columns(
-        &self,
-        model: &Model,
-        body: usize,
-        point: &Vec3,
-        visit: &mut dyn FnMut(usize, Vec3, Vec3),
-    );
+    fn visit_columns(&self, model: &Model, body: usize, point: &Vec3, visit: &mut dyn FnMut(usize, Vec3, Vec3));
 
     /// Applies the constrained inverse mass matrix: generalised forces to accelerations, in place.
     fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]);
@@ -152,12 +146,5 @@ pub(super) trait Equations: Send {
 
     /// Power of all drives, W, after an evaluation at `y` with the accelerations `dv`; `all` if some of them are loaded by
     /// bodies whose motion is not a function of time alone. May change the loads.
-    fn drive_power(
-        &mut self,
-        model: &Model,
-        gravity: &Vec3,
-        y: &[f64],
-        dv: &[f64],
-        all: bool,
-    ) -> f64;
+    fn drive_power(&mut self, model: &Model, gravity: &Vec3, y: &[f64], dv: &[f64], all: bool) -> f64;
 }

@@ -17,15 +17,9 @@ impl Pattern {
     /// From the parent of each coordinate.
     pub fn new(parent: Vec<usize>) -> Self {
         let chain = |k: usize| if k == 0 { NONE } else { k - 1 };
-        let on_free_body = parent.len() >= 6
-            && parent
-                .iter()
-                .enumerate()
-                .all(|(k, &p)| p == if k < 6 { chain(k) } else { 5 });
-        Self {
-            parent,
-            on_free_body,
-        }
+        let on_free_body =
+            parent.len() >= 6 && parent.iter().enumerate().all(|(k, &p)| p == if k < 6 { chain(k) } else { 5 });
+        Self { parent, on_free_body }
     }
 
     /// Number of coordinates.
@@ -297,10 +291,7 @@ impl Skyline {
     /// never read.
     #[inline]
     pub fn add_block(&mut self, i: usize, j: usize, block: &Block) {
-        debug_assert_eq!(
-            (self.place[SIDE * i], self.place[SIDE * j]),
-            ((i, 0), (j, 0))
-        );
+        debug_assert_eq!((self.place[SIDE * i], self.place[SIDE * j]), ((i, 0), (j, 0)));
         let sum = &mut self.blocks[self.offset[i] + j - self.first[i]];
         for (sum, row) in sum.iter_mut().zip(block) {
             for (sum, value) in sum.iter_mut().zip(row) {
@@ -312,11 +303,7 @@ impl Skyline {
     /// Entry (i, j), j <= i, before [`Self::factor`]; 0 outside the envelope.
     pub fn get(&self, i: usize, j: usize) -> f64 {
         let ((i, row), (j, column)) = (self.place[i], self.place[j]);
-        if j < self.first[i] {
-            0.0
-        } else {
-            self.blocks[self.offset[i] + j - self.first[i]][row][column]
-        }
+        if j < self.first[i] { 0.0 } else { self.blocks[self.offset[i] + j - self.first[i]][row][column] }
     }
 
     /// Original diagonal entry i and its pivot, after [`Self::factor`].
@@ -536,11 +523,7 @@ mod tests {
             let second = (0..leg).flat_map(|other| 5 * other + 3..5 * other + 5);
             for row in 0..5 {
                 let own = 5 * leg..5 * leg + row;
-                columns.push(if row < 3 {
-                    own.collect()
-                } else {
-                    second.clone().chain(own).collect()
-                });
+                columns.push(if row < 3 { own.collect() } else { second.clone().chain(own).collect() });
             }
         }
         let n = columns.len();
@@ -567,27 +550,18 @@ mod tests {
         assert!((x - expected).norm() < 1e-13);
         // The first column makes rows 2 and 3 couple, and those fill in the last row between its entries.
         let star = Skyline::new(vec![vec![], vec![], vec![0], vec![0], vec![1, 2]]);
-        assert_eq!(
-            (star.coupled(3), star.coupled(4)),
-            (&[0, 2][..], &[1, 2, 3][..])
-        );
+        assert_eq!((star.coupled(3), star.coupled(4)), (&[0, 2][..], &[1, 2, 3][..]));
     }
 
     #[test]
     fn skyline_solves_a_banded_system() {
         let n = 12;
-        let columns: Vec<_> = (0..n)
-            .map(|i: usize| (i.saturating_sub(2)..i).collect())
-            .collect();
+        let columns: Vec<_> = (0..n).map(|i: usize| (i.saturating_sub(2)..i).collect()).collect();
         let mut a = Skyline::new(columns);
         let mut dense = nalgebra::DMatrix::<f64>::zeros(n, n);
         for i in 0..n {
             for j in i.saturating_sub(2)..=i {
-                let value = if i == j {
-                    5.0 + i as f64
-                } else {
-                    1.0 / (1.0 + i as f64 + j as f64)
-                };
+                let value = if i == j { 5.0 + i as f64 } else { 1.0 / (1.0 + i as f64 + j as f64) };
                 a.add(i, j, value);
                 dense[(i, j)] = value;
                 dense[(j, i)] = value;

@@ -51,12 +51,7 @@ impl Flyer {
         // In the order of their bodies, as blocks are.
         let lone = model.blocks.iter().filter_map(|block| block.lone);
         let flyer = |body: BodyIndex| match model.bodies[body].motion {
-            Motion::Free { q, v } => Some(Self {
-                body,
-                joints: std::mem::take(&mut joints[body]),
-                q,
-                v: model.nq + v,
-            }),
+            Motion::Free { q, v } => Some(Self { body, joints: std::mem::take(&mut joints[body]), q, v: model.nq + v }),
             _ => None,
         };
         lone.filter(|&b| !loaded[b]).filter_map(flyer).collect()
@@ -80,10 +75,7 @@ pub(super) struct Moving {
 impl Moving {
     /// With room to leave out so many flyers.
     pub fn with_room(flyers: usize) -> Self {
-        Self {
-            parts: Vec::with_capacity(2 * (flyers + 1)),
-            of_positions: 0,
-        }
+        Self { parts: Vec::with_capacity(2 * (flyers + 1)), of_positions: 0 }
     }
 
     /// Those that are positions.
@@ -97,12 +89,7 @@ impl Moving {
     }
 
     /// Of a state of `dimension` components, `positions` of them positions, of which the `flyers` are left out.
-    fn leave_out<'a>(
-        &mut self,
-        positions: usize,
-        dimension: usize,
-        flyers: impl Iterator<Item = &'a Flyer> + Clone,
-    ) {
+    fn leave_out<'a>(&mut self, positions: usize, dimension: usize, flyers: impl Iterator<Item = &'a Flyer> + Clone) {
         self.parts.clear();
         for (kind, all) in [0..positions, positions..dimension].into_iter().enumerate() {
             let mut from = all.start;
@@ -220,14 +207,8 @@ impl Mechanism {
     /// Of ball and socket of joint `j`, those that may fly.
     pub fn flyers_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
-        let of = |b: BodyIndex| {
-            self.flyers
-                .binary_search_by_key(&b, |flyer| flyer.body)
-                .ok()
-        };
-        [of(joint.ball.body), of(joint.socket.body)]
-            .into_iter()
-            .flatten()
+        let of = |b: BodyIndex| self.flyers.binary_search_by_key(&b, |flyer| flyer.body).ok();
+        [of(joint.ball.body), of(joint.socket.body)].into_iter().flatten()
     }
 
     /// Free flight of `flyer` from the state `y` at `t`.
@@ -328,12 +309,7 @@ mod tests {
         flight.put(&flyer, 0.25 + length, &mut flown);
         for part in flyer.parts() {
             for i in part {
-                assert!(
-                    (flown[i] - y[i]).abs() < 3e-14 * (1.0 + y[i].abs()),
-                    "{i}: {} {}",
-                    flown[i],
-                    y[i]
-                );
+                assert!((flown[i] - y[i]).abs() < 3e-14 * (1.0 + y[i].abs()), "{i}: {} {}", flown[i], y[i]);
             }
         }
     }

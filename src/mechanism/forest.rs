@@ -19,10 +19,7 @@ impl Forest {
     /// For `model`.
     pub(super) fn new(model: &Model) -> Self {
         let constraints = || Constraints::new(model, &model.ideal_joints);
-        Self {
-            tree: Tree::new(model),
-            constraints: model.closes_loops().then(constraints),
-        }
+        Self { tree: Tree::new(model), constraints: model.closes_loops().then(constraints) }
     }
 
     /// Drive forces for the accelerations in the tree's motion, from the bodies selected by `moved`.
@@ -145,13 +142,7 @@ impl Equations for Forest {
         self.constraints.is_some()
     }
 
-    fn visit_columns(
-        &self,
-        model: &Model,
-        body: usize,
-        point: &Vec3,
-        visit: &mut dyn FnMut(usize, Vec3, Vec3),
-    ) {
+    fn visit_columns(&self, model: &Model, body: usize, point: &Vec3, visit: &mut dyn FnMut(usize, Vec3, Vec3)) {
         if body < model.bodies.len() && !model.bodies[body].driven_only {
             let first = model.blocks[model.block_of[body]].v;
             tree::visit_columns(model, &self.tree.motion, body, point, |c, v, w| {
@@ -167,12 +158,7 @@ impl Equations for Forest {
         }
     }
 
-    fn apply_inverse_mass_within(
-        &mut self,
-        model: &Model,
-        (first, end): (usize, usize),
-        x: &mut [f64],
-    ) {
+    fn apply_inverse_mass_within(&mut self, model: &Model, (first, end): (usize, usize), x: &mut [f64]) {
         self.tree.solve_within(model, first, end, x);
     }
 
@@ -229,9 +215,7 @@ impl Equations for Forest {
 
     fn closure_load(&self, c: usize) -> [Vec3; 2] {
         let constraints = self.constraints.as_ref();
-        constraints.map_or([Vec3::zeros(); 2], |constraints| {
-            constraints.closure_load(c)
-        })
+        constraints.map_or([Vec3::zeros(); 2], |constraints| constraints.closure_load(c))
     }
 
     fn is_closure_unique(&self, c: usize) -> bool {
@@ -281,24 +265,12 @@ impl Equations for Forest {
         self.constraints.is_none()
     }
 
-    fn drive_power(
-        &mut self,
-        model: &Model,
-        gravity: &Vec3,
-        y: &[f64],
-        dv: &[f64],
-        all: bool,
-    ) -> f64 {
+    fn drive_power(&mut self, model: &Model, gravity: &Vec3, y: &[f64], dv: &[f64], all: bool) -> f64 {
         if all {
             self.tree.accelerate(model, y, dv);
             self.load_reactions(model);
         }
-        let Tree {
-            motion,
-            wrench,
-            driven,
-            ..
-        } = &mut self.tree;
+        let Tree { motion, wrench, driven, .. } = &mut self.tree;
         // If forces suffice, everything carried by a drive depends on time alone.
         let moved = |b: usize| all || model.bodies[b].driven_only;
         let mut power = 0.0;

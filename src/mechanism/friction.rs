@@ -35,11 +35,7 @@ struct TreePart {
 impl TreePart {
     fn new(range: (usize, usize)) -> Self {
         let n = range.1 - range.0;
-        Self {
-            range,
-            reads: Vec::with_capacity(n),
-            weighted: vec![Vec3::zeros(); n],
-        }
+        Self { range, reads: Vec::with_capacity(n), weighted: vec![Vec3::zeros(); n] }
     }
 }
 
@@ -72,9 +68,7 @@ impl Touch {
         let force = self.law.force(&self.memory, &at, || self.read);
         if force.normal > 0.0 {
             let slope = Slope::Secant;
-            let of = self
-                .law
-                .linearise(&self.memory, &at, &self.rate, &self.read, &force, slope);
+            let of = self.law.linearise(&self.memory, &at, &self.rate, &self.read, &force, slope);
             self.resistance = of.by_slip;
         }
     }
@@ -82,9 +76,7 @@ impl Touch {
     /// Velocity that friction reads for the velocities `x`.
     fn reading(&self, x: &[f64]) -> Vec3 {
         let reads = self.trees.iter().flat_map(|tree| &tree.reads);
-        reads.fold(Vec3::zeros(), |sum, (coordinate, read)| {
-            sum + read * x[*coordinate]
-        })
+        reads.fold(Vec3::zeros(), |sum, (coordinate, read)| sum + read * x[*coordinate])
     }
 
     /// Adds M^-1 S^T `force` to `x`.
@@ -204,10 +196,8 @@ impl Friction {
         let trees = of.iter().map(|(_, ranges)| ranges.iter().copied());
         let reach = reach_of(trees, &mut friction.first_on);
         let widths = of.iter().flat_map(|(_, ranges)| ranges).map(width).sum();
-        Cost::of_implicit_contacts(of.len(), reach, widths).check(
-            CostOf::ImplicitContacts,
-            Advice::Method(Method::DormandPrince5),
-        )?;
+        Cost::of_implicit_contacts(of.len(), reach, widths)
+            .check(CostOf::ImplicitContacts, Advice::Method(Method::DormandPrince5))?;
         let touch = |(joint, ranges): (usize, Vec<(usize, usize)>)| Touch {
             joint,
             law: *contacts.coefficients(joint),
@@ -262,8 +252,7 @@ impl Friction {
                 let read = |c: &Column| if surfaces { c.surface } else { c.centre };
                 let columns = self.columns.iter().filter(here);
                 tree.reads.clear();
-                tree.reads
-                    .extend(columns.clone().map(|c| (c.coordinate, read(c))));
+                tree.reads.extend(columns.clone().map(|c| (c.coordinate, read(c))));
                 for i in 0..3 {
                     self.scratch[first..end].fill(0.0);
                     for column in columns.clone() {
@@ -296,8 +285,7 @@ impl Friction {
         let size = self.active.len();
         let trees = (0..size).map(|i| touch(i).trees.iter().map(|tree| tree.range));
         let reach = reach_of(trees, &mut self.first_on);
-        self.band
-            .arrange(size, reach, |i, j| touch(i).meets(touch(j)));
+        self.band.arrange(size, reach, |i, j| touch(i).meets(touch(j)));
         self.arranged.clone_from(&self.active);
     }
 
@@ -326,8 +314,7 @@ impl Friction {
         }
         for i in 0..band.size() {
             for j in band.row(i) {
-                let mut block =
-                    self.mobility[band.at(i, j)] * -self.touches[self.active[j]].resistance;
+                let mut block = self.mobility[band.at(i, j)] * -self.touches[self.active[j]].resistance;
                 if i == j {
                     block += Mat3::identity() * shift;
                 }
@@ -367,13 +354,7 @@ impl Friction {
     }
 
     /// Solves (s I - J) x = b in place, for the components that move.
-    pub fn solve(
-        &mut self,
-        b: &mut [f64],
-        moving: &Moving,
-        equations: &dyn Equations,
-        model: &Model,
-    ) {
+    pub fn solve(&mut self, b: &mut [f64], moving: &Moving, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let b_v = &mut b[positions..];
         for (&slot, right) in self.active.iter().zip(&mut self.right) {
@@ -420,10 +401,7 @@ mod tests {
     /// Without damping, so that the load, and with it friction, does not follow the penetration rate: that is left out.
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
         let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-        let elastic = [
-            ("contact.restitution", "1"),
-            ("contact.slip_speed_low", "0"),
-        ];
+        let elastic = [("contact.restitution", "1"), ("contact.slip_speed_low", "0")];
         let changes: Vec<(String, String)> = elastic.iter().chain(changes).map(own).collect();
         Scene::load(name, &changes).unwrap()
     }
@@ -468,9 +446,7 @@ mod tests {
             for (v, x) in moved[positions..].iter_mut().zip(x) {
                 *v += sign * width * x;
             }
-            mechanism
-                .evaluator(Touching::Located(memory))
-                .derivative(0.0, &moved, &mut out);
+            mechanism.evaluator(Touching::Located(memory)).derivative(0.0, &moved, &mut out);
             out.split_off(positions)
         };
         let (plus, minus) = (at(1.0), at(-1.0));
@@ -481,12 +457,7 @@ mod tests {
     #[test]
     fn a_hanging_chain_rings_as_its_links_are_pushed_back() {
         let (scene, y) = resting().swap_remove(0);
-        let memory = Memory {
-            active: true,
-            approach_speed: 1e-3,
-            floored: true,
-            ..Memory::default()
-        };
+        let memory = Memory { active: true, approach_speed: 1e-3, floored: true, ..Memory::default() };
         let memory = vec![memory; scene.ball_joints.len()];
         let mut mechanism = Mechanism::new(&scene).unwrap();
         mechanism.prepare_friction().unwrap();
@@ -504,22 +475,14 @@ mod tests {
         };
         let width = 1e-11;
         let expected = ((opening(width) - opening(-width)) / (2.0 * width)).sqrt();
-        assert!(
-            (ringing / expected - 1.0).abs() < 1e-3,
-            "{ringing} {expected}"
-        );
+        assert!((ringing / expected - 1.0).abs() < 1e-3, "{ringing} {expected}");
     }
 
     #[test]
     fn it_solves_with_what_friction_alone_adds_to_the_derivative() {
         for (scene, y) in resting() {
             let name = &scene.name;
-            let memory = Memory {
-                active: true,
-                approach_speed: 1e-3,
-                floored: true,
-                ..Memory::default()
-            };
+            let memory = Memory { active: true, approach_speed: 1e-3, floored: true, ..Memory::default() };
             let memory = vec![memory; scene.ball_joints.len()];
             let mut mechanism = Mechanism::new(&scene).unwrap();
             let positions = mechanism.positions();
@@ -545,11 +508,7 @@ mod tests {
                 let left = shift * x_v[k] - (with[k] - without[k]);
                 let off = (left - b[positions + k]).abs();
                 let scale = largest + (shift * x_v[k]).abs() + with[k].abs();
-                assert!(
-                    off < 1e-3 * scale,
-                    "{name} {k}: {left:e} {:e}",
-                    b[positions + k]
-                );
+                assert!(off < 1e-3 * scale, "{name} {k}: {left:e} {:e}", b[positions + k]);
             }
             let mut rate = vec![0.0; y.len()];
             let mut moving = y.clone();

@@ -73,9 +73,7 @@ impl Touch {
             return;
         }
         let slope = Slope::Secant;
-        let stiffness = self
-            .law
-            .linearise(&self.memory, &at, &rate, &read, &force, slope);
+        let stiffness = self.law.linearise(&self.memory, &at, &rate, &read, &force, slope);
         self.force = at.normal * -force.normal + force.friction;
         self.impedance = stiffness.by_displacement * h + stiffness.by_rate;
         self.resistance = stiffness.by_slip;
@@ -110,10 +108,8 @@ impl ImplicitContacts {
     /// Contacts that are coupled too widely.
     pub fn new(model: &Model, n: usize, blocks: bool) -> Result<Self, MechanismError> {
         let joints = model.joints.len();
-        let block_of = |body: usize| {
-            (body < model.bodies.len() && !model.bodies[body].driven_only)
-                .then(|| model.block_of[body])
-        };
+        let block_of =
+            |body: usize| (body < model.bodies.len() && !model.bodies[body].driven_only).then(|| model.block_of[body]);
         let of_joint = |j: usize| {
             let joint = &model.joints[j];
             [block_of(joint.ball.body), block_of(joint.socket.body)]
@@ -147,10 +143,7 @@ impl ImplicitContacts {
             reach,
             band: Band::with_room(joints, reach),
             touches: Vec::with_capacity(joints),
-            columns: ranges
-                .iter()
-                .map(|range| Vec::with_capacity(width(range)))
-                .collect(),
+            columns: ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
             weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
             blocks: vec![Mat3::zeros(); Band::places(joints, reach)],
             right: Vec::with_capacity(joints),
@@ -185,10 +178,7 @@ impl ImplicitContacts {
                 memory: if memory.active {
                     memory
                 } else {
-                    Memory {
-                        approach_piece: ApproachPiece::Held,
-                        ..Memory::begun(&law, gap.separation.rate)
-                    }
+                    Memory { approach_piece: ApproachPiece::Held, ..Memory::begun(&law, gap.separation.rate) }
                 },
                 eccentricity: gap.eccentricity,
                 rate: gap.eccentricity_rate,
@@ -218,13 +208,7 @@ impl ImplicitContacts {
     }
 
     /// Finds the forces at the end of a step of size `h`. Returns whether a normal turned so far that its arms need updating.
-    pub fn solve(
-        &mut self,
-        model: &Model,
-        h: f64,
-        equations: &mut dyn Equations,
-        counts: &mut Counts,
-    ) -> bool {
+    pub fn solve(&mut self, model: &Model, h: f64, equations: &mut dyn Equations, counts: &mut Counts) -> bool {
         let within = equations.is_block_diagonal();
         for touch in &self.touches {
             let j = touch.joint;
@@ -299,12 +283,7 @@ impl ImplicitContacts {
 
     /// Computes how the contacts move each other.
     fn couple(&mut self) {
-        let Self {
-            band,
-            touches,
-            ranges,
-            ..
-        } = self;
+        let Self { band, touches, ranges, .. } = self;
         let range = |i: usize| ranges[touches[i].joint];
         band.arrange(touches.len(), self.reach, |i, j| {
             let [(first, end), (from, to)] = [i, j].map(range);
@@ -355,17 +334,11 @@ impl ImplicitContacts {
         let band = &self.band;
         for (i, touch) in self.touches.iter().enumerate() {
             for j in band.row(i) {
-                let unit = if i == j {
-                    Mat3::identity()
-                } else {
-                    Mat3::zeros()
-                };
+                let unit = if i == j { Mat3::identity() } else { Mat3::zeros() };
                 let [centre, felt] = &self.mobility[band.at(i, j)];
-                self.blocks[band.at(i, j)] =
-                    unit - (touch.impedance * centre + touch.resistance * felt) * h;
+                self.blocks[band.at(i, j)] = unit - (touch.impedance * centre + touch.resistance * felt) * h;
             }
-            self.right[i] =
-                touch.force - touch.impedance * touch.added - touch.resistance * touch.slipping;
+            self.right[i] = touch.force - touch.impedance * touch.added - touch.resistance * touch.slipping;
         }
         band.factor(&mut self.blocks);
         band.solve(&self.blocks, &mut self.right);

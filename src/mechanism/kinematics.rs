@@ -45,11 +45,7 @@ impl Kinematics {
 
     /// Pose and velocity of a free body at its coordinates: centroid, quaternion (w, x, y, z); velocity, angular velocity.
     #[inline]
-    pub fn move_freely(
-        &mut self,
-        [x, y, z, turn @ ..]: &[f64; 7],
-        &[vx, vy, vz, wx, wy, wz]: &[f64; 6],
-    ) {
+    pub fn move_freely(&mut self, [x, y, z, turn @ ..]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) {
         self.rotation = rotation_of(turn);
         self.position = Vec3::new(*x, *y, *z);
         self.velocity = Vec3::new(vx, vy, vz);
@@ -67,9 +63,7 @@ impl Kinematics {
     pub fn point_acceleration(&self, arm: &Vec3) -> Vec3 {
         self.acceleration
             + self.angular_acceleration.cross(arm)
-            + self
-                .angular_velocity
-                .cross(&self.angular_velocity.cross(arm))
+            + self.angular_velocity.cross(&self.angular_velocity.cross(arm))
     }
 }
 
@@ -106,10 +100,7 @@ impl BallJoint {
     #[inline(always)]
     pub fn opening(&self, motion: &[Kinematics], [ball, socket]: &[Vec3; 2]) -> (Vec3, Vec3) {
         let (b, s) = (&motion[self.ball.body], &motion[self.socket.body]);
-        (
-            (b.position + ball) - (s.position + socket),
-            b.point_velocity(ball) - s.point_velocity(socket),
-        )
+        ((b.position + ball) - (s.position + socket), b.point_velocity(ball) - s.point_velocity(socket))
     }
 
     /// e = Z_j - Z_i, m (5).
@@ -125,8 +116,7 @@ impl BallJoint {
     /// d2e/dt2, m/s^2.
     pub fn opening_acceleration(&self, motion: &[Kinematics]) -> Vec3 {
         let [ball, socket] = &self.arms(motion);
-        motion[self.ball.body].point_acceleration(ball)
-            - motion[self.socket.body].point_acceleration(socket)
+        motion[self.ball.body].point_acceleration(ball) - motion[self.socket.body].point_acceleration(socket)
     }
 }
 
@@ -142,10 +132,7 @@ pub struct Wrench {
 impl Wrench {
     /// No load.
     pub fn zero() -> Self {
-        Self {
-            force: Vec3::zeros(),
-            torque: Vec3::zeros(),
-        }
+        Self { force: Vec3::zeros(), torque: Vec3::zeros() }
     }
 }
 
@@ -157,32 +144,14 @@ pub fn rotation_of(&[w, x, y, z]: &[f64; 4]) -> Mat3 {
     let (wx, wy, wz) = (w * xs, w * ys, w * zs);
     let (xx, xy, xz) = (x * xs, x * ys, x * zs);
     let (yy, yz, zz) = (y * ys, y * zs, z * zs);
-    Mat3::new(
-        1.0 - (yy + zz),
-        xy - wz,
-        xz + wy,
-        xy + wz,
-        1.0 - (xx + zz),
-        yz - wx,
-        xz - wy,
-        yz + wx,
-        1.0 - (xx + yy),
-    )
+    Mat3::new(1.0 - (yy + zz), xy - wz, xz + wy, xy + wz, 1.0 - (xx + zz), yz - wx, xz - wy, yz + wx, 1.0 - (xx + yy))
 }
 
 /// Position rates of a free body: those of its centroid, and dq/dt = 1/2 omega q for its world angular velocity.
 #[inline]
 pub fn free_rate(&[.., w, x, y, z]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) -> [f64; 7] {
     let (a, b, c) = (0.5 * wx, 0.5 * wy, 0.5 * wz);
-    [
-        vx,
-        vy,
-        vz,
-        -a * x - b * y - c * z,
-        a * w + b * z - c * y,
-        b * w + c * x - a * z,
-        c * w + a * y - b * x,
-    ]
+    [vx, vy, vz, -a * x - b * y - c * z, a * w + b * z - c * y, b * w + c * x - a * z, c * w + a * y - b * x]
 }
 
 /// Turns the quaternion at `q` by the small world rotation vector `turn` and normalises it.
@@ -232,9 +201,8 @@ pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bo
         child.position = parent.position + from_parent + arm;
         child.velocity = parent.velocity + wp.cross(&from_parent) + omega.cross(&arm);
         child.angular_velocity = omega;
-        child.acceleration = parent.point_acceleration(&from_parent)
-            + alpha.cross(&arm)
-            + omega.cross(&omega.cross(&arm));
+        child.acceleration =
+            parent.point_acceleration(&from_parent) + alpha.cross(&arm) + omega.cross(&omega.cross(&arm));
         child.angular_acceleration = alpha;
         child.arm = arm;
     } else {
@@ -248,8 +216,7 @@ pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bo
         child.position = parent.position + offset;
         child.velocity = parent.point_velocity(&offset) + velocity;
         child.angular_velocity = wp;
-        child.acceleration =
-            parent.point_acceleration(&offset) + 2.0 * wp.cross(&velocity) + axis * acceleration;
+        child.acceleration = parent.point_acceleration(&offset) + 2.0 * wp.cross(&velocity) + axis * acceleration;
         child.angular_acceleration = parent.angular_acceleration;
         child.arm = arm;
     }
@@ -257,30 +224,20 @@ pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bo
 
 /// Completes a body's acceleration with its own coordinate's acceleration and its parent's full acceleration.
 #[inline]
-pub fn accelerate(
-    child: &mut Kinematics,
-    parent: &Kinematics,
-    revolute: bool,
-    rate: f64,
-    acceleration: f64,
-) {
+pub fn accelerate(child: &mut Kinematics, parent: &Kinematics, revolute: bool, rate: f64, acceleration: f64) {
     let offset = child.position - parent.position;
     let wp = parent.angular_velocity;
     if revolute {
         let from_parent = offset - child.arm;
         let omega = child.angular_velocity;
-        let alpha = parent.angular_acceleration
-            + wp.cross(&(child.axis * rate))
-            + child.axis * acceleration;
+        let alpha = parent.angular_acceleration + wp.cross(&(child.axis * rate)) + child.axis * acceleration;
         child.angular_acceleration = alpha;
-        child.acceleration = parent.point_acceleration(&from_parent)
-            + alpha.cross(&child.arm)
-            + omega.cross(&omega.cross(&child.arm));
+        child.acceleration =
+            parent.point_acceleration(&from_parent) + alpha.cross(&child.arm) + omega.cross(&omega.cross(&child.arm));
     } else {
         child.angular_acceleration = parent.angular_acceleration;
-        child.acceleration = parent.point_acceleration(&offset)
-            + 2.0 * wp.cross(&(child.axis * rate))
-            + child.axis * acceleration;
+        child.acceleration =
+            parent.point_acceleration(&offset) + 2.0 * wp.cross(&(child.axis * rate)) + child.axis * acceleration;
     }
 }
 
@@ -302,9 +259,7 @@ impl Driven {
             time: None,
             coordinates: vec![Jet::default(); model.drives.len()],
             closed: None,
-            bodies: (model.order.iter().copied())
-                .filter(|&b| model.bodies[b].driven_only)
-                .collect(),
+            bodies: (model.order.iter().copied()).filter(|&b| model.bodies[b].driven_only).collect(),
         }
     }
 
@@ -360,10 +315,7 @@ impl Driven {
         let body = &model.bodies[b];
         match body.motion {
             // A slider on the world moves only along its line.
-            Motion::Driven {
-                drive,
-                revolute: false,
-            } if body.parent == model.world() => {
+            Motion::Driven { drive, revolute: false } if body.parent == model.world() => {
                 let q = self.coordinates[drive];
                 let arm = body.axis * q.value + body.fixed * body.to_centroid;
                 let child = &mut motion[b];

@@ -89,26 +89,15 @@ impl Layout {
         let mut add = |rows_of: Rows, child: BodyIndex, parent: BodyIndex| {
             let first = rows;
             rows += rows_of.count();
-            groups.push(Group {
-                rows: rows_of,
-                child,
-                parent,
-                first,
-            });
+            groups.push(Group { rows: rows_of, child, parent, first });
             first
         };
         for (b, (body, joint)) in model.bodies.iter().zip(&scene.joints).enumerate() {
             let pair = match model.linked_at(b) {
                 Some((pair, _)) => *pair,
                 None => {
-                    let child = Anchor {
-                        body: b,
-                        offset: -body.to_centroid,
-                    };
-                    let parent = Anchor {
-                        body: body.parent,
-                        offset: body.from_parent,
-                    };
+                    let child = Anchor { body: b, offset: -body.to_centroid };
+                    let parent = Anchor { body: body.parent, offset: body.from_parent };
                     Pair::new(joint, child, parent)
                 }
             };
@@ -129,10 +118,7 @@ impl Layout {
             .iter()
             .map(|&j| {
                 let joint = &model.joints[j];
-                let point = Rows::Point {
-                    child: joint.ball.offset,
-                    parent: joint.socket.offset,
-                };
+                let point = Rows::Point { child: joint.ball.offset, parent: joint.socket.offset };
                 add(point, joint.ball.body, joint.socket.body)
             })
             .collect();
@@ -144,31 +130,16 @@ impl Layout {
             let ends = own.map(|(first, count)| first..first + count);
             closure_rows.extend(ends.reduce(|a, b| a.start..b.end));
         }
-        Self {
-            groups,
-            rows,
-            driver_row,
-            ideal_row,
-            closure_rows,
-        }
+        Self { groups, rows, driver_row, ideal_row, closure_rows }
     }
 }
 
 impl Lagrange {
     /// For `scene` compiled as `model`.
     pub fn new(scene: &Scene, model: &Model) -> Self {
-        let Layout {
-            groups,
-            rows,
-            driver_row,
-            ideal_row,
-            closure_rows,
-        } = Layout::new(scene, model);
-        let group_of: Vec<usize> = groups
-            .iter()
-            .enumerate()
-            .flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count()))
-            .collect();
+        let Layout { groups, rows, driver_row, ideal_row, closure_rows } = Layout::new(scene, model);
+        let group_of: Vec<usize> =
+            groups.iter().enumerate().flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count())).collect();
         let pairs = pairs_of(&groups, model.world());
         let mut columns = vec![Vec::new(); rows];
         for &(i, j) in &pairs {
@@ -204,16 +175,10 @@ impl Lagrange {
     /// J_i M^-1 J_j^T.
     #[inline]
     fn mobility(&self, model: &Model, i: usize, j: usize) -> f64 {
-        let (gi, gj) = (
-            &self.groups[self.group_of[i]],
-            &self.groups[self.group_of[j]],
-        );
+        let (gi, gj) = (&self.groups[self.group_of[i]], &self.groups[self.group_of[j]]);
         let (ri, rj) = (&self.rows[i].j, &self.rows[j]);
         let mut sum = 0.0;
-        let others = [
-            (gj.child, &rj.j.child[0], &rj.turned[0]),
-            (gj.parent, &rj.j.parent[0], &rj.turned[1]),
-        ];
+        let others = [(gj.child, &rj.j.child[0], &rj.turned[0]), (gj.parent, &rj.j.parent[0], &rj.turned[1])];
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
             if bi == model.bodies.len() {
                 continue;
@@ -292,10 +257,7 @@ impl Equations for Lagrange {
             Motion::Driven { drive, .. } => Some(self.driven.coordinate(drive)),
             Motion::Revolute { .. } | Motion::Prismatic { .. } => match model.linked_at(b) {
                 Some((pair, part)) => pair.coordinates(&self.motion).nth(part),
-                None => Some([
-                    position_of(model, &self.motion, b),
-                    rate_of(model, &self.motion, b),
-                ]),
+                None => Some([position_of(model, &self.motion, b), rate_of(model, &self.motion, b)]),
             },
             Motion::Fixed | Motion::Free { .. } => None,
         }
@@ -340,10 +302,7 @@ impl Equations for Lagrange {
         for (Row { j, turned }, &group) in self.rows.iter_mut().zip(&self.group_of) {
             let group = &self.groups[group];
             let [of_child, of_parent] = turned;
-            for (b, turned, j) in [
-                (group.child, of_child, j.child[1]),
-                (group.parent, of_parent, j.parent[1]),
-            ] {
+            for (b, turned, j) in [(group.child, of_child, j.child[1]), (group.parent, of_parent, j.parent[1])] {
                 if b < model.bodies.len() {
                     *turned = self.inverse_inertia[b] * j;
                 }
@@ -406,13 +365,7 @@ impl Equations for Lagrange {
         false
     }
 
-    fn visit_columns(
-        &self,
-        model: &Model,
-        body: usize,
-        point: &Vec3,
-        mut visit: &mut dyn FnMut(usize, Vec3, Vec3),
-    ) {
+    fn visit_columns(&self, model: &Model, body: usize, point: &Vec3, mut visit: &mut dyn FnMut(usize, Vec3, Vec3)) {
         if body < model.bodies.len() {
             let arm = point - self.motion[body].position;
             visit_free(6 * body, &arm, &mut visit);
@@ -428,9 +381,7 @@ impl Equations for Lagrange {
                 x[6 * b + 3 + i] = alpha[i];
             }
         }
-        let part = |x: &[f64], b: usize, at: usize| {
-            Vec3::new(x[6 * b + at], x[6 * b + at + 1], x[6 * b + at + 2])
-        };
+        let part = |x: &[f64], b: usize, at: usize| Vec3::new(x[6 * b + at], x[6 * b + at + 1], x[6 * b + at + 2]);
         for (i, row) in self.rows.iter().enumerate() {
             let group = &self.groups[self.group_of[i]];
             let mut sum = 0.0;
@@ -558,8 +509,7 @@ impl Equations for Lagrange {
             }
             None => rate_of(model, &self.motion, b),
         };
-        each.map(|(drive, &row)| self.multipliers[row] * rate(drive.body))
-            .sum()
+        each.map(|(drive, &row)| self.multipliers[row] * rate(drive.body)).sum()
     }
 }
 

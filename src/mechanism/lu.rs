@@ -48,12 +48,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     }
 
     /// Factors the matrix of `n` rows with these entries (row, column), and `diagonal` added to its diagonal.
-    pub fn factor(
-        &mut self,
-        n: usize,
-        entries: impl Iterator<Item = (usize, usize, X)>,
-        diagonal: X,
-    ) {
+    pub fn factor(&mut self, n: usize, entries: impl Iterator<Item = (usize, usize, X)>, diagonal: X) {
         self.clear();
         self.n = n;
         self.products = 0;
@@ -83,11 +78,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     /// Distance between two rows.
     #[inline]
     fn stride(&self) -> usize {
-        if self.n < LEAST_SPARSE {
-            self.n
-        } else {
-            self.most
-        }
+        if self.n < LEAST_SPARSE { self.n } else { self.most }
     }
 
     /// Zeroes what the latest matrix filled.
@@ -97,11 +88,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             self.rows[..n * n].fill(X::zero());
             return;
         }
-        for (row, extent) in self
-            .rows
-            .chunks_exact_mut(self.most)
-            .zip(&self.extents[..n])
-        {
+        for (row, extent) in self.rows.chunks_exact_mut(self.most).zip(&self.extents[..n]) {
             row[extent.clone()].fill(X::zero());
         }
     }
@@ -165,8 +152,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             }
             self.pivots[k] = best;
             if best != k {
-                let part = extents[k].start.min(extents[best].start)
-                    ..extents[k].end.max(extents[best].end);
+                let part = extents[k].start.min(extents[best].start)..extents[k].end.max(extents[best].end);
                 let (top, bottom) = a.split_at_mut(best * stride);
                 top[k * stride..][part.clone()].swap_with_slice(&mut bottom[part]);
                 extents.swap(k, best);
@@ -181,11 +167,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             self.filled.extend(filled);
             // What lies side by side is taken several at a time.
             let together = span.len() < 2 * self.filled.len();
-            let width = if together {
-                span.len()
-            } else {
-                self.filled.len()
-            };
+            let width = if together { span.len() } else { self.filled.len() };
             for i in below {
                 let extent = &mut extents[i];
                 if !extent.contains(&k) {

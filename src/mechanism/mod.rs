@@ -111,9 +111,7 @@ pub enum MechanismError {
         clearance: f64,
     },
     /// The loops closed at the start, but on another branch than that of the drives' closed form.
-    #[error(
-        "the loops close on another branch than the drives ask for: start poses are too far off"
-    )]
+    #[error("the loops close on another branch than the drives ask for: start poses are too far off")]
     OtherBranch,
     /// A start pose in which the ideal joints do not determine the velocities.
     #[error(
@@ -183,11 +181,7 @@ impl OpenJoint {
 
     /// What may be open by [`Self::most`].
     fn kind(&self) -> &'static str {
-        if self.ball {
-            "an ideal joint"
-        } else {
-            "a joint that closes a loop"
-        }
+        if self.ball { "an ideal joint" } else { "a joint that closes a loop" }
     }
 
     fn most(&self) -> String {
@@ -201,8 +195,8 @@ impl OpenJoint {
     /// `B by 5 mm along y and by 3 deg`.
     fn stays(&self) -> String {
         let Opening { apart, turned } = &self.opening;
-        let apart = (apart.norm() > start::CLOSED)
-            .then(|| format!(" by {} along {}", length(apart.norm()), axes(apart)));
+        let apart =
+            (apart.norm() > start::CLOSED).then(|| format!(" by {} along {}", length(apart.norm()), axes(apart)));
         let turned = (*turned > start::CLOSED).then(|| format!(" by {}", angle(*turned)));
         let parts: Vec<String> = apart.into_iter().chain(turned).collect();
         format!("{}{}", self.joint, parts.join(" and"))
@@ -215,10 +209,7 @@ impl OpenJoint {
             let speed = format_quantity_digits(apart.norm(), "m/s", 4);
             return format!("opens at {speed} along {}", axes(apart));
         }
-        format!(
-            "is turned open at {}",
-            format_quantity_digits(*turned, "rad/s", 4)
-        )
+        format!("is turned open at {}", format_quantity_digits(*turned, "rad/s", 4))
     }
 }
 
@@ -226,18 +217,10 @@ impl std::fmt::Display for OpenJoint {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let apart = length(self.opening.apart.norm());
         if self.ball {
-            return write!(
-                f,
-                "{}: ball and socket centres are {apart} apart",
-                self.title()
-            );
+            return write!(f, "{}: ball and socket centres are {apart} apart", self.title());
         }
         let turned = angle(self.opening.turned);
-        write!(
-            f,
-            "{}: its bodies are {apart} apart there and turned against it by {turned}",
-            self.title()
-        )
+        write!(f, "{}: its bodies are {apart} apart there and turned against it by {turned}", self.title())
     }
 }
 
@@ -254,10 +237,7 @@ fn axes(vector: &Vec3) -> String {
     let largest = vector.amax();
     let named = ["x", "y", "z"].into_iter().zip(vector.iter());
     let named = named.filter(|(_, part)| part.abs() > 0.05 * largest);
-    named
-        .map(|(axis, _)| axis)
-        .collect::<Vec<_>>()
-        .join(" and ")
+    named.map(|(axis, _)| axis).collect::<Vec<_>>().join(" and ")
 }
 
 fn unclosed(stays: &[OpenJoint]) -> String {
@@ -265,10 +245,7 @@ fn unclosed(stays: &[OpenJoint]) -> String {
         return ": the parts do not reach, or the guess is too far off".to_owned();
     }
     let each: Vec<String> = stays.iter().map(OpenJoint::stays).collect();
-    format!(
-        ": remaining gaps: {} (no joint can move that way)",
-        each.join(", ")
-    )
+    format!(": remaining gaps: {} (no joint can move that way)", each.join(", "))
 }
 
 /// Identifies the equations of a mechanism: two are equal if their states are interchangeable.
@@ -380,10 +357,7 @@ impl Mechanism {
 
     /// What a snapshot stores about the equations.
     pub fn structure(&self) -> Structure {
-        Structure {
-            model: self.model.clone(),
-            rank: self.rank,
-        }
+        Structure { model: self.model.clone(), rank: self.rank }
     }
 
     /// Whether `structure` belongs to these equations.
@@ -527,9 +501,7 @@ impl Mechanism {
     /// all of them, in N and N m.
     pub fn is_reaction_unique(&self, j: usize) -> bool {
         match self.model.joints.get(j) {
-            Some(joint) => joint
-                .ideal
-                .is_none_or(|k| self.equations.is_reaction_unique(k)),
+            Some(joint) => joint.ideal.is_none_or(|k| self.equations.is_reaction_unique(k)),
             None => {
                 let c = j - self.model.joints.len();
                 self.equations.is_closure_unique(c)
@@ -688,8 +660,7 @@ impl Mechanism {
             let (dimension, positions) = (self.dimension(), self.positions());
             let (contacts, within) = (&self.contacts, self.equations.is_block_diagonal());
             let velocities = dimension - positions;
-            let friction =
-                friction::Friction::new(&self.model, contacts, velocities, dimension, within)?;
+            let friction = friction::Friction::new(&self.model, contacts, velocities, dimension, within)?;
             self.friction = Some(Box::new(friction));
         }
         Ok(())
@@ -725,11 +696,7 @@ impl Mechanism {
 
     /// Most velocity coordinates with which the automatic choice steps implicitly, too.
     pub fn largest_implicit(&self) -> usize {
-        if self.equations.is_block_diagonal() {
-            LARGEST_DENSE
-        } else {
-            bounds::LARGEST_COUPLED
-        }
+        if self.equations.is_block_diagonal() { LARGEST_DENSE } else { bounds::LARGEST_COUPLED }
     }
 
     /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.

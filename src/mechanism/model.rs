@@ -7,9 +7,7 @@ use super::drives::{Course, Law, course_of};
 use super::factor::{NONE, Pattern};
 use super::spcmm::Trajectory;
 use crate::jet::Jet;
-use crate::scene::{
-    Attachment, Drive, Freedom, Joint, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3,
-};
+use crate::scene::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
 /// Index of a body: those of the scene, then massless links; one past the last stands for the world.
 pub type BodyIndex = usize;
@@ -121,11 +119,7 @@ impl Pair {
     /// Of `joint` between these points.
     pub fn new(joint: &Joint, child: Anchor, parent: Anchor) -> Self {
         let x = joint.axis;
-        let across = if x.x.abs() < 0.7 {
-            Vec3::x()
-        } else {
-            Vec3::y()
-        };
+        let across = if x.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
         let y = x.cross(&across).normalize();
         let axes = [x, y, x.cross(&y)];
         Self {
@@ -200,9 +194,7 @@ impl Model {
         let mut root = vec![usize::MAX; world];
         for (index, (body, joint)) in scene.bodies.iter().zip(&scene.joints).enumerate() {
             let parent = joint.parent.unwrap_or(world);
-            let parent_centre = joint
-                .parent
-                .map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
+            let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
             let mut moves = |freedom: Freedom, drive: &Option<Drive>, body| {
                 let revolute = freedom.turns();
                 match drive {
@@ -232,11 +224,7 @@ impl Model {
                 Motion::Fixed | Motion::Driven { .. } => usize::MAX,
                 _ => body,
             };
-            let mut above = if parent == world {
-                usize::MAX
-            } else {
-                root[parent]
-            };
+            let mut above = if parent == world { usize::MAX } else { root[parent] };
             if let Some(motion) = &of_link {
                 above = root_below(above, link, motion);
                 root[link] = above;
@@ -251,14 +239,8 @@ impl Model {
             let to_centroid = body.centre - joint.child_point;
             let (mut hangs_on, mut from, mut axis) = (parent, from_parent, joint.axis);
             if let Some(motion) = of_link {
-                let child = Anchor {
-                    body: index,
-                    offset: -to_centroid,
-                };
-                let of_parent = Anchor {
-                    body: parent,
-                    offset: from_parent,
-                };
+                let child = Anchor { body: index, offset: -to_centroid };
+                let of_parent = Anchor { body: parent, offset: from_parent };
                 linked.push(Pair::new(joint, child, of_parent));
                 links.push(Body {
                     driven_only: root[link] == usize::MAX,
@@ -326,10 +308,7 @@ impl Model {
             scale: Vec::new(),
             length_scale: Scales::of(scene).length,
             output_body: scene.output.body,
-            probe: scene
-                .output
-                .probe
-                .map(|p| p - scene.bodies[scene.output.body].centre),
+            probe: scene.output.probe.map(|p| p - scene.bodies[scene.output.body].centre),
             shortest_period,
             bounding,
         };
@@ -376,9 +355,7 @@ impl Model {
     pub fn anchor(&self, scene: &Scene, point: &Attachment) -> Anchor {
         Anchor {
             body: point.body.unwrap_or(self.bodies.len()),
-            offset: point
-                .body
-                .map_or(point.point, |b| point.point - scene.bodies[b].centre),
+            offset: point.body.map_or(point.point, |b| point.point - scene.bodies[b].centre),
         }
     }
 
@@ -407,11 +384,7 @@ impl Model {
             let first = start_v.len();
             let mut parent_coordinate = Vec::new();
             for b in bodies {
-                let above = if b == tree {
-                    NONE
-                } else {
-                    last[self.bodies[b].parent]
-                };
+                let above = if b == tree { NONE } else { last[self.bodies[b].parent] };
                 last[b] = above;
                 let (q, v) = (start_q.len(), start_v.len());
                 let [position, velocity] = self.start_of(scene, b);
@@ -435,8 +408,7 @@ impl Model {
                     }
                     Motion::Free { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        let (position, rotation, velocity, spin) =
-                            free_start(scene.joints[b].start);
+                        let (position, rotation, velocity, spin) = free_start(scene.joints[b].start);
                         let centre = rotation * scene.bodies[b].centre;
                         start_q.extend((position + centre).iter());
                         start_q.extend([rotation.w, rotation.i, rotation.j, rotation.k]);
@@ -455,8 +427,7 @@ impl Model {
                     Motion::Fixed | Motion::Driven { .. } => {}
                 }
             }
-            let lone = (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. }))
-                .then_some(tree);
+            let lone = (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. })).then_some(tree);
             self.blocks.push(TreeBlock {
                 v: first,
                 n: parent_coordinate.len(),
@@ -485,9 +456,7 @@ impl Model {
     /// Driven coordinate `drive` at `t`.
     pub fn drive(&self, drive: usize, t: f64, closed: Option<&ClosedMotion>) -> Jet {
         match &self.drives[drive].course {
-            Course::ClosedForm(coordinate) => {
-                closed.map_or_else(Jet::default, |motion| motion.driven[*coordinate])
-            }
+            Course::ClosedForm(coordinate) => closed.map_or_else(Jet::default, |motion| motion.driven[*coordinate]),
             Course::Own(law) => law.at(t),
         }
     }
@@ -506,11 +475,7 @@ fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
         return [rest, Mat3::zeros(), Mat3::zeros()];
     }
     let along = axis * axis.transpose();
-    [
-        along * rest,
-        (Mat3::identity() - along) * rest,
-        axis.cross_matrix() * rest,
-    ]
+    [along * rest, (Mat3::identity() - along) * rest, axis.cross_matrix() * rest]
 }
 
 /// The massless link of a joint of two degrees: on a slide of a cylindrical joint, on the first hinge of a universal one, which
@@ -545,18 +510,12 @@ fn closed_form_of(scene: &Scene) -> Option<Arc<dyn ClosedForm>> {
 
 fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
     match start {
-        JointStart::Pose {
-            position,
-            rotation,
-            velocity,
-            angular_velocity,
-        } => (position, rotation, velocity, angular_velocity),
-        JointStart::Scalar { .. } | JointStart::Pair { .. } => (
-            Vec3::zeros(),
-            Quat::identity(),
-            Vec3::zeros(),
-            Vec3::zeros(),
-        ),
+        JointStart::Pose { position, rotation, velocity, angular_velocity } => {
+            (position, rotation, velocity, angular_velocity)
+        }
+        JointStart::Scalar { .. } | JointStart::Pair { .. } => {
+            (Vec3::zeros(), Quat::identity(), Vec3::zeros(), Vec3::zeros())
+        }
     }
 }
 
@@ -580,11 +539,6 @@ impl Scales {
             .chain(closing.map(|_| scene.contact.ball_radius))
             .fold(f64::INFINITY, f64::min)
             .min(1.0);
-        Self {
-            length,
-            speed: length / 0.1,
-            angle: 0.1,
-            angular_speed: 1.0,
-        }
+        Self { length, speed: length / 0.1, angle: 0.1, angular_speed: 1.0 }
     }
 }

@@ -14,21 +14,10 @@ pub enum Rows {
     /// A vector of the child stays perpendicular to one of the parent: 1 row, as in (46), (47).
     Perpendicular { child: Vec3, parent: Vec3 },
     /// The child's point stays at `parent + s along`, s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
-    Offset {
-        child: Vec3,
-        parent: Vec3,
-        along: Vec3,
-        drive: Option<usize>,
-    },
+    Offset { child: Vec3, parent: Vec3, along: Vec3, drive: Option<usize> },
     /// Angle from the parent's `zero` to the child's `child` about `axis`, of the parent or `in_child`, is the driven coordinate:
     /// 1 row.
-    Angle {
-        child: Vec3,
-        zero: Vec3,
-        axis: Vec3,
-        in_child: bool,
-        drive: usize,
-    },
+    Angle { child: Vec3, zero: Vec3, axis: Vec3, in_child: bool, drive: usize },
 }
 
 /// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
@@ -41,11 +30,7 @@ pub struct JacobianRow {
 impl Rows {
     /// Number of rows.
     pub fn count(&self) -> usize {
-        if matches!(self, Self::Point { .. }) {
-            3
-        } else {
-            1
-        }
+        if matches!(self, Self::Point { .. }) { 3 } else { 1 }
     }
 
     /// Whether it is about orientation, not points.
@@ -74,10 +59,7 @@ impl Rows {
                 for i in 0..3 {
                     let mut e = zero;
                     e[i] = 1.0;
-                    let row = JacobianRow {
-                        child: [e, dc.cross(&e)],
-                        parent: [-e, e.cross(&dp)],
-                    };
+                    let row = JacobianRow { child: [e, dc.cross(&e)], parent: [-e, e.cross(&dp)] };
                     found(i, row, [phi[i], rate[i], acceleration[i]]);
                 }
             }
@@ -86,20 +68,12 @@ impl Rows {
                 let cross = a.cross(&b);
                 let relative = wc - wp;
                 let turning = wc.cross(&a).cross(&b) + a.cross(&wp.cross(&b));
-                let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&cross)
-                    + relative.dot(&turning);
-                let row = JacobianRow {
-                    child: [zero, cross],
-                    parent: [zero, -cross],
-                };
+                let acceleration =
+                    (c.angular_acceleration - p.angular_acceleration).dot(&cross) + relative.dot(&turning);
+                let row = JacobianRow { child: [zero, cross], parent: [zero, -cross] };
                 found(0, row, [a.dot(&b), relative.dot(&cross), acceleration]);
             }
-            Self::Offset {
-                child,
-                parent,
-                along,
-                drive,
-            } => {
+            Self::Offset { child, parent, along, drive } => {
                 let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
                 let f = drive.map_or(Jet::default(), |d| driven[d]);
                 let d = (c.position + dc) - (p.position + dp);
@@ -110,25 +84,12 @@ impl Rows {
                 let phi = b.dot(&d) - f.value;
                 let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
                 let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
-                let row = JacobianRow {
-                    child: [b, dc.cross(&b)],
-                    parent: [-b, b.cross(&dp) + b.cross(&d)],
-                };
+                let row = JacobianRow { child: [b, dc.cross(&b)], parent: [-b, b.cross(&dp) + b.cross(&d)] };
                 found(0, row, [phi, rate, acceleration]);
             }
-            Self::Angle {
-                child,
-                zero: reference,
-                axis,
-                in_child,
-                drive,
-            } => {
+            Self::Angle { child, zero: reference, axis, in_child, drive } => {
                 let of_axis = if in_child { c } else { p };
-                let (a, b, x) = (
-                    c.rotation * child,
-                    p.rotation * reference,
-                    of_axis.rotation * axis,
-                );
+                let (a, b, x) = (c.rotation * child, p.rotation * reference, of_axis.rotation * axis);
                 let f = driven[drive];
                 let angle = libm::atan2(b.cross(&a).dot(&x), b.dot(&a));
                 // A driven crank turns many times: compare modulo a turn.
@@ -138,10 +99,7 @@ impl Rows {
                 let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
                     + relative.dot(&of_axis.angular_velocity.cross(&x))
                     - f.acceleration;
-                let row = JacobianRow {
-                    child: [zero, x],
-                    parent: [zero, -x],
-                };
+                let row = JacobianRow { child: [zero, x], parent: [zero, -x] };
                 found(0, row, [phi, relative.dot(&x) - f.rate, acceleration]);
             }
         }
@@ -174,33 +132,19 @@ impl Pair {
             JointKind::Cylindrical => (&slides, &along),
         };
         let perpendicular = |&(child, parent): &(Vec3, Vec3)| Rows::Perpendicular { child, parent };
-        [
-            points.to_vec(),
-            orientation.iter().map(perpendicular).collect(),
-        ]
+        [points.to_vec(), orientation.iter().map(perpendicular).collect()]
     }
 
     /// The row that prescribes its coordinate `part`.
     pub fn driven_row(&self, part: usize, drive: usize) -> Rows {
-        let about_axis = |child: Vec3, zero: Vec3| Rows::Angle {
-            child,
-            zero,
-            axis: self.axes[0],
-            in_child: false,
-            drive,
-        };
+        let about_axis =
+            |child: Vec3, zero: Vec3| Rows::Angle { child, zero, axis: self.axes[0], in_child: false, drive };
         match (self.kind, part) {
-            (JointKind::Prismatic | JointKind::Cylindrical, 0) => {
-                self.offset(&self.axes[0], Some(drive))
-            }
+            (JointKind::Prismatic | JointKind::Cylindrical, 0) => self.offset(&self.axes[0], Some(drive)),
             (JointKind::Universal, 0) => about_axis(self.second, self.second_at_zero()),
-            (JointKind::Universal, _) => Rows::Angle {
-                child: self.seen[0],
-                zero: self.axes[0],
-                axis: self.second,
-                in_child: true,
-                drive,
-            },
+            (JointKind::Universal, _) => {
+                Rows::Angle { child: self.seen[0], zero: self.axes[0], axis: self.second, in_child: true, drive }
+            }
             _ => about_axis(self.seen[1], self.axes[1]),
         }
     }
@@ -212,19 +156,11 @@ impl Pair {
     }
 
     fn point(&self) -> Rows {
-        Rows::Point {
-            child: self.child.offset,
-            parent: self.parent.offset,
-        }
+        Rows::Point { child: self.child.offset, parent: self.parent.offset }
     }
 
     fn offset(&self, along: &Vec3, drive: Option<usize>) -> Rows {
-        Rows::Offset {
-            child: self.child.offset,
-            parent: self.parent.offset,
-            along: *along,
-            drive,
-        }
+        Rows::Offset { child: self.child.offset, parent: self.parent.offset, along: *along, drive }
     }
 
     /// Whether the child's point moves along the axis.
@@ -242,11 +178,7 @@ impl Pair {
     pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
         let [c, p] = self.ends(motion);
         let arm = c.rotation * self.child.offset;
-        let other = if self.slides() {
-            c.position + arm - p.position
-        } else {
-            p.rotation * self.parent.offset
-        };
+        let other = if self.slides() { c.position + arm - p.position } else { p.rotation * self.parent.offset };
         [arm, other]
     }
 
@@ -266,13 +198,7 @@ impl Pair {
             let angle = libm::atan2(from.cross(to).dot(about), from.dot(to));
             [angle, about.dot(&spin)]
         };
-        let hinge = || {
-            turn(
-                &axis,
-                &(p.rotation * self.axes[1]),
-                &(c.rotation * self.seen[1]),
-            )
-        };
+        let hinge = || turn(&axis, &(p.rotation * self.axes[1]), &(c.rotation * self.seen[1]));
         let both = match self.kind {
             JointKind::Fixed | JointKind::Free => [None, None],
             JointKind::Prismatic => [Some(slide()), None],
@@ -282,10 +208,7 @@ impl Pair {
                 let second = c.rotation * self.second;
                 let zero = p.rotation * self.second_at_zero();
                 let first = turn(&axis, &zero, &second);
-                [
-                    Some(first),
-                    Some(turn(&second, &axis, &(c.rotation * self.seen[0]))),
-                ]
+                [Some(first), Some(turn(&second, &axis, &(c.rotation * self.seen[0])))]
             }
         };
         both.into_iter().flatten()
@@ -296,13 +219,8 @@ impl Pair {
         let [c, p] = self.ends(motion);
         let axes = self.axes.map(|axis| p.rotation * axis);
         let seen = self.seen.map(|axis| c.rotation * axis);
-        let gap = (c.position + c.rotation * self.child.offset)
-            - (p.position + p.rotation * self.parent.offset);
-        let apart = if self.slides() {
-            gap - axes[0] * axes[0].dot(&gap)
-        } else {
-            gap
-        };
+        let gap = (c.position + c.rotation * self.child.offset) - (p.position + p.rotation * self.parent.offset);
+        let apart = if self.slides() { gap - axes[0] * axes[0].dot(&gap) } else { gap };
         let turned = match self.kind {
             JointKind::Free => 0.0,
             JointKind::Revolute | JointKind::Cylindrical => {
@@ -331,15 +249,10 @@ impl Pair {
             let mut sum = Vec3::zeros();
             for rows in rows {
                 let part = usize::from(rows.turns());
-                rows.linearise(c, p, &[], |_, row, [_, rate, _]| {
-                    sum += row.child[part] * rate
-                });
+                rows.linearise(c, p, &[], |_, row, [_, rate, _]| sum += row.child[part] * rate);
             }
             sum
         });
-        Opening {
-            apart: rates[0],
-            turned: rates[1].norm(),
-        }
+        Opening { apart: rates[0], turned: rates[1].norm() }
     }
 }

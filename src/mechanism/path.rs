@@ -37,11 +37,7 @@ impl Path {
         let mut path = Self::default();
         for b in bodies {
             let body = &model.bodies[b];
-            let of = if body.driven_only {
-                &mut path.driven
-            } else {
-                &mut path.dynamic
-            };
+            let of = if body.driven_only { &mut path.driven } else { &mut path.dynamic };
             of.push(b);
             match body.motion {
                 Motion::Free { q, v } => path.add_parts(q..q + 7, model.nq + v, 6),

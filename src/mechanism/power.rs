@@ -31,10 +31,7 @@ impl Sources {
             free_rider |= moved[b] && !body.driven_only;
         }
         let prescribed = equations.prescribes_drives() && !free_rider;
-        Self {
-            none: !drives && !contacts && elements == 0,
-            forces_suffice: !drives || prescribed,
-        }
+        Self { none: !drives && !contacts && elements == 0, forces_suffice: !drives || prescribed }
     }
 }
 

@@ -24,11 +24,7 @@ pub struct RowSystem {
 impl RowSystem {
     /// For rows that couple with these `columns` before their own.
     pub fn new(columns: Vec<Vec<usize>>) -> Self {
-        Self {
-            reference: vec![0.0; columns.len()],
-            skyline: Skyline::new(columns),
-            dependent: None,
-        }
+        Self { reference: vec![0.0; columns.len()], skyline: Skyline::new(columns), dependent: None }
     }
 
     /// Says what an entry on the diagonal of the rows from `first` on would be, could their sides move freely in their unit.
@@ -186,11 +182,7 @@ impl Dependent {
         // A group that nothing moves has no scale; all its entries are 0.
         for i in (0..n).rev() {
             let largest = self.scale[self.group[i]];
-            self.scale[i] = if largest > 0.0 {
-                1.0 / largest.sqrt()
-            } else {
-                1.0
-            };
+            self.scale[i] = if largest > 0.0 { 1.0 / largest.sqrt() } else { 1.0 };
         }
         for (i, place) in self.order.iter_mut().enumerate() {
             *place = i;
@@ -276,11 +268,8 @@ impl Dependent {
                 for k in 0..j {
                     sum -= self.gram[i * n + k] * self.gram[j * n + k];
                 }
-                self.gram[i * n + j] = if i == j {
-                    sum.max(f64::MIN_POSITIVE).sqrt()
-                } else {
-                    sum / self.gram[j * n + j]
-                };
+                self.gram[i * n + j] =
+                    if i == j { sum.max(f64::MIN_POSITIVE).sqrt() } else { sum / self.gram[j * n + j] };
             }
         }
     }

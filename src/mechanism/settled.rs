@@ -34,17 +34,13 @@ pub(super) fn settle(scene: &Scene) -> Result<Settled, MechanismError> {
     let assembly = mechanism.assembly().clone();
     for _ in 0..ROUNDS {
         let mut rate = vec![0.0; state.len()];
-        mechanism
-            .evaluator(Touching::Nothing)
-            .evaluate_fully(0.0, &state, &mut rate);
+        mechanism.evaluator(Touching::Nothing).evaluate_fully(0.0, &state, &mut rate);
         for (j, joint) in scene.ball_joints.iter().enumerate() {
             if joint.contact.clearance == 0.0 {
                 continue;
             }
             // Balls that share a load, it is not known how, stay in the middle: the loops could not close with both on a wall.
-            let force = mechanism
-                .reaction(j)
-                .filter(|_| mechanism.is_reaction_unique(j));
+            let force = mechanism.reaction(j).filter(|_| mechanism.is_reaction_unique(j));
             let force = force.unwrap_or_default();
             let eccentricity = resting_place(&joint.contact, force);
             let turned_back = match joint.ball.body {

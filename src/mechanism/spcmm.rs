@@ -88,20 +88,7 @@ impl Trajectory {
         let (x1, y1) = (x_relative + b * wx, y + b * wy);
         let (x2, y2) = (x_relative - b * wx, y - b * wy);
         let left = [rod2 - x1 * x1 - y1 * y1, rod2 - x2 * x2 - y2 * y2, quarter];
-        (
-            left,
-            Parts {
-                x_relative,
-                y,
-                sb,
-                cb,
-                beta,
-                c_,
-                lead,
-                half,
-                wz,
-            },
-        )
+        (left, Parts { x_relative, y, sb, cb, beta, c_, lead, half, wz })
     }
 }
 
@@ -110,17 +97,7 @@ impl ClosedForm for Trajectory {
     /// it turns at the rate of beta about Z. NaN where a rod is too short.
     fn at(&self, t: f64) -> ClosedMotion {
         let (left, parts) = self.evaluate(t);
-        let Parts {
-            x_relative,
-            y,
-            sb,
-            cb,
-            beta,
-            c_,
-            lead,
-            half,
-            wz,
-        } = parts;
+        let Parts { x_relative, y, sb, cb, beta, c_, lead, half, wz } = parts;
         let f3 = (half + left[2].sqrt()) * lead.recip();
         let z = c_ * (f3 - y) - self.tan_gamma * (x_relative * cb);
         let along = Jet::constant(self.p.hinge_radius * wz);
@@ -140,11 +117,7 @@ impl ClosedForm for Trajectory {
     /// Searches one whole period for a rod that is too short, and names the one that is by the most.
     fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
-        let period = if self.p.frequency > 0.0 {
-            self.period()
-        } else {
-            0.0
-        };
+        let period = if self.p.frequency > 0.0 { self.period() } else { 0.0 };
         let has = self.p.driven_rod;
         let mut worst: Option<Unreachable> = None;
         for n in 0..=SAMPLES {
@@ -155,20 +128,11 @@ impl ClosedForm for Trajectory {
                     continue;
                 }
                 // Slider 3 sees a slanted line: its quarter discriminant is `lead` times the missing square.
-                let missing = if i == 2 {
-                    square.value / parts.lead.value
-                } else {
-                    square.value
-                };
+                let missing = if i == 2 { square.value / parts.lead.value } else { square.value };
                 let needs = (has * has - missing).sqrt();
                 if worst.is_none_or(|w| needs > w.needs) {
                     let slider = i as u8 + 1;
-                    worst = Some(Unreachable {
-                        slider,
-                        time,
-                        needs,
-                        has,
-                    });
+                    worst = Some(Unreachable { slider, time, needs, has });
                 }
             }
         }
@@ -222,54 +186,28 @@ mod tests {
         // The reference trajectories' first row; 0.143 m tan(pi / 12).
         assert!((ideal.position[2].value + 0.0383167345177).abs() < 1e-12);
         let half = Trajectory::new(&paper()).at(0.5);
-        for (f, value) in half
-            .driven
-            .iter()
-            .zip([0.0902403840, 0.2210909323, 0.1575618239])
-        {
+        for (f, value) in half.driven.iter().zip([0.0902403840, 0.2210909323, 0.1575618239]) {
             assert!((f.value - value).abs() < 1e-10, "{f:?}");
         }
     }
 
     #[test]
     fn square_roots_stay_real_in_the_range_the_contract_gives() {
-        for (socket_plane, reachable) in [
-            (0.041518, true),
-            (0.041516, false),
-            (0.364482, true),
-            (0.364484, false),
-        ] {
-            let p = Spcmm {
-                slider_plane: socket_plane - 0.028,
-                ..paper()
-            };
-            assert_eq!(
-                Trajectory::new(&p).check().is_ok(),
-                reachable,
-                "x_s = {socket_plane}"
-            );
+        for (socket_plane, reachable) in [(0.041518, true), (0.041516, false), (0.364482, true), (0.364484, false)] {
+            let p = Spcmm { slider_plane: socket_plane - 0.028, ..paper() };
+            assert_eq!(Trajectory::new(&p).check().is_ok(), reachable, "x_s = {socket_plane}");
         }
     }
 
     #[test]
     fn names_the_slider_whose_rod_is_too_short() {
-        let p = Spcmm {
-            slider_plane: 0.0,
-            ..paper()
-        };
+        let p = Spcmm { slider_plane: 0.0, ..paper() };
         let Err(MechanismError::Unreachable(error)) = Trajectory::new(&p).check() else {
             panic!("the rod is long enough");
         };
         assert_eq!(error.slider, 1);
-        let near = Unreachable {
-            needs: 0.200_000_3,
-            ..error
-        };
-        assert!(
-            near.to_string()
-                .ends_with("needs 0.20000030 m, has 0.20000000 m"),
-            "{near}"
-        );
+        let near = Unreachable { needs: 0.200_000_3, ..error };
+        assert!(near.to_string().ends_with("needs 0.20000030 m, has 0.20000000 m"), "{near}");
         assert!(error.needs > 0.2, "{error}");
     }
 }

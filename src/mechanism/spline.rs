@@ -30,12 +30,7 @@ impl Spline {
         let curvatures = curvatures(&widths, &rises, ends);
         let cubic = |(i, (h, rise)): (usize, (&f64, &f64))| {
             let (m0, m1) = (curvatures[i], curvatures[i + 1]);
-            [
-                points[i][1],
-                rise / h - h * (2.0 * m0 + m1) / 6.0,
-                m0 / 2.0,
-                (m1 - m0) / (6.0 * h),
-            ]
+            [points[i][1], rise / h - h * (2.0 * m0 + m1) / 6.0, m0 / 2.0, (m1 - m0) / (6.0 * h)]
         };
         Self {
             knots: points.iter().map(|point| point[0]).collect(),
@@ -58,11 +53,7 @@ impl Spline {
         let i = self.next(x).clamp(1, self.cubics.len()) - 1;
         let [a, b, c, d] = self.cubics[i];
         let s = x - self.knots[i];
-        Jet::new(
-            a + s * (b + s * (c + s * d)),
-            b + s * (2.0 * c + 3.0 * s * d),
-            2.0 * c + 6.0 * s * d,
-        )
+        Jet::new(a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d), 2.0 * c + 6.0 * s * d)
     }
 }
 
@@ -71,12 +62,8 @@ fn curvatures(widths: &[f64], rises: &[f64], ends: Ends) -> Vec<f64> {
     let n = widths.len();
     let slope = |i: usize| rises[i] / widths[i];
     // Row i: below[i] m[i - 1] + on[i] m[i] + above[i] m[i + 1] = right[i].
-    let (mut below, mut on, mut above, mut right) = (
-        vec![0.0; n + 1],
-        vec![0.0; n + 1],
-        vec![0.0; n + 1],
-        vec![0.0; n + 1],
-    );
+    let (mut below, mut on, mut above, mut right) =
+        (vec![0.0; n + 1], vec![0.0; n + 1], vec![0.0; n + 1], vec![0.0; n + 1]);
     for i in 1..n {
         (below[i], above[i]) = (widths[i - 1], widths[i]);
         on[i] = 2.0 * (widths[i - 1] + widths[i]);

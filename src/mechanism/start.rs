@@ -61,18 +61,10 @@ impl Mechanism {
         const T: f64 = 0.0;
         let model = &self.model;
         let assembled = model.start == StartRule::Ideal;
-        let all: Vec<usize> = if assembled {
-            (0..model.joints.len()).collect()
-        } else {
-            model.ideal_joints.clone()
-        };
+        let all: Vec<usize> = if assembled { (0..model.joints.len()).collect() } else { model.ideal_joints.clone() };
         let closes = !all.is_empty() || !model.closures.is_empty();
         // Poses alone need no mass matrix.
-        let mut tree = if closes {
-            Tree::new(model)
-        } else {
-            Tree::without_masses(model)
-        };
+        let mut tree = if closes { Tree::new(model) } else { Tree::without_masses(model) };
         let settled = self.settled.as_ref().map(|settled| &settled.state);
         let mut y = settled.unwrap_or(&model.start_state).clone();
         let closed_form = model.closed_form.as_deref().filter(|_| assembled);
@@ -95,11 +87,7 @@ impl Mechanism {
                     return Err(MechanismError::Open { given });
                 }
             } else if d > clearance + 0.01 * self.contacts.coefficients(j).ball_radius {
-                return Err(MechanismError::OutsideSocket {
-                    joint: joint(),
-                    distance: d,
-                    clearance,
-                });
+                return Err(MechanismError::OutsideSocket { joint: joint(), distance: d, clearance });
             }
         }
         let balls = model.joints.len();
@@ -149,12 +137,7 @@ impl Mechanism {
     }
 
     /// Closes the joints of `constraints` from the guess in `y`.
-    fn assemble(
-        &self,
-        constraints: &mut Constraints,
-        tree: &mut Tree,
-        y: &mut Vec<f64>,
-    ) -> Result<(), MechanismError> {
+    fn assemble(&self, constraints: &mut Constraints, tree: &mut Tree, y: &mut Vec<f64>) -> Result<(), MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
         let guess = y.clone();
@@ -196,11 +179,7 @@ impl Mechanism {
 
     /// A joint at which trees are cut: ball joints, then joints that close loops.
     fn gap(&self, joint: usize, opening: Opening) -> OpenJoint {
-        OpenJoint {
-            joint: self.joint_names[joint].clone(),
-            ball: joint < self.model.joints.len(),
-            opening,
-        }
+        OpenJoint { joint: self.joint_names[joint].clone(), ball: joint < self.model.joints.len(), opening }
     }
 
     /// Ball joint `joint` with e = Z_j - Z_i, or its rate.
@@ -241,44 +220,29 @@ impl Mechanism {
     }
 
     /// The error for loops that are still open at `y`.
-    fn no_closure(
-        &self,
-        constraints: &mut Constraints,
-        tree: &mut Tree,
-        guess: &[f64],
-        y: &[f64],
-    ) -> MechanismError {
+    fn no_closure(&self, constraints: &mut Constraints, tree: &mut Tree, guess: &[f64], y: &[f64]) -> MechanismError {
         const T: f64 = 0.0;
         let model = &self.model;
         let mut again = y.to_vec();
         constraints.project(model, tree, T, &mut again);
         let steps = again.iter().zip(y).zip(&model.scale).take(model.nq);
-        let at_rest = steps
-            .map(|((a, b), scale)| (a - b).abs() / scale)
-            .all(|moved| moved <= AT_REST);
+        let at_rest = steps.map(|((a, b), scale)| (a - b).abs() / scale).all(|moved| moved <= AT_REST);
         tree.update_kinematics(model, T, &again);
         let mut stays = Vec::new();
         if at_rest {
             stays = self.gaps(constraints, &tree.motion);
-            stays.retain(|OpenJoint { opening, .. }| {
-                opening.apart.norm() > CLOSED || opening.turned > CLOSED
-            });
+            stays.retain(|OpenJoint { opening, .. }| opening.apart.norm() > CLOSED || opening.turned > CLOSED);
         }
         tree.update_kinematics(model, T, guess);
         let given = self.gaps(constraints, &tree.motion);
-        let size =
-            |gap: &OpenJoint| gap.opening.apart.norm() + gap.opening.turned * model.length_scale;
+        let size = |gap: &OpenJoint| gap.opening.apart.norm() + gap.opening.turned * model.length_scale;
         let widest = given.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
         let given = widest.unwrap_or_else(|| unreachable!("something did not close"));
         MechanismError::NoClosure { given, stays }
     }
 
     /// Rank of the closed joints' rows in the assembled pose `y` and around it; `None` if all are independent.
-    fn rank_of_closed_joints(
-        &self,
-        tree: &mut Tree,
-        y: &[f64],
-    ) -> Result<Option<usize>, MechanismError> {
+    fn rank_of_closed_joints(&self, tree: &mut Tree, y: &[f64]) -> Result<Option<usize>, MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
         if !model.closes_loops() {
@@ -298,30 +262,20 @@ impl Mechanism {
             factor_at(model, &mut constraints, tree, T, y);
             let closures = model.joints.len()..self.cut_joints();
             let names = model.ideal_joints.iter().copied().chain(closures);
-            let shared = names
-                .enumerate()
-                .filter(|&(k, _)| !constraints.is_unique(k));
-            MechanismError::Branching {
-                joints: shared.map(|(_, j)| self.joint_names[j].clone()).collect(),
-            }
+            let shared = names.enumerate().filter(|&(k, _)| !constraints.is_unique(k));
+            MechanismError::Branching { joints: shared.map(|(_, j)| self.joint_names[j].clone()).collect() }
         })
     }
 
     /// Whether the force of actuator `i` is unique at the latest evaluation.
     pub fn is_actuator_unique(&mut self, i: usize) -> bool {
-        self.equations
-            .is_actuator_unique(&self.model, &self.gravity, i)
+        self.equations.is_actuator_unique(&self.model, &self.gravity, i)
     }
 }
 
 /// Rank of `constraints`, treated as dependent, at the assembled state `y` if it is the same in neighbouring poses; `None`
 /// if it is larger there: the pose is singular.
-fn rank_around(
-    model: &Model,
-    constraints: &mut Constraints,
-    tree: &mut Tree,
-    y: &[f64],
-) -> Option<usize> {
+fn rank_around(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y: &[f64]) -> Option<usize> {
     const T: f64 = 0.0;
     factor_at(model, constraints, tree, T, y);
     let rank = constraints.rank();
@@ -336,10 +290,7 @@ fn rank_around(
     let mut beside = Vec::new();
     for sign in [1.0, -1.0] {
         if !model.drives.is_empty() {
-            beside.push((
-                sign * period,
-                y[model.nq..].iter().map(|v| v * sign * period).collect(),
-            ));
+            beside.push((sign * period, y[model.nq..].iter().map(|v| v * sign * period).collect()));
         }
         for direction in 1..=2 {
             factor_at(model, constraints, tree, T, y);
@@ -371,13 +322,7 @@ fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f
 
 /// Whether closed joints leave no degree of freedom and a singular pose lies between the guess and the assembled state
 /// `y`: the determinant of as many independent rows as coordinates then has opposite signs at the two.
-fn is_other_mode(
-    model: &Model,
-    constraints: &mut Constraints,
-    tree: &mut Tree,
-    guess: &[f64],
-    y: &[f64],
-) -> bool {
+fn is_other_mode(model: &Model, constraints: &mut Constraints, tree: &mut Tree, guess: &[f64], y: &[f64]) -> bool {
     let mut sign_at = |y: &[f64], places: Option<&[usize]>| {
         factor_at(model, constraints, tree, 0.0, y);
         let rows = places.map_or_else(|| constraints.system().independent(), <[usize]>::to_vec);
@@ -398,15 +343,8 @@ fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placemen
     let origin = |m: &Kinematics| m.position + m.rotation * body.origin;
     let turn = from.rotation.tr_mul(&to.rotation);
     // Sine and cosine of the angle: the cosine alone does not resolve small angles.
-    let sine = Vec3::new(
-        turn[(2, 1)] - turn[(1, 2)],
-        turn[(0, 2)] - turn[(2, 0)],
-        turn[(1, 0)] - turn[(0, 1)],
-    );
-    Placement {
-        moved: (origin(to) - origin(from)).norm(),
-        turned: libm::atan2(sine.norm(), turn.trace() - 1.0),
-    }
+    let sine = Vec3::new(turn[(2, 1)] - turn[(1, 2)], turn[(0, 2)] - turn[(2, 0)], turn[(1, 0)] - turn[(0, 1)]);
+    Placement { moved: (origin(to) - origin(from)).norm(), turned: libm::atan2(sine.norm(), turn.trace() - 1.0) }
 }
 
 /// Places the free output body as in the ideal mechanism at t = 0, so that assembly has little left to do.
@@ -419,8 +357,7 @@ fn place_output_body(model: &Model, form: &dyn ClosedForm, y: &mut [f64]) {
         let rotation = kinematics::quaternion_of(&ideal.rotation);
         y[q..q + 3].copy_from_slice(position.as_slice());
         y[q + 3..q + 7].copy_from_slice(&[rotation.w, rotation.i, rotation.j, rotation.k]);
-        let velocity = Vec3::from_fn(|i, _| ideal.position[i].rate)
-            + ideal.angular_velocity.cross(&to_centroid);
+        let velocity = Vec3::from_fn(|i, _| ideal.position[i].rate) + ideal.angular_velocity.cross(&to_centroid);
         let v = model.nq + v;
         y[v..v + 3].copy_from_slice(velocity.as_slice());
         y[v + 3..v + 6].copy_from_slice(ideal.angular_velocity.as_slice());
@@ -437,9 +374,7 @@ fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
         };
         let body = &motion[joint.ball.body];
         let hinge = body.position - body.arm;
-        let centre = |a: &model::Anchor| {
-            motion[a.body].position + motion[a.body].rotation * a.offset - hinge
-        };
+        let centre = |a: &model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset - hinge;
         let (ball, socket, axis) = (centre(&joint.ball), centre(&joint.socket), body.axis);
         let sine = axis.dot(&ball.cross(&socket));
         let cosine = ball.dot(&socket) - axis.dot(&ball) * axis.dot(&socket);

@@ -76,19 +76,9 @@ pub struct Stiff {
 impl Stiff {
     /// For `velocities` velocity coordinates in a state of `dimension`, with `couplings` ball joints and elements. With
     /// `separate`, a force accelerates only the coordinates of the trees that it acts on.
-    pub fn new(
-        model: &Model,
-        velocities: usize,
-        dimension: usize,
-        couplings: usize,
-        separate: bool,
-    ) -> Self {
+    pub fn new(model: &Model, velocities: usize, dimension: usize, couplings: usize, separate: bool) -> Self {
         let n = velocities;
-        let trees = if separate {
-            trees_of(model)
-        } else {
-            std::iter::once(0..n).collect()
-        };
+        let trees = if separate { trees_of(model) } else { std::iter::once(0..n).collect() };
         let mut tree_of = vec![0; n];
         for (place, tree) in trees.iter().enumerate() {
             tree_of[tree.clone()].fill(place);
@@ -143,11 +133,7 @@ impl Stiff {
         self.time_derivative.fill(0.0);
         self.linked.fill(false);
         self.empty = true;
-        let at = At {
-            t,
-            motion,
-            touching,
-        };
+        let at = At { t, motion, touching };
         let of_contacts = contacts.loose().map(|contact| contact.coupling(&at));
         let of_elements = elements.iter().map(|element| element.coupling(&at));
         for (i, coupling) in of_contacts.chain(of_elements).enumerate() {
@@ -211,11 +197,7 @@ impl Stiff {
         let of_elements = elements.iter().map(|element| element.ends(motion));
         for (drift, ends) in self.drift.iter_mut().zip(of_contacts.chain(of_elements)) {
             *drift = ends.map_or_else(Drift::default, |[socket, ball]| {
-                let joint = BallJoint {
-                    socket,
-                    ball,
-                    ideal: None,
-                };
+                let joint = BallJoint { socket, ball, ideal: None };
                 let (b, s) = (&motion[ball.body], &motion[socket.body]);
                 Drift {
                     eccentricity: joint.opening_rate(motion),
@@ -230,14 +212,11 @@ impl Stiff {
     /// dQ_k/dt of one coupling. Sliding of driven bodies' surfaces due to their rotation is not stiff and is left out.
     fn add_drift(&mut self, coupling: &Coupling, i: usize) {
         let (s, drift) = (&coupling.stiffness, self.drift[i]);
-        let force = s.by_displacement * drift.eccentricity
-            + (s.by_rate + s.by_slip) * drift.rate
-            + s.by_clearance;
+        let force = s.by_displacement * drift.eccentricity + (s.by_rate + s.by_slip) * drift.rate + s.by_clearance;
         let lever = (s.normal * drift.eccentricity).cross(&coupling.force);
         let positions = self.time_derivative.len() - self.n;
         for k in &self.columns {
-            self.time_derivative[positions + k.coordinate] +=
-                k.surface.dot(&force) + k.turn.dot(&lever);
+            self.time_derivative[positions + k.coordinate] += k.surface.dot(&force) + k.turn.dot(&lever);
         }
     }
 
@@ -267,11 +246,7 @@ impl Stiff {
         for l in &self.columns {
             let force_q = s.by_displacement * l.centre;
             let normal_q = s.normal * l.centre;
-            let slip = if coupling.uses_surface_velocity {
-                l.surface
-            } else {
-                l.centre
-            };
+            let slip = if coupling.uses_surface_velocity { l.surface } else { l.centre };
             let force_v = s.by_rate * l.centre + s.by_slip * slip;
             let lever = normal_q.cross(&coupling.force);
             for k in &self.columns {
@@ -296,8 +271,7 @@ impl Stiff {
             }
             let linked = &self.linked[place * count..][..count];
             self.partners.clear();
-            self.partners
-                .extend((0..count).filter(|&other| linked[other]));
+            self.partners.extend((0..count).filter(|&other| linked[other]));
             for (column, j) in tree.clone().zip(self.first[place]..) {
                 for matrix in [&mut self.by_position, &mut self.by_velocity] {
                     let forces = &mut matrix[column * n..][..n];
@@ -330,11 +304,7 @@ impl Stiff {
     /// Coupled coordinates, and the products that their latest elimination with a real shift took; 0 where nothing is coupled.
     pub fn size(&self) -> [usize; 2] {
         // What an earlier one left behind is no part of a snapshot.
-        if self.empty {
-            [0; 2]
-        } else {
-            [self.coordinates.len(), self.lu.products]
-        }
+        if self.empty { [0; 2] } else { [self.coordinates.len(), self.lu.products] }
     }
 
     /// Prepares to solve with a real shift s: factors s I - M^-1 D - M^-1 K / s.
@@ -367,13 +337,7 @@ impl Stiff {
     }
 
     /// Solves (s I - J) x = b in place, for the components that move.
-    pub fn solve(
-        &mut self,
-        b: &mut [f64],
-        moving: &Moving,
-        equations: &dyn Equations,
-        model: &Model,
-    ) {
+    pub fn solve(&mut self, b: &mut [f64], moving: &Moving, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let s = self.shift;
         if self.empty {
@@ -421,13 +385,11 @@ impl Stiff {
             equations.velocities_of(model, &self.y, im_q, &mut self.scratch_im);
             self.pair.clear();
             let coupled = self.coordinates.iter();
-            self.pair
-                .extend(coupled.map(|&c| Complex::new(re_v[c], im_v[c])));
+            self.pair.extend(coupled.map(|&c| Complex::new(re_v[c], im_v[c])));
             self.moved.clear();
             let (re, im) = (&self.scratch, &self.scratch_im);
             let coupled = self.coordinates.iter();
-            self.moved
-                .extend(coupled.map(|&c| inverse * Complex::new(re[c], im[c])));
+            self.moved.extend(coupled.map(|&c| inverse * Complex::new(re[c], im[c])));
             for [i, j, at] in self.entries.iter().map(|entry| entry.map(|x| x as usize)) {
                 self.pair[i] += self.moved[j] * self.by_position[at];
             }
@@ -486,10 +448,7 @@ mod tests {
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
     /// The memory of each contact holds `remembered`, m/s.
     fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [Memory; 3]) {
-        let changes: Vec<(String, String)> = changes
-            .iter()
-            .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
-            .collect();
+        let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load("spcmm", &changes).unwrap();
         let mut mechanism = Mechanism::new(&scene).unwrap();
         let mut y = mechanism.start().unwrap();
@@ -499,12 +458,7 @@ mod tests {
         for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
             y[v + i] += slip;
         }
-        let memory = Memory {
-            active: true,
-            approach_speed: remembered,
-            floored: true,
-            ..Memory::default()
-        };
+        let memory = Memory { active: true, approach_speed: remembered, floored: true, ..Memory::default() };
         (mechanism, y, [memory; 3])
     }
 
@@ -518,17 +472,11 @@ mod tests {
             ("surface", "largest", 1e-3),
             ("surface", "largest", 1e-9),
         ] {
-            let changes = [
-                ("contact.friction_velocity", surface),
-                ("contact.approach_speed", approach),
-            ];
+            let changes = [("contact.friction_velocity", surface), ("contact.approach_speed", approach)];
             let (mut m, y, memory) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
             m.measure(t, &y);
-            let rises = m
-                .contacts
-                .gaps()
-                .all(|gap| gap.separation.rate > remembered);
+            let rises = m.contacts.gaps().all(|gap| gap.separation.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
             let touching = Touching::Located(&memory);
             m.evaluator(touching).linearise(t, &y);
@@ -536,17 +484,16 @@ mod tests {
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
             // Rounding of the differences and what a W-method may leave out stay below 1e-3 of the stiffest entry.
-            let compare =
-                |name: &str, got: &[f64], plus: &[f64], minus: &[f64], scale: f64, width: f64| {
-                    for k in 0..n {
-                        let want = (plus[nq + k] - minus[nq + k]) / (2.0 * width);
-                        assert!(
-                            (got[k] - want).abs() < 1e-3 * scale,
-                            "{surface} {name}[{k}]: {:e} against {want:e}",
-                            got[k]
-                        );
-                    }
-                };
+            let compare = |name: &str, got: &[f64], plus: &[f64], minus: &[f64], scale: f64, width: f64| {
+                for k in 0..n {
+                    let want = (plus[nq + k] - minus[nq + k]) / (2.0 * width);
+                    assert!(
+                        (got[k] - want).abs() < 1e-3 * scale,
+                        "{surface} {name}[{k}]: {:e} against {want:e}",
+                        got[k]
+                    );
+                }
+            };
             let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
             let (stiffest, dampest) = (largest(&stiff.by_position), largest(&stiff.by_velocity));
             assert!(stiffest > 1e7 && dampest > 1e3, "{stiffest:e} {dampest:e}");
@@ -560,14 +507,7 @@ mod tests {
                 };
                 moved(1.0, &mut plus);
                 moved(-1.0, &mut minus);
-                compare(
-                    &format!("K{l}"),
-                    &stiff.by_position[l * n..][..n],
-                    &plus,
-                    &minus,
-                    stiffest,
-                    1e-10,
-                );
+                compare(&format!("K{l}"), &stiff.by_position[l * n..][..n], &plus, &minus, stiffest, 1e-10);
                 let mut faster = |sign: f64, out: &mut [f64]| {
                     let mut z = y.clone();
                     z[nq + l] += sign * 1e-8;
@@ -575,37 +515,20 @@ mod tests {
                 };
                 faster(1.0, &mut plus);
                 faster(-1.0, &mut minus);
-                compare(
-                    &format!("D{l}"),
-                    &stiff.by_velocity[l * n..][..n],
-                    &plus,
-                    &minus,
-                    dampest,
-                    1e-8,
-                );
+                compare(&format!("D{l}"), &stiff.by_velocity[l * n..][..n], &plus, &minus, dampest, 1e-8);
             }
             let mut evaluator = m.evaluator(touching);
             evaluator.derivative(t + 1e-9, &y, &mut plus);
             evaluator.derivative(t - 1e-9, &y, &mut minus);
-            compare(
-                "ft",
-                &stiff.time_derivative[nq..],
-                &plus,
-                &minus,
-                1e-2 * stiffest,
-                1e-9,
-            );
+            compare("ft", &stiff.time_derivative[nq..], &plus, &minus, 1e-2 * stiffest, 1e-9);
         }
     }
 
     /// Bodies in a row from a free one: a hinge, a slide and a fixed joint, and a hinge on a slide that is driven; moving, and
     /// loaded by `elements`.
     fn linked(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
-        let body = |name: &str| {
-            format!(
-                "[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n"
-            )
-        };
+        let body =
+            |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n");
         let joint = |kind: &str, parent: &str, child: &str, more: &str| {
             format!(
                 "[[joint]]\nname = \"{child}\"\nkind = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{more}\n"
@@ -620,25 +543,10 @@ mod tests {
         let driven = "axis = [0, 1, 0]\ndrive = { law = \"harmonic\", amplitude = \"1 mm\", frequency = \"1 Hz\" }";
         let text = bodies
             + &joint("free", "world", "base", free)
-            + &joint(
-                "revolute",
-                "base",
-                "arm",
-                &format!("axis = [1, 0, 2]\n{at}\n{turns}"),
-            )
-            + &joint(
-                "prismatic",
-                "arm",
-                "rod",
-                &format!("axis = [0, 1, 1]\n{at}\n{slow}"),
-            )
+            + &joint("revolute", "base", "arm", &format!("axis = [1, 0, 2]\n{at}\n{turns}"))
+            + &joint("prismatic", "arm", "rod", &format!("axis = [0, 1, 1]\n{at}\n{slow}"))
             + &joint("prismatic", "world", "table", driven)
-            + &joint(
-                "revolute",
-                "table",
-                "wheel",
-                &format!("axis = [0, 1, 2]\n{at}\n{turns}"),
-            )
+            + &joint("revolute", "table", "wheel", &format!("axis = [0, 1, 2]\n{at}\n{turns}"))
             + elements;
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let scene = Scene::parse(&text, None, &changes).unwrap();
@@ -674,12 +582,8 @@ mod tests {
                 let stiff = m.stiff.take().unwrap();
                 let n = stiff.n;
                 let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
-                let (stiffest, dampest) =
-                    (largest(&stiff.by_position), largest(&stiff.by_velocity));
-                assert!(
-                    stiffest > 1e5 && dampest > 1e2,
-                    "{name}: {stiffest:e} {dampest:e}"
-                );
+                let (stiffest, dampest) = (largest(&stiff.by_position), largest(&stiff.by_velocity));
+                assert!(stiffest > 1e5 && dampest > 1e2, "{name}: {stiffest:e} {dampest:e}");
                 let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
                 let check = |what: String, got: &[f64], plus: &[f64], minus: &[f64], scale: f64| {
                     for k in 0..n {
@@ -708,19 +612,11 @@ mod tests {
                     let column = &stiff.by_velocity[l * n..][..n];
                     check(format!("D{l}"), column, &plus, &minus, dampest);
                 }
-                m.evaluator(Touching::Nothing)
-                    .derivative(t + 1e-6, &y, &mut plus);
-                m.evaluator(Touching::Nothing)
-                    .derivative(t - 1e-6, &y, &mut minus);
+                m.evaluator(Touching::Nothing).derivative(t + 1e-6, &y, &mut plus);
+                m.evaluator(Touching::Nothing).derivative(t - 1e-6, &y, &mut minus);
                 // Speeds are some mm/s.
                 let rates = 1e-2 * stiffest;
-                check(
-                    "ft".to_owned(),
-                    &stiff.time_derivative[nq..],
-                    &plus,
-                    &minus,
-                    rates,
-                );
+                check("ft".to_owned(), &stiff.time_derivative[nq..], &plus, &minus, rates);
             }
         }
     }

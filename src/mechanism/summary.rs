@@ -43,15 +43,10 @@ impl Summary {
         let equations = &mechanism.equations;
         let velocity_coordinates = equations.velocities(model);
         let (constraint_rows, rank) = (equations.rows(), equations.rank());
-        let contacts: Vec<usize> = (0..model.joints.len())
-            .filter(|&j| mechanism.contacts.has_clearance(j))
-            .collect();
+        let contacts: Vec<usize> = (0..model.joints.len()).filter(|&j| mechanism.contacts.has_clearance(j)).collect();
         Self {
             bodies: model.massive,
-            driven_bodies: model.bodies[..model.massive]
-                .iter()
-                .filter(|b| b.driven_only)
-                .count(),
+            driven_bodies: model.bodies[..model.massive].iter().filter(|b| b.driven_only).count(),
             drives: model.drives.len(),
             velocity_coordinates,
             position_coordinates: equations.positions(model),

@@ -19,11 +19,7 @@ pub struct Evaluator<'a> {
 impl Mechanism {
     /// The equations of motion, with what decides which contacts carry a force.
     pub fn evaluator<'a>(&'a mut self, touching: Touching<'a>) -> Evaluator<'a> {
-        Evaluator {
-            mechanism: self,
-            touching,
-            counts: Counts::default(),
-        }
+        Evaluator { mechanism: self, touching, counts: Counts::default() }
     }
 }
 
@@ -32,13 +28,7 @@ impl Evaluator<'_> {
     /// reactions and actuator forces.
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
-        let Mechanism {
-            model,
-            equations,
-            contacts,
-            evaluated,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, evaluated, .. } = &mut *self.mechanism;
         *evaluated = None;
         equations.complete_motion(model, y, &dy[equations.positions(model)..]);
         // Forces stay those of the derivative; only the geometry of ideal joints is missing.
@@ -47,27 +37,13 @@ impl Evaluator<'_> {
 
     /// Motion and contact forces at (t, y), no accelerations.
     fn load(&mut self, t: f64, y: &[f64]) {
-        let Mechanism {
-            model,
-            equations,
-            contacts,
-            elements,
-            evaluated,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, elements, evaluated, .. } = &mut *self.mechanism;
         *evaluated = None;
         equations.update_awake(model, t, y);
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
-        let at = At {
-            t,
-            motion,
-            touching: self.touching,
-        };
-        let mut loads = Loads {
-            wrench,
-            counts: &mut self.counts,
-        };
+        let at = At { t, motion, touching: self.touching };
+        let mut loads = Loads { wrench, counts: &mut self.counts };
         contacts.load(&at, &mut loads);
         for element in elements {
             element.load(&at, &mut loads);
@@ -105,13 +81,7 @@ impl System for Evaluator<'_> {
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.counts.equations += 1;
         self.load(t, y);
-        let Mechanism {
-            model,
-            equations,
-            gravity,
-            evaluated,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, gravity, evaluated, .. } = &mut *self.mechanism;
         let (dq, dv) = dy.split_at_mut(equations.positions(model));
         equations.position_rate(model, y, dq);
         equations.accelerate(model, gravity, t, y, dv);
@@ -142,25 +112,13 @@ impl StiffSystem for Evaluator<'_> {
         // Only prescribed motion moves contacts by time alone; bodies in the state are at rest in that sense.
         scratch[..positions].copy_from_slice(&y[..positions]);
         scratch[positions..].fill(0.0);
-        let Mechanism {
-            model,
-            equations,
-            contacts,
-            elements,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
         if let Some(motion) = equations.prescribed_motion(model, t, &scratch) {
             stiff.observe_drift(contacts, elements, self.touching, motion);
         }
         self.derivative(t, y, &mut scratch);
         stiff.derivative = scratch;
-        let Mechanism {
-            model,
-            equations,
-            contacts,
-            elements,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
         let touching = self.touching;
         stiff.gather(model, contacts, elements, touching, &**equations, (t, y));
         stiff.apply_inverse_mass(model, &mut **equations);
@@ -174,13 +132,7 @@ impl StiffSystem for Evaluator<'_> {
     }
 
     fn solve_shifted(&mut self, b: &mut [f64]) {
-        let Mechanism {
-            model,
-            equations,
-            stiff,
-            moving,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, stiff, moving, .. } = &mut *self.mechanism;
         if let Some(stiff) = stiff {
             stiff.solve(b, moving, &**equations, model);
         }
@@ -193,23 +145,14 @@ impl StiffSystem for Evaluator<'_> {
     }
 
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]) {
-        let Mechanism {
-            model,
-            equations,
-            stiff,
-            moving,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, stiff, moving, .. } = &mut *self.mechanism;
         if let Some(stiff) = stiff {
             stiff.solve_pair(b_real, b_imaginary, moving, &**equations, model);
         }
     }
 
     fn time_derivative(&self) -> &[f64] {
-        self.mechanism
-            .stiff
-            .as_ref()
-            .map_or(&[], |stiff| &stiff.time_derivative)
+        self.mechanism.stiff.as_ref().map_or(&[], |stiff| &stiff.time_derivative)
     }
 }
 
@@ -262,12 +205,7 @@ impl StiffSystem for FrictionAlone<'_, '_> {
         self.0.derivative(t, y, &mut scratch);
         friction.derivative = scratch;
         let touching = self.0.touching;
-        let Mechanism {
-            model,
-            equations,
-            contacts,
-            ..
-        } = &mut *self.0.mechanism;
+        let Mechanism { model, equations, contacts, .. } = &mut *self.0.mechanism;
         friction.gather(model, contacts, touching, &mut **equations, y);
         self.0.mechanism.friction = Some(friction);
     }
@@ -279,13 +217,7 @@ impl StiffSystem for FrictionAlone<'_, '_> {
     }
 
     fn solve_shifted(&mut self, b: &mut [f64]) {
-        let Mechanism {
-            model,
-            equations,
-            friction,
-            moving,
-            ..
-        } = &mut *self.0.mechanism;
+        let Mechanism { model, equations, friction, moving, .. } = &mut *self.0.mechanism;
         if let Some(friction) = friction {
             friction.solve(b, moving, &**equations, model);
         }
@@ -319,13 +251,7 @@ impl ContactSystem for Evaluator<'_> {
         self.mechanism.measure(t, y);
         // An error was already reported when the method was chosen.
         let _ = self.mechanism.prepare_implicit_contacts();
-        let Mechanism {
-            model,
-            equations,
-            contacts,
-            implicit,
-            ..
-        } = &mut *self.mechanism;
+        let Mechanism { model, equations, contacts, implicit, .. } = &mut *self.mechanism;
         let Some(implicit) = implicit else {
             return false;
         };

@@ -76,11 +76,7 @@ impl Tree {
         let mut total = 0;
         for block in &model.blocks {
             tree.mass_offset.push(total);
-            total += if block.lone.is_some() {
-                0
-            } else {
-                block.n * block.n
-            };
+            total += if block.lone.is_some() { 0 } else { block.n * block.n };
         }
         tree.mass = vec![0.0; total];
         tree
@@ -158,15 +154,7 @@ impl Tree {
     /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`; those of sleeping bodies stay.
     #[inline]
     pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
-        let Self {
-            motion,
-            wrench,
-            composite,
-            mass,
-            mass_offset,
-            awake,
-            ..
-        } = self;
+        let Self { motion, wrench, composite, mass, mass_offset, awake, .. } = self;
         for &b in awake.iter().rev() {
             let body = &model.bodies[b];
             let m = &motion[b];
@@ -251,9 +239,7 @@ impl Tree {
             x.copy_from_slice(&six_of(&acceleration, &alpha));
         } else {
             let h = &self.mass[self.mass_offset[index]..][..block.n * block.n];
-            block
-                .pattern
-                .solve(h, &self.inverse_diagonal[block.v..][..block.n], x);
+            block.pattern.solve(h, &self.inverse_diagonal[block.v..][..block.n], x);
         }
     }
 
@@ -290,12 +276,8 @@ impl Tree {
                     child.acceleration = Vec3::new(vdot[v], vdot[v + 1], vdot[v + 2]);
                     child.angular_acceleration = Vec3::new(vdot[v + 3], vdot[v + 4], vdot[v + 5]);
                 }
-                Motion::Revolute { v, .. } => {
-                    kinematics::accelerate(child, &parent, true, vs[v], vdot[v])
-                }
-                Motion::Prismatic { v, .. } => {
-                    kinematics::accelerate(child, &parent, false, vs[v], vdot[v])
-                }
+                Motion::Revolute { v, .. } => kinematics::accelerate(child, &parent, true, vs[v], vdot[v]),
+                Motion::Prismatic { v, .. } => kinematics::accelerate(child, &parent, false, vs[v], vdot[v]),
                 Motion::Driven { drive, revolute } => {
                     let q = self.driven.coordinates[drive];
                     kinematics::accelerate(child, &parent, revolute, q.rate, q.acceleration);
@@ -327,8 +309,7 @@ impl Tree {
             match model.bodies[b].motion {
                 Motion::Free { q, v } => {
                     out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
-                    out[v + 3..v + 6]
-                        .copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
+                    out[v + 3..v + 6].copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
                 Motion::Fixed | Motion::Driven { .. } => {}
@@ -416,16 +397,8 @@ fn world_inertia(r: &Mat3, inertia: &Mat3, diagonal: bool) -> Mat3 {
     } else {
         r * inertia
     };
-    let entry =
-        |i: usize, j: usize| t[(i, 0)] * r[(j, 0)] + t[(i, 1)] * r[(j, 1)] + t[(i, 2)] * r[(j, 2)];
-    let (xx, xy, xz, yy, yz, zz) = (
-        entry(0, 0),
-        entry(0, 1),
-        entry(0, 2),
-        entry(1, 1),
-        entry(1, 2),
-        entry(2, 2),
-    );
+    let entry = |i: usize, j: usize| t[(i, 0)] * r[(j, 0)] + t[(i, 1)] * r[(j, 1)] + t[(i, 2)] * r[(j, 2)];
+    let (xx, xy, xz, yy, yz, zz) = (entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2));
     Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
@@ -436,11 +409,7 @@ fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &
     // With h = k + m d / 2 the whole shift is 2 (d.h) 1 - d h^T - h d^T.
     let h = k + d * (0.5 * mass);
     let trace = 2.0 * d.dot(&h);
-    let (xy, xz, yz) = (
-        d.x * h.y + h.x * d.y,
-        d.x * h.z + h.x * d.z,
-        d.y * h.z + h.y * d.z,
-    );
+    let (xy, xz, yz) = (d.x * h.y + h.x * d.y, d.x * h.z + h.x * d.z, d.y * h.z + h.y * d.z);
     sum.m11 += inertia.m11 + trace - 2.0 * d.x * h.x;
     sum.m22 += inertia.m22 + trace - 2.0 * d.y * h.y;
     sum.m33 += inertia.m33 + trace - 2.0 * d.z * h.z;

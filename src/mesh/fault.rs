@@ -81,9 +81,7 @@ pub enum MeshFault {
     #[error("neither a binary STL file nor one in text, which begins with `solid`")]
     NotStl,
     /// STL: a length that does not fit the number of triangles.
-    #[error(
-        "a binary STL file with {triangles} triangles, as it says here, has {wanted} bytes, this file has {bytes}"
-    )]
+    #[error("a binary STL file with {triangles} triangles, as it says here, has {wanted} bytes, this file has {bytes}")]
     Length {
         /// As the file says.
         triangles: usize,

@@ -14,12 +14,8 @@ pub(super) fn read(bytes: &[u8], other: Other<'_>) -> Result<Builder, Fault> {
     } else {
         (bytes, None)
     };
-    let json =
-        serde_json::from_slice(text).map_err(|why| Fault::somewhere(MeshFault::NotJson(why)))?;
-    let mut file = File {
-        json: &json,
-        buffers: Vec::new(),
-    };
+    let json = serde_json::from_slice(text).map_err(|why| Fault::somewhere(MeshFault::NotJson(why)))?;
+    let mut file = File { json: &json, buffers: Vec::new() };
     file.build(binary, other).map_err(Fault::somewhere)
 }
 
@@ -45,11 +41,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), Fault> {
     let text = chunk(12, b"JSON", "the chunk JSON")?;
     let next = 20 + text.len();
     // There need not be one.
-    let binary = if next < bytes.len() {
-        chunk(next, b"BIN\0", "the chunk BIN")?
-    } else {
-        &[]
-    };
+    let binary = if next < bytes.len() { chunk(next, b"BIN\0", "the chunk BIN")? } else { &[] };
     Ok((text, binary))
 }
 
@@ -150,11 +142,7 @@ impl<'f> File<'f> {
             for triangle in order.chunks_exact(3) {
                 let corner = |k: usize| {
                     let found = corners.get(triangle[k]).copied();
-                    found.ok_or_else(|| MeshFault::NoCorner {
-                        mesh: at,
-                        vertex: triangle[k],
-                        known: corners.len(),
-                    })
+                    found.ok_or_else(|| MeshFault::NoCorner { mesh: at, vertex: triangle[k], known: corners.len() })
                 };
                 let [a, b, c] = [corner(0)?, corner(1)?, corner(2)?];
                 out.triangle(if mirrored { [a, c, b] } else { [a, b, c] })?;
@@ -172,23 +160,14 @@ impl<'f> File<'f> {
         found.ok_or(MeshFault::NoItem { list, at })
     }
 
-    fn accessor(
-        &self,
-        at: usize,
-        components: &'static [u64],
-        kind: &'static str,
-    ) -> Result<Accessor<'_>, MeshFault> {
+    fn accessor(&self, at: usize, components: &'static [u64], kind: &'static str) -> Result<Accessor<'_>, MeshFault> {
         let json = self.item("accessors", at)?;
         if json.get("sparse").is_some() {
             return Err(MeshFault::Sparse(at));
         }
         let component = json["componentType"].as_u64().unwrap_or(0);
         if json["type"] != kind || !components.contains(&component) {
-            return Err(MeshFault::Elements {
-                accessor: at,
-                kind,
-                components,
-            });
+            return Err(MeshFault::Elements { accessor: at, kind, components });
         }
         let width = match component {
             5121 => 1,
@@ -201,19 +180,12 @@ impl<'f> File<'f> {
         let view = self.item("bufferViews", view_at)?;
         let of_view = |key| size_of(view, "bufferViews", view_at, key);
         let buffer = index(&view["buffer"], "bufferViews.buffer")?;
-        let none = MeshFault::NoItem {
-            list: "buffers",
-            at: buffer,
-        };
+        let none = MeshFault::NoItem { list: "buffers", at: buffer };
         let buffer = self.buffers.get(buffer).ok_or(none)?;
         let (start, length) = (of_view("byteOffset")?, of_view("byteLength")?);
         let end = start.checked_add(length);
         let bytes = end.and_then(|end| buffer.get(start..end));
-        let bytes = bytes.ok_or(MeshFault::Beyond {
-            list: "bufferViews",
-            at: view_at,
-            whole: "buffer",
-        })?;
+        let bytes = bytes.ok_or(MeshFault::Beyond { list: "bufferViews", at: view_at, whole: "buffer" })?;
         let stride = match of_view("byteStride")? {
             0 => size,
             stride => stride,
@@ -221,22 +193,11 @@ impl<'f> File<'f> {
         let offset = size_of(json, "accessors", at, "byteOffset")?;
         let bytes = bytes.get(offset..).unwrap_or_default();
         // The last one need not be followed by a whole stride.
-        let last = count
-            .checked_sub(1)
-            .map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
+        let last = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
         if last.is_none_or(|last| last > bytes.len()) {
-            return Err(MeshFault::Beyond {
-                list: "accessors",
-                at,
-                whole: "buffer view",
-            });
+            return Err(MeshFault::Beyond { list: "accessors", at, whole: "buffer view" });
         }
-        Ok(Accessor {
-            bytes,
-            stride,
-            count,
-            component,
-        })
+        Ok(Accessor { bytes, stride, count, component })
     }
 }
 
@@ -267,48 +228,25 @@ fn whole(json: &Json) -> Option<usize> {
 
 /// An index into a list; `key` names it in errors.
 fn index(json: &Json, key: &'static str) -> Result<usize, MeshFault> {
-    whole(json).ok_or_else(|| MeshFault::NotIndex {
-        key,
-        json: json.to_string(),
-    })
+    whole(json).ok_or_else(|| MeshFault::NotIndex { key, json: json.to_string() })
 }
 
 /// A number of bytes or elements in item `at` of a list, 0 if it is not given.
-fn size_of(
-    item: &Json,
-    list: &'static str,
-    at: usize,
-    key: &'static str,
-) -> Result<usize, MeshFault> {
+fn size_of(item: &Json, list: &'static str, at: usize, key: &'static str) -> Result<usize, MeshFault> {
     let Some(json) = item.get(key) else {
         return Ok(0);
     };
-    whole(json).ok_or_else(|| MeshFault::NotSize {
-        list,
-        at,
-        key,
-        json: json.to_string(),
-    })
+    whole(json).ok_or_else(|| MeshFault::NotSize { list, at, key, json: json.to_string() })
 }
 
 /// N numbers of node `at`, if they are given.
-fn numbers<const N: usize>(
-    node: &Json,
-    at: usize,
-    key: &'static str,
-) -> Result<Option<[f64; N]>, MeshFault> {
+fn numbers<const N: usize>(node: &Json, at: usize, key: &'static str) -> Result<Option<[f64; N]>, MeshFault> {
     let Some(list) = node.get(key) else {
         return Ok(None);
     };
     let list = list.as_array().into_iter().flatten().map(Json::as_f64);
-    let list = list
-        .collect::<Option<Vec<f64>>>()
-        .and_then(|list| list.try_into().ok());
-    list.map(Some).ok_or(MeshFault::NotNumbers {
-        node: at,
-        key,
-        count: N,
-    })
+    let list = list.collect::<Option<Vec<f64>>>().and_then(|list| list.try_into().ok());
+    list.map(Some).ok_or(MeshFault::NotNumbers { node: at, key, count: N })
 }
 
 /// How node `at` places what hangs on it.

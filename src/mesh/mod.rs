@@ -98,17 +98,8 @@ mod tests {
     fn box_of_triangles() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         let side = |i: u32, bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
         let corner = |i| [10.0 + side(i, 0), 2.0 * side(i, 1), 3.0 * side(i, 2)];
-        let quads = [
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-        ];
-        let halves = quads
-            .into_iter()
-            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let halves = quads.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
         ((0..8).map(corner).collect(), halves.collect())
     }
 
@@ -119,11 +110,7 @@ mod tests {
         for triangle in triangles {
             out.extend([0; 12]);
             for corner in triangle {
-                out.extend(
-                    corners[corner as usize]
-                        .iter()
-                        .flat_map(|x| x.to_le_bytes()),
-                );
+                out.extend(corners[corner as usize].iter().flat_map(|x| x.to_le_bytes()));
             }
             out.extend([0; 2]);
         }
@@ -227,10 +214,7 @@ mod tests {
         let files = [
             (Format::Stl, binary_stl()),
             (Format::Stl, text_stl().into_bytes()),
-            (
-                Format::Stl,
-                text_stl().replace('\n', "\r\n").to_uppercase().into_bytes(),
-            ),
+            (Format::Stl, text_stl().replace('\n', "\r\n").to_uppercase().into_bytes()),
             (Format::Obj, obj().into_bytes()),
             (Format::Gltf, glb()),
             (Format::Gltf, gltf_alone()),
@@ -243,10 +227,7 @@ mod tests {
             let wanted = triangles.iter().map(|t| t.map(|i| corners[i as usize]));
             for (found, wanted) in found.zip(wanted) {
                 for (found, wanted) in found.iter().flatten().zip(wanted.iter().flatten()) {
-                    assert!(
-                        (found - wanted).abs() < 2e-6,
-                        "{format:?}: {found} {wanted}"
-                    );
+                    assert!((found - wanted).abs() < 2e-6, "{format:?}: {found} {wanted}");
                 }
             }
             assert_eq!((mesh.vertices().len(), mesh.triangles().len()), (8, 12));
@@ -316,12 +297,7 @@ mod tests {
         let bad = good.replacen("vertex 9.5", "vertex 9.5mm", 1);
         check(Format::Stl, &bad, at(&bad, "9.5mm"), "not a number");
         let bad = good.replacen("  endloop", "", 1);
-        check(
-            Format::Stl,
-            &bad,
-            at(&bad, " endfacet").map(|i| i + 1),
-            "endloop",
-        );
+        check(Format::Stl, &bad, at(&bad, " endfacet").map(|i| i + 1), "endloop");
         let bad = &good[..good.len() - 16];
         check(Format::Stl, bad, Some(bad.len()), "ends within");
         check(Format::Stl, "", Some(0), "empty");

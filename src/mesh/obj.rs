@@ -28,9 +28,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
                 for word in words {
                     let corner = index(word, vertices.len()).map(|i| vertices[i]);
                     let known = vertices.len();
-                    corners.push(corner.ok_or_else(|| {
-                        Fault::at(offset(text, word), MeshFault::NoVertex { known })
-                    })?);
+                    corners.push(corner.ok_or_else(|| Fault::at(offset(text, word), MeshFault::NoVertex { known }))?);
                 }
                 if corners.len() < 3 {
                     return Err(at(MeshFault::Face));

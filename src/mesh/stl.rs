@@ -18,14 +18,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
         Some(count) if bytes.len() == length(count) => binary(bytes),
         _ if solid => in_words(text(bytes)?),
         _ if bytes.is_empty() => Err(Fault::at(0, MeshFault::Empty)),
-        Some(count) => Err(Fault::at(
-            80,
-            MeshFault::Length {
-                triangles: count,
-                wanted: length(count),
-                bytes: bytes.len(),
-            },
-        )),
+        Some(count) => {
+            Err(Fault::at(80, MeshFault::Length { triangles: count, wanted: length(count), bytes: bytes.len() }))
+        }
         None => Err(Fault::at(0, MeshFault::NotStl)),
     }
 }
@@ -79,18 +74,13 @@ fn in_words(text: &str) -> Result<Builder, Fault> {
                 corners = None;
             }
             (_, None) => {
-                return Err(at(MeshFault::Expected(
-                    "`solid`, `facet`, `outer loop`, `endfacet` or `endsolid`",
-                )));
+                return Err(at(MeshFault::Expected("`solid`, `facet`, `outer loop`, `endfacet` or `endsolid`")));
             }
             (_, Some(_)) => return Err(at(MeshFault::Expected("`vertex` or `endloop`"))),
         }
     }
     if !ended {
-        return Err(Fault::at(
-            text.len(),
-            MeshFault::EndsWithin("a solid: no `endsolid`"),
-        ));
+        return Err(Fault::at(text.len(), MeshFault::EndsWithin("a solid: no `endsolid`")));
     }
     Ok(out)
 }

@@ -35,8 +35,7 @@ impl Mesh {
     /// Ends of an edge that is not the border of as many triangles on its one side as on its other, if there is one: the mesh
     /// is not closed then, and has no volume.
     pub fn open_edge(&self) -> Option<[[f32; 3]; 2]> {
-        self.open
-            .map(|ends| ends.map(|i| self.vertices[i as usize]))
+        self.open.map(|ends| ends.map(|i| self.vertices[i as usize]))
     }
 
     /// Lowest and highest coordinates.
@@ -57,9 +56,7 @@ impl Mesh {
     pub fn tetrahedra(&self, point: [f32; 3]) -> impl Iterator<Item = [Vector3<f64>; 3]> {
         let point = Vector3::from(point.map(f64::from));
         let corner = move |i: u32| Vector3::from(self.vertices[i as usize].map(f64::from)) - point;
-        self.triangles
-            .iter()
-            .map(move |triangle| triangle.map(corner))
+        self.triangles.iter().map(move |triangle| triangle.map(corner))
     }
 
     /// The middle of its bounds.
@@ -125,15 +122,9 @@ impl Builder {
             return Err(MeshFault::NoTriangles);
         }
         let open = open_edge(&self.triangles);
-        let mut mesh = Mesh {
-            vertices: self.vertices,
-            triangles: self.triangles,
-            open,
-        };
+        let mut mesh = Mesh { vertices: self.vertices, triangles: self.triangles, open };
         if mesh.volume_about(mesh.middle()) < 0.0 {
-            mesh.triangles
-                .iter_mut()
-                .for_each(|corners| corners.swap(1, 2));
+            mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
         }
         Ok(mesh)
     }

@@ -26,11 +26,7 @@ struct Shown {
 /// Creates the renderer and stores it in egui's callback resources. Call once, when the application starts.
 pub fn install(state: &egui_wgpu::RenderState) {
     let renderer = Renderer::new(&state.device, &state.adapter);
-    let resources = Resources {
-        finish: renderer.finish(&state.device, state.target_format),
-        renderer,
-        shown: None,
-    };
+    let resources = Resources { finish: renderer.finish(&state.device, state.target_format), renderer, shown: None };
     state.renderer.write().callback_resources.insert(resources);
 }
 
@@ -67,11 +63,7 @@ impl Resources {
         let fits = |shown: &Shown| shown.target.fits(list, size);
         let shown = self.shown.take().filter(fits).unwrap_or_else(|| {
             let target = self.renderer.target(device, size, list.quality.samples);
-            Shown {
-                group: self.finish.group(device, &target.light),
-                target,
-                revision: None,
-            }
+            Shown { group: self.finish.group(device, &target.light), target, revision: None }
         });
         self.shown.insert(shown)
     }

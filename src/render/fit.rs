@@ -18,10 +18,7 @@ impl Ball {
         let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
         let axes = [0, 1, 2].map(column);
         if round {
-            return Self {
-                centre: column(3),
-                radius: axes[0].length(),
-            };
+            return Self { centre: column(3), radius: axes[0].length() };
         }
         let [middle, half] = bounds;
         let along = |k: usize| axes[k].length() * half[k];
@@ -40,17 +37,9 @@ pub(super) struct Sight {
 impl Sight {
     pub fn new(eye: &Eye) -> Self {
         let row = |i| eye.clip_from_world.row(i);
-        let planes = [
-            row(3) + row(0),
-            row(3) - row(0),
-            row(3) + row(1),
-            row(3) - row(1),
-            row(3),
-        ];
+        let planes = [row(3) + row(0), row(3) - row(0), row(3) + row(1), row(3) - row(1), row(3)];
         let unit = |plane: Vec4| plane / plane.truncate().length().max(f32::MIN_POSITIVE);
-        Self {
-            planes: planes.map(unit),
-        }
+        Self { planes: planes.map(unit) }
     }
 
     /// Whether some of `ball` may be in the picture; true if it has no place.
@@ -70,12 +59,7 @@ pub(super) struct Region {
 
 /// The region that serves what is in view: all `casters` that are (the flag), and those whose shadows on the floor (a point of
 /// it, and up) are.
-pub(super) fn shadow_region(
-    casters: &[(Ball, bool)],
-    light: Vec3,
-    floor: Option<(Vec3, Vec3)>,
-    eye: &Eye,
-) -> Region {
+pub(super) fn shadow_region(casters: &[(Ball, bool)], light: Vec3, floor: Option<(Vec3, Vec3)>, eye: &Eye) -> Region {
     let sight = Sight::new(eye);
     let steep = floor.filter(|(_, up)| light.dot(*up) > 0.05);
     let on_floor = |ball: &Ball| {
@@ -103,22 +87,13 @@ pub(super) fn shadow_region(
         }
     }
     if !(low.cmple(high).all() && depths[0] < depths[1]) {
-        return Region {
-            centre: Vec3::ZERO,
-            radius: 1.0,
-            depths: [-1.0, 1.0],
-        };
+        return Region { centre: Vec3::ZERO, radius: 1.0, depths: [-1.0, 1.0] };
     }
     let centre = (low + high) / 2.0;
     let farthest = casters
         .iter()
         .filter(|(ball, seen)| *seen || on_floor(ball).is_some())
-        .map(|(ball, _)| {
-            (ball.centre - centre)
-                .reject_from_normalized(light)
-                .length()
-                + ball.radius
-        })
+        .map(|(ball, _)| (ball.centre - centre).reject_from_normalized(light).length() + ball.radius)
         .filter(|radius| radius.is_finite())
         .fold(f32::MIN_POSITIVE, f32::max);
     Region {
@@ -184,10 +159,7 @@ mod tests {
         let camera = SceneView::new(&scene, &frame).camera();
         let eye = camera.view([640, 360]);
         let light = Vec3::new(0.3, -0.4, 0.8).normalize();
-        let ball = |offset: Vec3, radius| Ball {
-            centre: camera.target + offset * camera.distance,
-            radius,
-        };
+        let ball = |offset: Vec3, radius| Ball { centre: camera.target + offset * camera.distance, radius };
         let (right, _, _) = camera.axes();
         let casters = [
             (ball(Vec3::ZERO, 0.01), true),

@@ -4,9 +4,7 @@
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RenderError {
     /// A size of 0 or beyond the device's limit.
-    #[error(
-        "picture of {width}x{height} pixels: each side must be 1 to {limit} on this graphics adapter"
-    )]
+    #[error("picture of {width}x{height} pixels: each side must be 1 to {limit} on this graphics adapter")]
     Size {
         /// Requested width.
         width: u32,

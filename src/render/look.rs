@@ -6,29 +6,16 @@ use crate::view::{DrawList, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptio
 #[test]
 #[ignore = "writes pictures for a person to look at"]
 fn look() {
-    let folder = std::path::PathBuf::from(
-        std::env::var("JOINTPLAY_LOOK").expect("JOINTPLAY_LOOK names a folder"),
-    );
+    let folder = std::path::PathBuf::from(std::env::var("JOINTPLAY_LOOK").expect("JOINTPLAY_LOOK names a folder"));
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
-    for (name, (scene, frame)) in [
-        ("pendulum", fixture::pendulum()),
-        ("legs", fixture::three_legs()),
-    ] {
+    for (name, (scene, frame)) in [("pendulum", fixture::pendulum()), ("legs", fixture::three_legs())] {
         let view = SceneView::new(&scene, &frame);
         let mut marks = PeakMarks::new();
         for (theme, mood) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
-            for (shot, magnification) in [
-                ("whole", 1.0),
-                ("play", 20.0),
-                ("close", 20.0),
-                ("hit", 20.0),
-                ("front", 1.0),
-            ] {
-                let options = ViewOptions {
-                    theme,
-                    magnification,
-                    ..Default::default()
-                };
+            for (shot, magnification) in
+                [("whole", 1.0), ("play", 20.0), ("close", 20.0), ("hit", 20.0), ("front", 1.0)]
+            {
+                let options = ViewOptions { theme, magnification, ..Default::default() };
                 marks.clear(-1.0);
                 marks.update(&frame, &[], f64::INFINITY);
                 let mut camera = view.camera();
@@ -50,12 +37,7 @@ fn look() {
                 let trail: Vec<glam::Vec3> = (0..200)
                     .map(|i| {
                         view.bounds().centre
-                            + 0.1
-                                * glam::Vec3::new(
-                                    0.4,
-                                    (i as f32 * 0.05).cos(),
-                                    (i as f32 * 0.08).sin(),
-                                )
+                            + 0.1 * glam::Vec3::new(0.4, (i as f32 * 0.05).cos(), (i as f32 * 0.08).sin())
                     })
                     .collect();
                 let mut list = DrawList::default();
@@ -72,14 +54,9 @@ fn look() {
                 view.build(&input, &mut list);
                 let started = web_time::Instant::now();
                 let image = offscreen.render(&list).expect("a picture");
-                println!(
-                    "{name} {mood} {shot}: {:?}, {}",
-                    started.elapsed(),
-                    list.magnification_text
-                );
+                println!("{name} {mood} {shot}: {:?}, {}", started.elapsed(), list.magnification_text);
                 let png = image.png(&[("Title", name)]).expect("a PNG");
-                std::fs::write(folder.join(format!("{name}-{mood}-{shot}.png")), png)
-                    .expect("a writable folder");
+                std::fs::write(folder.join(format!("{name}-{mood}-{shot}.png")), png).expect("a writable folder");
             }
         }
     }
@@ -116,8 +93,5 @@ fn time() {
     }
     build.sort();
     record.sort();
-    println!(
-        "draw list {:?}, recording {:?} (median of 100)",
-        build[50], record[50]
-    );
+    println!("draw list {:?}, recording {:?} (median of 100)", build[50], record[50]);
 }

@@ -13,12 +13,7 @@ pub(super) struct Level {
 }
 
 /// The finest first.
-pub(super) const LEVELS: [Level; 4] = [
-    level(64, f32::INFINITY),
-    level(32, 18.0),
-    level(16, 4.5),
-    level(8, 1.1),
-];
+pub(super) const LEVELS: [Level; 4] = [level(64, f32::INFINITY), level(32, 18.0), level(16, 4.5), level(8, 1.1)];
 
 const fn level(sectors: u32, pixels: f32) -> Level {
     Level { sectors, pixels }
@@ -27,13 +22,7 @@ const fn level(sectors: u32, pixels: f32) -> Level {
 /// The shared meshes, by [`Mesh::index`], with so many sectors around.
 pub(super) fn shared(sectors: u32) -> [MeshData; Mesh::SHARED] {
     let stacks = sectors / 2;
-    [
-        sphere(sectors, stacks),
-        cylinder(sectors),
-        cone(sectors),
-        cube(),
-        socket(sectors, stacks / 2),
-    ]
+    [sphere(sectors, stacks), cylinder(sectors), cone(sectors), cube(), socket(sectors, stacks / 2)]
 }
 
 /// Adds a patch: `point(u, v)` for u, v in 0..=1 gives position and normal; u runs around, v from bottom to top, so that
@@ -42,8 +31,7 @@ fn patch(mesh: &mut MeshData, nu: u32, nv: u32, point: impl Fn(f32, f32) -> ([f3
     let first = mesh.vertices.len() as u32;
     for j in 0..=nv {
         for i in 0..=nu {
-            mesh.vertices
-                .push(point(i as f32 / nu as f32, j as f32 / nv as f32));
+            mesh.vertices.push(point(i as f32 / nu as f32, j as f32 / nv as f32));
         }
     }
     for j in 0..nv {
@@ -81,10 +69,7 @@ fn disc(mesh: &mut MeshData, nu: u32, z: f32, up: bool) {
     patch(mesh, nu, 1, |u, v| {
         let (x, y) = circle(u);
         let r = if up { 1.0 - v } else { v };
-        (
-            [r * x, r * y, z, 0.0],
-            [0.0, 0.0, if up { 1.0 } else { -1.0 }],
-        )
+        ([r * x, r * y, z, 0.0], [0.0, 0.0, if up { 1.0 } else { -1.0 }])
     });
 }
 
@@ -104,10 +89,7 @@ fn cone(nu: u32) -> MeshData {
     let slope = std::f32::consts::FRAC_1_SQRT_2;
     patch(&mut mesh, nu, 1, |u, v| {
         let (x, y) = circle(u);
-        (
-            [x * (1.0 - v), y * (1.0 - v), v, 0.0],
-            [x * slope, y * slope, slope],
-        )
+        ([x * (1.0 - v), y * (1.0 - v), v, 0.0], [x * slope, y * slope, slope])
     });
     disc(&mut mesh, nu, 0.0, false);
     mesh
@@ -161,14 +143,9 @@ fn socket(nu: u32, half: u32) -> MeshData {
         ([r * x, r * y, z, 2.0 + v], [out * x, out * y, up])
     });
     let mut mesh = MeshData::default();
-    for (face, from_behind) in [
-        (&outer, true),
-        (&inner, false),
-        (&cut, false),
-        (&cut, true),
-        (&inner, true),
-        (&outer, false),
-    ] {
+    for (face, from_behind) in
+        [(&outer, true), (&inner, false), (&cut, false), (&cut, true), (&inner, true), (&outer, false)]
+    {
         append(&mut mesh, face, from_behind);
     }
     mesh
@@ -179,12 +156,10 @@ fn append(mesh: &mut MeshData, face: &MeshData, from_behind: bool) {
     let first = mesh.vertices.len() as u32;
     let side = if from_behind { -1.0 } else { 1.0 };
     let vertices = face.vertices.iter();
-    mesh.vertices
-        .extend(vertices.map(|(place, normal)| (*place, normal.map(|x| side * x))));
+    mesh.vertices.extend(vertices.map(|(place, normal)| (*place, normal.map(|x| side * x))));
     for triangle in face.indices.chunks_exact(3) {
         let [a, b, c] = [0, 1, 2].map(|k| first + triangle[k]);
-        mesh.indices
-            .extend(if from_behind { [a, c, b] } else { [a, b, c] });
+        mesh.indices.extend(if from_behind { [a, c, b] } else { [a, b, c] });
     }
 }
 
@@ -216,10 +191,7 @@ mod tests {
                 let (a, b, c) = (corner(0), corner(1), corner(2));
                 let face = (b.0 - a.0).cross(c.0 - a.0);
                 let outward = a.1 + b.1 + c.1;
-                assert!(
-                    face.dot(outward) >= -1e-6,
-                    "mesh {i}: a triangle faces inwards"
-                );
+                assert!(face.dot(outward) >= -1e-6, "mesh {i}: a triangle faces inwards");
             }
         }
     }

@@ -9,9 +9,7 @@ use wgpu::util::DeviceExt as _;
 
 /// No graphics adapter on this machine.
 #[derive(Clone, Debug, thiserror::Error)]
-#[error(
-    "no graphics adapter found: install a Vulkan driver (software: Debian and Ubuntu package mesa-vulkan-drivers)"
-)]
+#[error("no graphics adapter found: install a Vulkan driver (software: Debian and Ubuntu package mesa-vulkan-drivers)")]
 pub struct NoAdapter;
 
 /// A device without a window, and its renderer.
@@ -47,8 +45,7 @@ impl Offscreen {
 
     async fn open() -> Option<Self> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-        descriptor.backends =
-            wgpu::Backends::from_env().unwrap_or(wgpu::Backends::PRIMARY | wgpu::Backends::GL);
+        descriptor.backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::PRIMARY | wgpu::Backends::GL);
         let instance = wgpu::Instance::new(descriptor);
         let mut adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
         // Stable: the backend's own order breaks ties.
@@ -108,16 +105,13 @@ impl Offscreen {
         let frame = self.take_frame(list);
         let frame = self.frame.insert(frame);
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        self.renderer
-            .draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
+        self.renderer.draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
         encode(&self.finish, &mut encoder, &frame.group, &frame.picture);
         let readback = &frame.readback;
         readback.copy(&mut encoder, &frame.picture);
         self.queue.submit([encoder.finish()]);
         let arrival = readback.request();
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(device_error)?;
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
         match arrival.get() {
             Some(Ok(())) => readback.read(),
             Some(Err(reason)) => Err(device_error(reason)),
@@ -176,17 +170,14 @@ impl Offscreen {
         };
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encoder.write_timestamp(&timer.stamps, 0);
-        self.renderer
-            .draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
+        self.renderer.draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
         encode(&self.finish, &mut encoder, &frame.group, &frame.picture);
         encoder.write_timestamp(&timer.stamps, 1);
         encoder.resolve_query_set(&timer.stamps, 0..2, &timer.resolved, 0);
         encoder.copy_buffer_to_buffer(&timer.resolved, 0, &timer.read, 0, 16);
         self.queue.submit([encoder.finish()]);
         timer.read.map_async(wgpu::MapMode::Read, .., |_| {});
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(device_error)?;
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
         let ticks = {
             let bytes = timer.read.get_mapped_range(..).map_err(device_error)?;
             let stamps: &[u64] = bytemuck::cast_slice(&bytes);
@@ -213,14 +204,11 @@ impl Offscreen {
         let frame = self.take_frame(list);
         let start = web_time::Instant::now();
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        self.renderer
-            .draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
+        self.renderer.draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
         self.queue.submit([encoder.finish()]);
         let spent = start.elapsed();
         self.frame = Some(frame);
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(device_error)?;
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
         Ok(spent)
     }
 
@@ -231,9 +219,7 @@ impl Offscreen {
             return frame;
         }
         let size = list.size;
-        let target = self
-            .renderer
-            .target(&self.device, size, list.quality.samples);
+        let target = self.renderer.target(&self.device, size, list.quality.samples);
         let picture = picture(&self.device, size);
         Frame {
             group: self.finish.group(&self.device, &target.light),
@@ -258,12 +244,7 @@ fn picture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
 }
 
 /// The last pass, to `picture`.
-fn encode(
-    finish: &Finish,
-    encoder: &mut wgpu::CommandEncoder,
-    group: &wgpu::BindGroup,
-    picture: &wgpu::Texture,
-) {
+fn encode(finish: &Finish, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, picture: &wgpu::Texture) {
     let view = picture.create_view(&Default::default());
     let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: Some("finish"),
@@ -271,10 +252,7 @@ fn encode(
             view: &view,
             depth_slice: None,
             resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                store: wgpu::StoreOp::Store,
-            },
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
         })],
         ..Default::default()
     });
@@ -309,10 +287,7 @@ impl Offscreen {
         );
         let light = texture.create_view(&Default::default());
         let group = self.finish.group(&self.device, &light);
-        let (picture, readback) = (
-            picture(&self.device, size),
-            Readback::new(&self.device, size),
-        );
+        let (picture, readback) = (picture(&self.device, size), Readback::new(&self.device, size));
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encode(&self.finish, &mut encoder, &group, &picture);
         readback.copy(&mut encoder, &picture);

@@ -86,86 +86,36 @@ const fn solid(label: &'static str, group: Group, fragment: &'static str) -> Pas
 
 /// Something seen through.
 const fn clear(label: &'static str, group: Group, fragment: &'static str, blend: Blend) -> Pass {
-    Pass {
-        blend,
-        write_depth: false,
-        ..solid(label, group, fragment)
-    }
+    Pass { blend, write_depth: false, ..solid(label, group, fragment) }
 }
 
 /// Something without a mesh.
-const fn flat(
-    label: &'static str,
-    draws: Draws,
-    vertex: &'static str,
-    fragment: &'static str,
-) -> Pass {
-    Pass {
-        draws,
-        vertex,
-        cull: None,
-        ..clear(label, Group::Solid, fragment, Blend::Given)
-    }
+const fn flat(label: &'static str, draws: Draws, vertex: &'static str, fragment: &'static str) -> Pass {
+    Pass { draws, vertex, cull: None, ..clear(label, Group::Solid, fragment, Blend::Given) }
 }
 
 /// All passes: one to the shadow map, the others to the picture. The last, `shaders/finish.wgsl`, is `finish.rs`.
 pub(super) const PASSES: &[Pass] = &[
-    Pass {
-        vertex: "vs_shadow",
-        fragment: None,
-        ..solid("shadow", Group::Casters, "")
-    },
+    Pass { vertex: "vs_shadow", fragment: None, ..solid("shadow", Group::Casters, "") },
     Pass {
         blend: Blend::Opaque,
         compare: Always,
-        ..flat(
-            "background",
-            Draws::Everywhere,
-            "vs_background",
-            "fs_background",
-        )
+        ..flat("background", Draws::Everywhere, "vs_background", "fs_background")
     },
     solid("solid", Group::Solid, "fs_solid"),
-    Pass {
-        vertex: "vs_joint",
-        ..solid("balls", Group::Balls, "fs_ball")
-    },
+    Pass { vertex: "vs_joint", ..solid("balls", Group::Balls, "fs_ball") },
     flat("floor", Draws::Floor, "vs_floor", "fs_floor"),
     flat("lines", Draws::Lines, "vs_line", "fs_line"),
     clear("faded", Group::Faded, "fs_faded", Blend::Light),
     clear("halos", Group::Halos, "fs_halo", Blend::Given),
     // The mesh has both sides of its faces, in the order in which any sight passes them.
-    Pass {
-        vertex: "vs_joint",
-        ..clear("sockets", Group::Sockets, "fs_socket", Blend::Light)
-    },
+    Pass { vertex: "vs_joint", ..clear("sockets", Group::Sockets, "fs_socket", Blend::Light) },
     // After the sockets, whose glass would tint their colours.
-    Pass {
-        cull: None,
-        compare: Always,
-        ..clear(
-            "wear behind others",
-            Group::Wear,
-            "fs_wear_behind",
-            Blend::Given,
-        )
-    },
+    Pass { cull: None, compare: Always, ..clear("wear behind others", Group::Wear, "fs_wear_behind", Blend::Given) },
     solid("wear", Group::Wear, "fs_wear"),
-    Pass {
-        vertex: "vs_joint",
-        ..clear(
-            "clear balls",
-            Group::ClearBalls,
-            "fs_clear_ball",
-            Blend::Light,
-        )
-    },
+    Pass { vertex: "vs_joint", ..clear("clear balls", Group::ClearBalls, "fs_clear_ball", Blend::Light) },
     // Only its nearest surface is visible: its own back parts would show through in patches.
-    Pass {
-        vertex: "vs_ghost",
-        blend: Blend::Nothing,
-        ..solid("ghost, depth", Group::Ghost, "fs_ghost")
-    },
+    Pass { vertex: "vs_ghost", blend: Blend::Nothing, ..solid("ghost, depth", Group::Ghost, "fs_ghost") },
     Pass {
         vertex: "vs_ghost",
         // The same vertices as in the depth pass.
@@ -179,24 +129,10 @@ pub(super) const PASSES: &[Pass] = &[
         ..solid("ghost, outline", Group::GhostEdges, "fs_ghost_edge")
     },
     // After the sockets, so that glass does not dim a force.
-    Pass {
-        compare: Always,
-        ..flat("marks", Draws::Marks, "vs_line", "fs_line")
-    },
-    Pass {
-        compare: Greater,
-        ..clear(
-            "arrows behind others",
-            Group::Arrows,
-            "fs_mark_behind",
-            Blend::Given,
-        )
-    },
+    Pass { compare: Always, ..flat("marks", Draws::Marks, "vs_line", "fs_line") },
+    Pass { compare: Greater, ..clear("arrows behind others", Group::Arrows, "fs_mark_behind", Blend::Given) },
     solid("arrows", Group::Arrows, "fs_mark"),
-    Pass {
-        vertex: "vs_overlay",
-        ..solid("overlay", Group::Overlay, "fs_overlay")
-    },
+    Pass { vertex: "vs_overlay", ..solid("overlay", Group::Overlay, "fs_overlay") },
 ];
 
 impl Pass {
@@ -217,10 +153,7 @@ impl Pass {
             Blend::Light => wgpu::BlendFactor::Zero,
             Blend::Given => wgpu::BlendFactor::One,
         };
-        Some(wgpu::BlendState {
-            color: over(wgpu::BlendFactor::SrcAlpha),
-            alpha: over(share),
-        })
+        Some(wgpu::BlendState { color: over(wgpu::BlendFactor::SrcAlpha), alpha: over(share) })
     }
 }
 

@@ -56,10 +56,7 @@ impl Pipelines {
                         multisampled: false,
                     },
                 ),
-                entry(
-                    1,
-                    wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
-                ),
+                entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison)),
             ],
         });
         let module = match keeping {
@@ -90,42 +87,21 @@ impl Pipelines {
     }
 }
 
-fn pipeline(
-    device: &wgpu::Device,
-    common: &Pipelines,
-    samples: u32,
-    pass: &Pass,
-) -> wgpu::RenderPipeline {
-    let Pipelines {
-        globals,
-        shadow,
-        shader,
-        keeping,
-        ..
-    } = common;
+fn pipeline(device: &wgpu::Device, common: &Pipelines, samples: u32, pass: &Pass) -> wgpu::RenderPipeline {
+    let Pipelines { globals, shadow, shader, keeping, .. } = common;
     let vertex = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x3];
     let instance = wgpu::vertex_attr_array![
         2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4, 6 => Float32x4, 7 => Float32x4, 8 => Float32x4
     ];
-    let line_ends =
-        wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32x4];
-    let buffer = |stride, step_mode, attributes| {
-        Some(wgpu::VertexBufferLayout {
-            array_stride: stride,
-            step_mode,
-            attributes,
-        })
-    };
+    let line_ends = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32x4];
+    let buffer =
+        |stride, step_mode, attributes| Some(wgpu::VertexBufferLayout { array_stride: stride, step_mode, attributes });
     use wgpu::VertexStepMode as Step;
     let meshes = [
         buffer(VERTEX_BYTES, Step::Vertex, &vertex[..]),
         buffer(size_of::<Instance>() as u64, Step::Instance, &instance[..]),
     ];
-    let lines = [buffer(
-        size_of::<Line>() as u64,
-        Step::Instance,
-        &line_ends[..],
-    )];
+    let lines = [buffer(size_of::<Line>() as u64, Step::Instance, &line_ends[..])];
     use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
     let (buffers, topology) = match pass.draws {
         Draws::Everywhere => (&[][..], TriangleList),
@@ -158,11 +134,7 @@ fn pipeline(
             compilation_options: Default::default(),
             buffers,
         },
-        primitive: wgpu::PrimitiveState {
-            topology,
-            cull_mode: pass.cull,
-            ..Default::default()
-        },
+        primitive: wgpu::PrimitiveState { topology, cull_mode: pass.cull, ..Default::default() },
         depth_stencil: Some(wgpu::DepthStencilState {
             format: if pass.casts() { SHADOW } else { DEPTH },
             depth_write_enabled: Some(pass.write_depth),
@@ -170,19 +142,12 @@ fn pipeline(
             stencil: Default::default(),
             // A little farther away than it is: keeps a surface from shadowing itself.
             bias: if pass.casts() {
-                wgpu::DepthBiasState {
-                    constant: 2,
-                    slope_scale: 2.0,
-                    clamp: 0.0,
-                }
+                wgpu::DepthBiasState { constant: 2, slope_scale: 2.0, clamp: 0.0 }
             } else {
                 Default::default()
             },
         }),
-        multisample: wgpu::MultisampleState {
-            count: if pass.casts() { 1 } else { samples },
-            ..Default::default()
-        },
+        multisample: wgpu::MultisampleState { count: if pass.casts() { 1 } else { samples }, ..Default::default() },
         fragment: pass.fragment.map(|entry| wgpu::FragmentState {
             module: shader,
             entry_point: Some(entry),

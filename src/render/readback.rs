@@ -23,11 +23,7 @@ pub fn check_size(device: &wgpu::Device, [width, height]: [u32; 2]) -> Result<u3
     if (1..=limit).contains(&width) && (1..=limit).contains(&height) {
         return Ok(limit);
     }
-    Err(RenderError::Size {
-        width,
-        height,
-        limit,
-    })
+    Err(RenderError::Size { width, height, limit })
 }
 
 /// What the device reports, as the error of a picture.
@@ -46,11 +42,7 @@ impl Readback {
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        Self {
-            buffer,
-            size,
-            stride,
-        }
+        Self { buffer, size, stride }
     }
 
     /// Size of the picture, pixels.
@@ -78,11 +70,10 @@ impl Readback {
     pub fn request(&self) -> Arrival {
         let arrival = Arrival::default();
         let report = arrival.clone();
-        self.buffer
-            .map_async(wgpu::MapMode::Read, .., move |result| {
-                // It is reported once.
-                let _ = report.set(result);
-            });
+        self.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // It is reported once.
+            let _ = report.set(result);
+        });
         arrival
     }
 
@@ -101,10 +92,6 @@ impl Readback {
             }
         }
         self.buffer.unmap();
-        Ok(Image {
-            width,
-            height,
-            rgba,
-        })
+        Ok(Image { width, height, rgba })
     }
 }

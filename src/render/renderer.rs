@@ -68,12 +68,7 @@ struct Shadow {
 }
 
 impl Shadow {
-    fn new(
-        device: &wgpu::Device,
-        layout: &wgpu::BindGroupLayout,
-        sampler: &wgpu::Sampler,
-        size: u32,
-    ) -> Self {
+    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, sampler: &wgpu::Sampler, size: u32) -> Self {
         let map = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadow map"),
             size: extent([size; 2]),
@@ -141,10 +136,7 @@ impl Renderer {
         let globals_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("globals"),
             layout: &pipelines.globals,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: globals.as_entire_binding(),
-            }],
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: globals.as_entire_binding() }],
         });
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("shadow"),
@@ -207,29 +199,20 @@ impl Renderer {
             self.shadow = Shadow::new(device, &self.pipelines.shadow, &self.sampler, side);
         }
         let batches = self.pack(list, target.size());
-        self.instances
-            .write(device, queue, bytemuck::cast_slice(&self.packed));
-        self.lines
-            .write(device, queue, bytemuck::cast_slice(&list.lines));
-        self.marks
-            .write(device, queue, bytemuck::cast_slice(&list.marks));
+        self.instances.write(device, queue, bytemuck::cast_slice(&self.packed));
+        self.lines.write(device, queue, bytemuck::cast_slice(&list.lines));
+        self.marks.write(device, queue, bytemuck::cast_slice(&list.marks));
         let globals = self.globals_of(list, target.size());
         queue.write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
 
-        let passes = PASSES
-            .iter()
-            .enumerate()
-            .filter(|(_, pass)| draws_something(pass.draws, list, &batches));
+        let passes = PASSES.iter().enumerate().filter(|(_, pass)| draws_something(pass.draws, list, &batches));
         let (shadow, picture): (Vec<_>, Vec<_>) = passes.partition(|(_, pass)| pass.casts());
         let pipeline = |index| self.pipelines.pass(device, target.samples(), index);
         {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("shadow"),
                 color_attachments: &[],
-                depth_stencil_attachment: Some(depth_attachment(
-                    &self.shadow.map,
-                    wgpu::StoreOp::Store,
-                )),
+                depth_stencil_attachment: Some(depth_attachment(&self.shadow.map, wgpu::StoreOp::Store)),
                 ..Default::default()
             });
             pass.set_bind_group(0, &self.globals_group, &[]);
@@ -248,10 +231,7 @@ impl Renderer {
                 view,
                 depth_slice: None,
                 resolve_target,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store,
-                },
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store },
             })],
             depth_stencil_attachment: Some(depth_attachment(&target.depth, wgpu::StoreOp::Discard)),
             ..Default::default()
@@ -282,10 +262,7 @@ impl Renderer {
             drawn.sum::<u64>()
         };
         let drawn = PASSES.iter().map(|pass| match pass.draws {
-            Draws::Meshes(Group::Casters) => CASTERS
-                .iter()
-                .map(|group| of(*group, |batch| batch.count))
-                .sum(),
+            Draws::Meshes(Group::Casters) => CASTERS.iter().map(|group| of(*group, |batch| batch.count)).sum(),
             Draws::Meshes(group) => of(group, |batch| batch.seen),
             _ => 0,
         });
@@ -338,39 +315,24 @@ impl Renderer {
         ] {
             let casts = CASTERS.contains(&group);
             for (mesh, all) in layer.by_mesh.iter().enumerate() {
-                let plain = all
-                    .iter()
-                    .filter(|one| group != Group::Solid || !faces(one));
+                let plain = all.iter().filter(|one| group != Group::Solid || !faces(one));
                 packing.mesh(mesh, plain, casts, &mut batches[group as usize]);
             }
         }
         let sphere = Mesh::Sphere.index();
         let solid = list.solid.by_mesh.get(sphere).map_or(&[][..], |all| all);
-        for (group, balls) in [
-            (Group::Balls, solid),
-            (Group::Halos, &list.halos[..]),
-            (Group::ClearBalls, &list.clear_balls[..]),
-        ] {
+        for (group, balls) in
+            [(Group::Balls, solid), (Group::Halos, &list.halos[..]), (Group::ClearBalls, &list.clear_balls[..])]
+        {
             let casts = CASTERS.contains(&group);
-            let balls = balls
-                .iter()
-                .filter(|one| group != Group::Balls || faces(one));
+            let balls = balls.iter().filter(|one| group != Group::Balls || faces(one));
             packing.mesh(sphere, balls, casts, &mut batches[group as usize]);
         }
-        packing.in_order(
-            Mesh::Socket.index(),
-            &list.sockets,
-            &mut batches[Group::Sockets as usize],
-        );
+        packing.in_order(Mesh::Socket.index(), &list.sockets, &mut batches[Group::Sockets as usize]);
         batches
     }
 
-    fn draw_meshes(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        batches: &[Batch],
-        count: impl Fn(&Batch) -> u32,
-    ) {
+    fn draw_meshes(&self, pass: &mut wgpu::RenderPass<'_>, batches: &[Batch], count: impl Fn(&Batch) -> u32) {
         for batch in batches.iter().filter(|batch| count(batch) > 0) {
             let Some(mesh) = self.meshes[batch.level].get(batch.mesh) else {
                 continue;
@@ -398,9 +360,7 @@ impl Renderer {
         let around = flag(list.quality.fine_shadows);
         Globals {
             clip_from_world: list.eye.clip_from_world.to_cols_array_2d(),
-            light_from_world: region
-                .light_from_world(light.direction, texels)
-                .to_cols_array_2d(),
+            light_from_world: region.light_from_world(light.direction, texels).to_cols_array_2d(),
             eye: with(list.eye.position, 1.0),
             light: with(light.direction, list.exposure),
             up: with(light.up, texel),
@@ -459,18 +419,14 @@ impl Packing<'_> {
             return;
         }
         if casts {
-            self.casters
-                .extend(places.iter().map(|(.., seen, ball)| (*ball, *seen)));
+            self.casters.extend(places.iter().map(|(.., seen, ball)| (*ball, *seen)));
         }
         for level in 0..LEVELS.len() {
             let first = self.packed.len();
             let mut count = 0;
             for wanted in [true, false].into_iter().filter(|wanted| *wanted || casts) {
-                let chosen = places
-                    .iter()
-                    .filter(|(_, of, seen, _)| (*of, *seen) == (level, wanted));
-                self.packed
-                    .extend(chosen.map(|(instance, ..)| linear(instance)));
+                let chosen = places.iter().filter(|(_, of, seen, _)| (*of, *seen) == (level, wanted));
+                self.packed.extend(chosen.map(|(instance, ..)| linear(instance)));
                 if wanted {
                     count = self.packed.len() - first;
                 }
@@ -522,28 +478,17 @@ impl Packing<'_> {
 /// The instance with its colour linear.
 fn linear(instance: &Instance) -> Instance {
     let [r, g, b] = Colour(instance.colour).linear();
-    Instance {
-        colour: [r, g, b, instance.colour[3]],
-        ..*instance
-    }
+    Instance { colour: [r, g, b, instance.colour[3]], ..*instance }
 }
 
 impl Growing {
     fn new(device: &wgpu::Device, label: &'static str) -> Self {
-        Self {
-            label,
-            buffer: Self::make(device, label, 4096),
-        }
+        Self { label, buffer: Self::make(device, label, 4096) }
     }
 
     fn make(device: &wgpu::Device, label: &str, size: u64) -> wgpu::Buffer {
         let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
-        device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        })
+        device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
     }
 
     fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, bytes: &[u8]) {
@@ -566,9 +511,9 @@ fn draws_something(draws: Draws, list: &DrawList, batches: &[Vec<Batch>; Group::
         Draws::Floor => list.floor.is_some(),
         Draws::Lines => !list.lines.is_empty(),
         Draws::Marks => !list.marks.is_empty(),
-        Draws::Meshes(Group::Casters) => CASTERS
-            .iter()
-            .any(|group| batches[*group as usize].iter().any(|batch| batch.count > 0)),
+        Draws::Meshes(Group::Casters) => {
+            CASTERS.iter().any(|group| batches[*group as usize].iter().any(|batch| batch.count > 0))
+        }
         Draws::Meshes(group) => batches[group as usize].iter().any(|batch| batch.seen > 0),
     }
 }
@@ -579,44 +524,22 @@ fn draw_lines(pass: &mut wgpu::RenderPass<'_>, buffer: &Growing, lines: &[Line])
     pass.draw(0..4, 0..lines.len() as u32);
 }
 
-fn depth_attachment(
-    view: &wgpu::TextureView,
-    store: wgpu::StoreOp,
-) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+fn depth_attachment(view: &wgpu::TextureView, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     wgpu::RenderPassDepthStencilAttachment {
         view,
-        depth_ops: Some(wgpu::Operations {
-            load: wgpu::LoadOp::Clear(1.0),
-            store,
-        }),
+        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store }),
         stencil_ops: None,
     }
 }
 
 fn load(device: &wgpu::Device, mesh: &MeshData) -> Loaded {
-    let vertices: Vec<f32> = mesh
-        .vertices
-        .iter()
-        .flat_map(|(p, n)| p.iter().chain(n).copied())
-        .collect();
+    let vertices: Vec<f32> = mesh.vertices.iter().flat_map(|(p, n)| p.iter().chain(n).copied()).collect();
     let buffer = |label, contents, usage| {
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
     Loaded {
-        vertices: buffer(
-            "vertices",
-            bytemuck::cast_slice(&vertices),
-            wgpu::BufferUsages::VERTEX,
-        ),
-        indices: buffer(
-            "indices",
-            bytemuck::cast_slice(&mesh.indices),
-            wgpu::BufferUsages::INDEX,
-        ),
+        vertices: buffer("vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        indices: buffer("indices", bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
         count: mesh.indices.len() as u32,
         bounds: mesh.bounds(),
     }
@@ -658,10 +581,7 @@ mod tests {
         let at = |origin: Vec3, radius: f32| {
             let linear = turn * Mat3::from_diagonal(Vec3::new(radius, radius, 1e-6));
             let rows = [0, 1, 2].map(|i| linear.row(i).extend(origin[i]).to_array());
-            let instance = Instance {
-                world_from_mesh: rows,
-                ..Instance::zeroed()
-            };
+            let instance = Instance { world_from_mesh: rows, ..Instance::zeroed() };
             [true, false].map(|seen| radius_on_screen(&eye, SIZE[1], &instance, seen))
         };
         let (right, _, back) = camera.axes();

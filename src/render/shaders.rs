@@ -5,10 +5,7 @@ use super::wgpu;
 /// A module: its name, its files, their text.
 pub(super) struct Module {
     pub name: &'static str,
-    #[cfg_attr(
-        not(test),
-        expect(dead_code, reason = "tests look for files that nothing uses")
-    )]
+    #[cfg_attr(not(test), expect(dead_code, reason = "tests look for files that nothing uses"))]
     pub files: &'static [&'static str],
     pub text: &'static str,
 }
@@ -24,11 +21,9 @@ macro_rules! module {
 }
 
 /// All passes but the last, where light is kept linear.
-pub(super) const LINEAR: Module =
-    module!("scene": "colour.wgsl", "light.wgsl", "linear.wgsl", "scene.wgsl");
+pub(super) const LINEAR: Module = module!("scene": "colour.wgsl", "light.wgsl", "linear.wgsl", "scene.wgsl");
 /// The same where each pass encodes.
-pub(super) const ENCODED: Module =
-    module!("scene, encoded": "colour.wgsl", "light.wgsl", "encoded.wgsl", "scene.wgsl");
+pub(super) const ENCODED: Module = module!("scene, encoded": "colour.wgsl", "light.wgsl", "encoded.wgsl", "scene.wgsl");
 /// The last pass.
 pub(super) const FINISH: Module = module!("finish": "colour.wgsl", "finish.wgsl");
 

@@ -54,12 +54,7 @@ pub struct RenderTarget {
 impl RenderTarget {
     /// A target of `size` pixels (each at least 1 and at most the device's `max_texture_dimension_2d`) with 1 or 4 samples in each;
     /// every backend supports four.
-    pub(super) fn new(
-        device: &wgpu::Device,
-        size: [u32; 2],
-        samples: u32,
-        keeping: Keeping,
-    ) -> Self {
+    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], samples: u32, keeping: Keeping) -> Self {
         use wgpu::TextureUsages as Usage;
         let texture = |label, format, sample_count, usage| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -102,11 +97,7 @@ impl RenderTarget {
 
 /// A texture's extent for a picture of `size` pixels.
 pub(super) fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
-    wgpu::Extent3d {
-        width,
-        height,
-        depth_or_array_layers: 1,
-    }
+    wgpu::Extent3d { width, height, depth_or_array_layers: 1 }
 }
 
 #[cfg(test)]
@@ -118,12 +109,7 @@ mod tests {
     fn light_is_kept_linear_only_where_floats_blend_and_resolve() {
         let all = Flags::BLENDABLE | Flags::MULTISAMPLE_X4 | Flags::MULTISAMPLE_RESOLVE;
         let usages = Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING;
-        let of = |flags, allowed_usages| {
-            Keeping::with(&wgpu::TextureFormatFeatures {
-                allowed_usages,
-                flags,
-            })
-        };
+        let of = |flags, allowed_usages| Keeping::with(&wgpu::TextureFormatFeatures { allowed_usages, flags });
         assert_eq!(of(all | Flags::FILTERABLE, usages), Keeping::Linear);
         for missing in all.iter() {
             assert_eq!(of(all - missing, usages), Keeping::Encoded, "{missing:?}");
@@ -132,9 +118,6 @@ mod tests {
             assert_eq!(of(all, usages - missing), Keeping::Encoded, "{missing:?}");
         }
         // WebGL2 without EXT_color_buffer_float.
-        assert_eq!(
-            of(Flags::FILTERABLE, Usage::TEXTURE_BINDING),
-            Keeping::Encoded
-        );
+        assert_eq!(of(Flags::FILTERABLE, Usage::TEXTURE_BINDING), Keeping::Encoded);
     }
 }

@@ -7,56 +7,30 @@ use super::{Image, Offscreen, RenderError, shaders};
 use crate::scene::{Scene, Vec3 as Vec3d};
 use crate::simulate::{ContactState, Frame, Simulation};
 use crate::view::{
-    Camera, Colour, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme,
-    ViewOptions, WearMap, WearScale, fixture, to_f32,
+    Camera, Colour, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, WearMap,
+    WearScale, fixture, to_f32,
 };
 
 const SIZE: [u32; 2] = [480, 360];
 
 fn offscreen() -> Offscreen {
-    Offscreen::new().expect(
-        "a graphics adapter: these tests need one, software is enough (mesa-vulkan-drivers)",
-    )
+    Offscreen::new().expect("a graphics adapter: these tests need one, software is enough (mesa-vulkan-drivers)")
 }
 
 /// Bare options: only the machine and its floor.
 fn bare() -> ViewOptions {
-    let mut options = ViewOptions {
-        triad: false,
-        hinges: false,
-        magnification: 20.0,
-        ..Default::default()
-    };
+    let mut options = ViewOptions { triad: false, hinges: false, magnification: 20.0, ..Default::default() };
     (options.arrows.normal, options.arrows.friction) = (false, false);
     options
 }
 
-fn picture(
-    scene: &Scene,
-    frame: &Frame,
-    options: &ViewOptions,
-    camera: &Camera,
-    hit: bool,
-) -> DrawList {
+fn picture(scene: &Scene, frame: &Frame, options: &ViewOptions, camera: &Camera, hit: bool) -> DrawList {
     let view = SceneView::new(scene, frame);
     let mut marks = PeakMarks::new();
-    let peaks = if hit {
-        fixture::hits(frame)
-    } else {
-        Vec::new()
-    };
+    let peaks = if hit { fixture::hits(frame) } else { Vec::new() };
     marks.update(frame, &peaks, f64::INFINITY);
     let mut list = DrawList::default();
-    let shot = Shot {
-        scene,
-        frame,
-        marks: &marks,
-        options,
-        camera,
-        trail: &[],
-        size: SIZE,
-        pixels_per_point: 1.0,
-    };
+    let shot = Shot { scene, frame, marks: &marks, options, camera, trail: &[], size: SIZE, pixels_per_point: 1.0 };
     view.build(&shot, &mut list);
     list
 }
@@ -81,11 +55,7 @@ fn brightness(pixel: [u8; 3]) -> i32 {
 
 /// Largest difference of a channel.
 fn difference(a: [u8; 3], b: [u8; 3]) -> u8 {
-    a.iter()
-        .zip(b)
-        .map(|(&a, b)| a.abs_diff(b))
-        .max()
-        .unwrap_or(0)
+    a.iter().zip(b).map(|(&a, b)| a.abs_diff(b)).max().unwrap_or(0)
 }
 
 #[test]
@@ -98,25 +68,20 @@ fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
         let name = name.to_str().expect("ASCII");
         let used = modules.iter().any(|module| module.files.contains(&name));
         assert!(used, "no module has {name}");
-        assert!(
-            house.contains(&format!("`{name}`")),
-            "{name}: ARCHITECTURE.md"
-        );
+        assert!(house.contains(&format!("`{name}`")), "{name}: ARCHITECTURE.md");
     }
     let mut entries = 0;
     for shaders::Module { name, text, .. } in modules {
-        let module = naga::front::wgsl::parse_str(text)
-            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
+        let module =
+            naga::front::wgsl::parse_str(text).unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
         // Core capabilities only: the web has no others.
         let flags = naga::valid::ValidationFlags::all();
         let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
             .validate(&module)
             .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
         for entry in &module.entry_points {
-            let options = naga::back::glsl::Options {
-                version: naga::back::glsl::Version::new_gles(300),
-                ..Default::default()
-            };
+            let options =
+                naga::back::glsl::Options { version: naga::back::glsl::Version::new_gles(300), ..Default::default() };
             let pipeline = naga::back::glsl::PipelineOptions {
                 shader_stage: entry.stage,
                 entry_point: entry.name.clone(),
@@ -137,37 +102,18 @@ fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
 fn the_same_list_gives_the_same_bytes() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
-    let options = ViewOptions {
-        magnification: 10.0,
-        ..Default::default()
-    };
+    let options = ViewOptions { magnification: 10.0, ..Default::default() };
     let mut camera = view.camera();
     view.fit(&mut camera, &scene, &frame, &options, SIZE);
     let list = picture(&scene, &frame, &options, &camera, true);
     let mut device = offscreen();
     let first = device.render(&list).expect("a picture");
-    assert_eq!(
-        (first.width, first.height, first.rgba.len()),
-        (480, 360, 480 * 360 * 4)
-    );
-    assert!(
-        first.rgba.chunks(4).all(|pixel| pixel[3] == 255),
-        "opaque everywhere"
-    );
-    assert_eq!(
-        device.render(&list).expect("a picture"),
-        first,
-        "on the same device"
-    );
-    assert_eq!(
-        offscreen().render(&list).expect("a picture"),
-        first,
-        "on a new device"
-    );
+    assert_eq!((first.width, first.height, first.rgba.len()), (480, 360, 480 * 360 * 4));
+    assert!(first.rgba.chunks(4).all(|pixel| pixel[3] == 255), "opaque everywhere");
+    assert_eq!(device.render(&list).expect("a picture"), first, "on the same device");
+    assert_eq!(offscreen().render(&list).expect("a picture"), first, "on a new device");
     let png = first.png(&[("Title", "three legs")]).expect("a PNG");
-    let mut reader = png::Decoder::new(std::io::Cursor::new(&png))
-        .read_info()
-        .expect("a PNG again");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&png)).read_info().expect("a PNG again");
     let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
     reader.next_frame(&mut bytes).expect("its pixels");
     assert_eq!(bytes, first.rgba);
@@ -175,42 +121,26 @@ fn the_same_list_gives_the_same_bytes() {
 
 #[test]
 fn the_ball_is_where_the_projection_says() {
-    let options = ViewOptions {
-        sockets: false,
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { sockets: false, floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let list = picture(&scene, &frame, &options, &camera, false);
     let mut without = list.clone();
     without.solid.by_mesh.iter_mut().for_each(Vec::clear);
     let mut device = offscreen();
-    let (with, without) = (
-        device.render(&list).expect("a picture"),
-        device.render(&without).expect("a picture"),
-    );
+    let (with, without) = (device.render(&list).expect("a picture"), device.render(&without).expect("a picture"));
     let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
     let (right, up, _) = camera.axes();
     let changed = |point: Vec3| difference(at(&with, &camera, point), at(&without, &camera, point));
     assert!(changed(centre) > 30, "the ball hides the background");
     for direction in [right, up, -right] {
-        assert!(
-            changed(centre + direction * 0.009) > 10,
-            "inside its outline"
-        );
-        assert!(
-            changed(centre + direction * 0.0115) <= 1,
-            "outside its outline"
-        );
+        assert!(changed(centre + direction * 0.009) > 10, "inside its outline");
+        assert!(changed(centre + direction * 0.0115) <= 1, "outside its outline");
     }
 }
 
 #[test]
 fn the_ball_shows_through_its_socket() {
-    let options = ViewOptions {
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, mut camera) = close_up(&options);
     // From behind: the closed half of the socket is between the eye and the ball.
     camera.yaw += std::f32::consts::PI;
@@ -231,10 +161,7 @@ fn the_ball_shows_through_its_socket() {
 
 #[test]
 fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
-    let options = ViewOptions {
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, mut camera) = close_up(&options);
     camera.yaw += std::f32::consts::PI;
     let mut list = picture(&scene, &frame, &options, &camera, false);
@@ -267,10 +194,7 @@ fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
     };
     let [coarse, fine] = far.map(|far| colour(&[far, near]));
     let bare = colour(&[far[1]]);
-    assert!(
-        difference(fine, bare) > 10,
-        "{fine:?} {bare:?}: glass before it"
-    );
+    assert!(difference(fine, bare) > 10, "{fine:?} {bare:?}: glass before it");
     assert!(difference(coarse, fine) < 6, "{coarse:?} {fine:?}");
 }
 
@@ -283,11 +207,7 @@ fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
     (camera.target, camera.distance) = (Vec3::ZERO, 0.16);
     let (right, up, back) = camera.axes();
     // No cut in the middle of the picture.
-    let openings = [
-        right + up - back,
-        up - right + 0.5 * back,
-        right - 2.0 * up - 1.5 * back,
-    ];
+    let openings = [right + up - back, up - right + 0.5 * back, right - 2.0 * up - 1.5 * back];
     let double = |v: Vec3| Vec3d::new(v.x.into(), v.y.into(), v.z.into());
     let (joint, report) = (scene.ball_joints[0].clone(), frame.joints[0]);
     let (body, motion) = (scene.bodies[0].clone(), frame.bodies[0]);
@@ -318,26 +238,11 @@ fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
 
 #[test]
 fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_order() {
-    const ORDERS: [[usize; 3]; 6] = [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ];
+    const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
     // A colour for each, and its opacity.
-    let tints = [
-        [0.9, 0.6, 0.6, 0.4],
-        [0.6, 0.85, 0.6, 0.5],
-        [0.6, 0.7, 0.85, 0.3],
-    ];
+    let tints = [[0.9, 0.6, 0.6, 0.4], [0.6, 0.85, 0.6, 0.5], [0.6, 0.7, 0.85, 0.3]];
     let greys = [0.4, 0.75].map(|c| Colour([c, c, c, 1.0]));
-    let options = ViewOptions {
-        floor: false,
-        joint_names: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, joint_names: false, ..bare() };
     let mut device = offscreen();
     for behind in [false, true] {
         let mut whole = Vec::new();
@@ -409,8 +314,7 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
             });
             light.map(|c| c - 0.04 * (1.0 - share))
         };
-        let off =
-            |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
+        let off = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
         let far_to_near = if behind { [2, 1, 0] } else { [0, 1, 2] };
         for (seen, ground) in middle(&|_| true).into_iter().zip(given) {
             let expected = over(far_to_near, ground);
@@ -442,47 +346,28 @@ fn the_machine_casts_a_shadow_on_the_floor() {
     let mut lit_list = shaded_list.clone();
     lit_list.solid.by_mesh.iter_mut().for_each(Vec::clear);
     let mut device = offscreen();
-    let (shaded, lit) = (
-        device.render(&shaded_list).expect("a picture"),
-        device.render(&lit_list).expect("a picture"),
-    );
-    let (dark, bright) = (
-        brightness(at(&shaded, &camera, shadow)),
-        brightness(at(&lit, &camera, shadow)),
-    );
-    assert!(
-        dark < bright - 90,
-        "{dark} in the shadow, {bright} without it"
-    );
+    let (shaded, lit) = (device.render(&shaded_list).expect("a picture"), device.render(&lit_list).expect("a picture"));
+    let (dark, bright) = (brightness(at(&shaded, &camera, shadow)), brightness(at(&lit, &camera, shadow)));
+    assert!(dark < bright - 90, "{dark} in the shadow, {bright} without it");
     let beside = shadow + 0.35 * camera.axes().0;
-    assert!(
-        difference(at(&shaded, &camera, beside), at(&lit, &camera, beside)) <= 1,
-        "light beside it"
-    );
+    assert!(difference(at(&shaded, &camera, beside), at(&lit, &camera, beside)) <= 1, "light beside it");
 }
 
 #[test]
 fn an_arrow_inside_a_ball_can_be_seen() {
-    let mut options = ViewOptions {
-        floor: false,
-        ..bare()
-    };
+    let mut options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let plain = picture(&scene, &frame, &options, &camera, false);
     options.arrows.normal = true;
     let marked = picture(&scene, &frame, &options, &camera, false);
     let mut device = offscreen();
-    let (plain, marked) = (
-        device.render(&plain).expect("a picture"),
-        device.render(&marked).expect("a picture"),
-    );
+    let (plain, marked) = (device.render(&plain).expect("a picture"), device.render(&marked).expect("a picture"));
     // The normal force points from the contact through the centre of the ball.
     let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
     let inside = centre - 0.005 * to_f32(&frame.joints[0].normal_force).normalize();
     let [red, _, blue] = at(&marked, &camera, inside);
     assert!(
-        difference(at(&plain, &camera, inside), [red, 0, blue]) > 0
-            && red > blue.saturating_add(40),
+        difference(at(&plain, &camera, inside), [red, 0, blue]) > 0 && red > blue.saturating_add(40),
         "{red} {blue}"
     );
 }
@@ -492,11 +377,8 @@ fn a_hit_joint_lights_up_and_themes_differ() {
     let options = bare();
     let (scene, frame, camera) = close_up(&options);
     let mut device = offscreen();
-    let mut draw = |options: &ViewOptions, hit| {
-        device
-            .render(&picture(&scene, &frame, options, &camera, hit))
-            .expect("a picture")
-    };
+    let mut draw =
+        |options: &ViewOptions, hit| device.render(&picture(&scene, &frame, options, &camera, hit)).expect("a picture");
     let (quiet, hit) = (draw(&options, false), draw(&options, true));
     let beside = to_f32(&frame.joints[0].socket_centre) + camera.axes().0 * 0.024;
     let [r0, _, b0] = at(&quiet, &camera, beside).map(i32::from);
@@ -510,21 +392,9 @@ fn a_hit_joint_lights_up_and_themes_differ() {
         let point = centre + 0.0186 * part.sqrt() * (right * turn.cos() + up * turn.sin());
         assert_eq!(at(&hit, &camera, point), at(&quiet, &camera, point));
     }
-    let dark = draw(
-        &ViewOptions {
-            theme: Theme::Dark,
-            ..options.clone()
-        },
-        false,
-    );
+    let dark = draw(&ViewOptions { theme: Theme::Dark, ..options.clone() }, false);
     assert!(brightness(quiet.pixel(5, 5)) > 600 && brightness(dark.pixel(5, 5)) < 200);
-    let calm = draw(
-        &ViewOptions {
-            flash: false,
-            ..options
-        },
-        true,
-    );
+    let calm = draw(&ViewOptions { flash: false, ..options }, true);
     assert_eq!(calm, quiet, "no flash where none is wanted");
 }
 
@@ -545,12 +415,7 @@ fn differing(a: &Image, b: &Image, by: u8) -> Vec<[u32; 2]> {
 fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
     let (scene, mut frame) = fixture::pendulum();
     let view = SceneView::new(&scene, &frame);
-    let mut options = ViewOptions {
-        sockets: false,
-        floor: false,
-        joint_names: false,
-        ..bare()
-    };
+    let mut options = ViewOptions { sockets: false, floor: false, joint_names: false, ..bare() };
     options.arrows.normal = true;
     options.arrows.reference = Some(10.0);
     let mut device = offscreen();
@@ -576,29 +441,18 @@ fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
         list.solid.by_mesh.iter_mut().for_each(Vec::clear);
         let with = draw(&list);
         list.arrows.by_mesh.iter_mut().for_each(Vec::clear);
-        let reach = differing(&with, &draw(&list), 12)
-            .into_iter()
-            .map(|[x, y]| x as f32 * 0.8 + y as f32 * 0.6);
-        let (low, high) = reach.fold((f32::MAX, f32::MIN), |(low, high), at| {
-            (low.min(at), high.max(at))
-        });
+        let reach = differing(&with, &draw(&list), 12).into_iter().map(|[x, y]| x as f32 * 0.8 + y as f32 * 0.6);
+        let (low, high) = reach.fold((f32::MAX, f32::MIN), |(low, high), at| (low.min(at), high.max(at)));
         let ruler = list.legend.as_ref().expect("a ruler").pixels * newtons as f32 / 10.0;
         let seen = high - low + 1.0;
         // The tip is a point and the tail a disc seen from its edge: a pixel or two at either end.
-        assert!(
-            (seen - ruler).abs() < 4.0,
-            "{newtons} N at {zoom}: {seen} of {ruler}"
-        );
+        assert!((seen - ruler).abs() < 4.0, "{newtons} N at {zoom}: {seen} of {ruler}");
     }
 }
 
 #[test]
 fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
-    let options = ViewOptions {
-        sockets: false,
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { sockets: false, floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let view = SceneView::new(&scene, &frame);
     let mut device = offscreen();
@@ -637,11 +491,7 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
 
 #[test]
 fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
-    let options = ViewOptions {
-        sockets: false,
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { sockets: false, floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let view = SceneView::new(&scene, &frame);
     let mut device = offscreen();
@@ -691,10 +541,7 @@ fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
             let change = difference(at(&both, &camera, point), at(&twin, &camera, point));
             assert!(change <= 1, "the nearer alone is seen: {change} at {point}");
         }
-        for (found, (image, which)) in edged
-            .iter_mut()
-            .zip([(&twin, Ghost::Twin), (&both, Ghost::Ideal)])
-        {
+        for (found, (image, which)) in edged.iter_mut().zip([(&twin, Ghost::Twin), (&both, Ghost::Ideal)]) {
             let edge = palette.ghost(which).edge.to_rgba8();
             // About the outline of the ball, which perspective makes a little larger.
             let ring = |step: i32| centre + (radius + 0.25 * step as f32 * pixel) * out;
@@ -711,10 +558,7 @@ fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
 fn every_standard_view_shows_what_moves() {
     let mut device = offscreen();
     let mut draw = |list: &DrawList| device.render(list).expect("a picture");
-    let options = ViewOptions {
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, ..bare() };
     for name in crate::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
         let mut frame = Frame::default();
@@ -739,11 +583,7 @@ fn every_standard_view_shows_what_moves() {
                 moving.light = whole.light;
                 let (mut fixed, mut nothing) = (whole.clone(), moving.clone());
                 // Fixed parts come first.
-                let both = fixed
-                    .solid
-                    .by_mesh
-                    .iter_mut()
-                    .zip(&mut nothing.solid.by_mesh);
+                let both = fixed.solid.by_mesh.iter_mut().zip(&mut nothing.solid.by_mesh);
                 for (fixed, moving) in both {
                     fixed.truncate(fixed.len() - moving.len());
                     moving.clear();
@@ -752,9 +592,7 @@ fn every_standard_view_shows_what_moves() {
                 nothing.sockets.clear();
                 let possible = differing(&draw(&moving), &draw(&nothing), 24);
                 let (whole, fixed) = (draw(&whole), draw(&fixed));
-                let seen = possible
-                    .iter()
-                    .filter(|[x, y]| difference(whole.pixel(*x, *y), fixed.pixel(*x, *y)) > 24);
+                let seen = possible.iter().filter(|[x, y]| difference(whole.pixel(*x, *y), fixed.pixel(*x, *y)) > 24);
                 let (seen, possible) = (seen.count(), possible.len());
                 println!("{name} {time} {preset:?}: {seen} of {possible}");
                 assert!(possible > 300, "{name} {preset:?}: {possible}");
@@ -780,21 +618,14 @@ fn the_background_has_exactly_the_themes_colours() {
     };
     let image = device.render(&list).expect("a picture");
     // Encoded exactly once; half a step of noise may round to a neighbour.
-    assert!(
-        (0..64).all(|i| difference(image.pixel(i, i), [0x40, 0x60, 0x80]) <= 1),
-        "{:?}",
-        image.pixel(9, 9)
-    );
+    assert!((0..64).all(|i| difference(image.pixel(i, i), [0x40, 0x60, 0x80]) <= 1), "{:?}", image.pixel(9, 9));
 }
 
 #[test]
 fn a_size_that_cannot_be_drawn_is_refused_with_the_limit() {
     let mut device = offscreen();
     for size in [[0, 10], [10, 0], [1 << 20, 10]] {
-        let list = DrawList {
-            size,
-            ..Default::default()
-        };
+        let list = DrawList { size, ..Default::default() };
         let error = device.render(&list).expect_err("refused");
         assert!(matches!(error, RenderError::Size { .. }));
         assert!(error.to_string().contains("1 to "), "{error}");
@@ -808,8 +639,7 @@ impl eframe::App for OnlyViewport {
     fn ui(&mut self, ui: &mut eframe::egui::Ui, _frame: &mut eframe::Frame) {
         eframe::egui::CentralPanel::no_frame().show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
-            ui.painter()
-                .add(super::Viewport::shape(rect, self.0.clone()));
+            ui.painter().add(super::Viewport::shape(rect, self.0.clone()));
         });
     }
 }
@@ -826,15 +656,8 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
     let wear = simulation.wear().expect("kept");
     let (view, marks) = (SceneView::new(&scene, &frame), PeakMarks::new());
     let mut device = offscreen();
-    for (theme, map) in [
-        (Theme::Light, WearMap::Impulse),
-        (Theme::Dark, WearMap::FrictionWork),
-    ] {
-        let options = ViewOptions {
-            theme,
-            wear: map,
-            ..bare()
-        };
+    for (theme, map) in [(Theme::Light, WearMap::Impulse), (Theme::Dark, WearMap::FrictionWork)] {
+        let options = ViewOptions { theme, wear: map, ..bare() };
         // From above, into the lower half, where the weight presses.
         let mut camera = view.camera();
         view.close_up(&mut camera, 0, &scene, &frame, &options);
@@ -852,11 +675,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
         let mut list = DrawList::default();
         view.build(&shot, &mut list);
         let clear = list.clear_balls.clone();
-        assert_eq!(
-            clear.len(),
-            1,
-            "the ball that hides the wall is seen through"
-        );
+        assert_eq!(clear.len(), 1, "the ball that hides the wall is seen through");
         // Nothing in front of the wall.
         list.solid.by_mesh.iter_mut().for_each(Vec::clear);
         list.clear_balls.clear();
@@ -873,10 +692,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
         for (i, cell) in wear.cells(0).iter().enumerate() {
             let edges = wear.grid().edges(i);
             let middle = |[from, to]: [f64; 2]| 0.5 * (from + to);
-            let ((s, c), (sa, ca)) = (
-                middle(edges.polar).sin_cos(),
-                middle(edges.azimuth).sin_cos(),
-            );
+            let ((s, c), (sa, ca)) = (middle(edges.polar).sin_cos(), middle(edges.azimuth).sin_cos());
             // Its socket is fixed to the world.
             let direction = wear.grid_from_body(0).transpose() * Vec3d::new(s * ca, s * sa, c);
             let point = socket + to_f32(&direction) * (0.99 * inner);
@@ -903,10 +719,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
             struck += 1;
             brightest = brightest.max(place);
         }
-        assert!(
-            struck >= 3 && clear >= 3,
-            "{map:?}: {struck} struck, {clear} clear"
-        );
+        assert!(struck >= 3 && clear >= 3, "{map:?}: {struck} struck, {clear} clear");
         assert_eq!(brightest, 1.0, "the largest value is in the picture");
     }
 }
@@ -915,10 +728,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
 fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
-    let options = ViewOptions {
-        magnification: 10.0,
-        ..Default::default()
-    };
+    let options = ViewOptions { magnification: 10.0, ..Default::default() };
     let mut camera = view.camera();
     view.fit(&mut camera, &scene, &frame, &options, SIZE);
     let list = picture(&scene, &frame, &options, &camera, false);
@@ -934,16 +744,8 @@ fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
     harness.run();
     let shown = harness.render().expect("a picture");
     assert_eq!((shown.width(), shown.height()), (SIZE[0], SIZE[1]));
-    let worst = shown
-        .as_raw()
-        .iter()
-        .zip(&alone.rgba)
-        .map(|(a, b)| a.abs_diff(*b))
-        .max();
-    assert!(
-        worst.is_some_and(|worst| worst <= 1),
-        "bytes are copied: {worst:?}"
-    );
+    let worst = shown.as_raw().iter().zip(&alone.rgba).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(worst.is_some_and(|worst| worst <= 1), "bytes are copied: {worst:?}");
 }
 
 /// Channel of a theme's colour as light.
@@ -964,14 +766,11 @@ fn arrows_and_outlines_have_the_themes_colours_on_any_ground() {
         options.arrows.reference = Some(1.0);
         let mut camera = SceneView::new(&scene, &frame).camera();
         SceneView::new(&scene, &frame).fit(&mut camera, &scene, &frame, &options, SIZE);
-        let image = device
-            .render(&picture(&scene, &frame, &options, &camera, true))
-            .expect("a picture");
+        let image = device.render(&picture(&scene, &frame, &options, &camera, true)).expect("a picture");
         let count = |colour: Colour| {
             let [r, g, b, _] = colour.to_rgba8();
             let all = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
-            all.filter(|(x, y)| difference(image.pixel(*x, *y), [r, g, b]) <= 2)
-                .count()
+            all.filter(|(x, y)| difference(image.pixel(*x, *y), [r, g, b]) <= 2).count()
         };
         for colour in [palette.normal, palette.friction] {
             let seen = count(colour);
@@ -982,10 +781,7 @@ fn arrows_and_outlines_have_the_themes_colours_on_any_ground() {
 
 #[test]
 fn a_halo_joins_the_picture_in_linear_light() {
-    let options = ViewOptions {
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let mut list = picture(&scene, &frame, &options, &camera, true);
     list.background.top = list.background.bottom;
@@ -1002,20 +798,13 @@ fn a_halo_joins_the_picture_in_linear_light() {
     assert!(share(2) > 0.2, "{}", share(2));
     for k in [0, 1] {
         let expected = before[k] + share(2) * (halo[k] - before[k]);
-        assert!(
-            (after[k] - expected).abs() < 0.02,
-            "{k}: {after:?} {before:?} {halo:?}"
-        );
+        assert!((after[k] - expected).abs() < 0.02, "{k}: {after:?} {before:?} {halo:?}");
     }
 }
 
 #[test]
 fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
-    let options = ViewOptions {
-        floor: false,
-        sockets: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, sockets: false, ..bare() };
     let (scene, touching, mut camera) = close_up(&options);
     let report = &touching.joints[0];
     let outwards = to_f32(&report.eccentricity).normalize();
@@ -1045,10 +834,7 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
         for [x, y] in seen {
             let off = glam::Vec2::new(x as f32, y as f32).distance(point);
             let radius = 0.01 / best.metres_per_pixel(SIZE);
-            assert!(
-                (0.25 * radius..0.65 * radius).contains(&off),
-                "{off} {radius}"
-            );
+            assert!((0.25 * radius..0.65 * radius).contains(&off), "{off} {radius}");
         }
     }
     assert_eq!(draw(ContactState::Ideal), free);
@@ -1056,10 +842,7 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
 
 #[test]
 fn a_ball_is_darker_the_nearer_its_wall_is() {
-    let options = ViewOptions {
-        floor: false,
-        ..bare()
-    };
+    let options = ViewOptions { floor: false, ..bare() };
     let (scene, frame, camera) = close_up(&options);
     let mut list = picture(&scene, &frame, &options, &camera, false);
     let mut device = offscreen();
@@ -1083,21 +866,14 @@ fn a_ball_is_darker_the_nearer_its_wall_is() {
         a / b
     };
     let (touching, front, opposite) = (share(0.8), share(0.0), share(-0.8));
-    assert!(
-        touching < 0.85 * front && front < opposite && opposite > 0.9,
-        "{touching} {front} {opposite}"
-    );
+    assert!(touching < 0.85 * front && front < opposite && opposite > 0.9, "{touching} {front} {opposite}");
 }
 
 /// The Khronos PBR Neutral tone mapper, from its specification:
 /// <https://github.com/KhronosGroup/ToneMapping/blob/main/PBR_Neutral/README.md>.
 fn neutral(light: [f64; 3]) -> [f64; 3] {
     let least = light.into_iter().fold(f64::INFINITY, f64::min);
-    let offset = if least <= 0.08 {
-        least - 6.25 * least * least
-    } else {
-        0.04
-    };
+    let offset = if least <= 0.08 { least - 6.25 * least * least } else { 0.04 };
     let c = light.map(|x| x - offset);
     let peak = c.into_iter().fold(0.0, f64::max);
     let bends = 0.8 - 0.04;
@@ -1127,18 +903,11 @@ fn light_is_mapped_by_the_neutral_curve_and_given_colours_are_left() {
         let expected = [0, 1, 2].map(|k| {
             let given = f64::from(given);
             let c = (mapped[k] + given * (light[k] - mapped[k])).clamp(0.0, 1.0);
-            let encoded = if c <= 0.003_130_8 {
-                12.92 * c
-            } else {
-                1.055 * c.powf(1.0 / 2.4) - 0.055
-            };
+            let encoded = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
             (255.0 * encoded).round() as u8
         });
         let found = image.pixel(i as u32, 0);
-        assert!(
-            difference(found, expected) <= 1,
-            "{r} {g} {given}: {found:?} {expected:?}"
-        );
+        assert!(difference(found, expected) <= 1, "{r} {g} {given}: {found:?} {expected:?}");
     }
 }
 

@@ -34,11 +34,7 @@ impl Scene {
 
     /// Parameters this scene has, in table order and then its own; a contact row also stands for `joint.<name>.<key>`.
     pub fn parameters(&self) -> Vec<&'static Parameter> {
-        table()
-            .iter()
-            .filter(|parameter| self.has(parameter))
-            .chain(self.source.own.iter().map(row_of_own))
-            .collect()
+        table().iter().filter(|parameter| self.has(parameter)).chain(self.source.own.iter().map(row_of_own)).collect()
     }
 
     /// Row of a number of the file, by its key.
@@ -53,62 +49,35 @@ impl Scene {
 
     fn resolve(&self, key: &str) -> Result<Resolved, SceneError> {
         if let Some(parameter) = self.number(key) {
-            return Ok(Resolved {
-                parameter,
-                joint: None,
-            });
+            return Ok(Resolved { parameter, joint: None });
         }
-        let Some((name, part)) = key
-            .strip_prefix("joint.")
-            .and_then(|rest| rest.rsplit_once('.'))
-        else {
+        let Some((name, part)) = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) else {
             return match find(key) {
-                Some(parameter) if self.has(parameter) => Ok(Resolved {
-                    parameter,
-                    joint: None,
-                }),
+                Some(parameter) if self.has(parameter) => Ok(Resolved { parameter, joint: None }),
                 Some(parameter) => {
                     let place = parameter.scope.describe();
                     Err(SceneError::about(
                         key,
                         None,
-                        format!(
-                            "the scene `{}` has no such key: it exists only in {place}",
-                            self.name
-                        ),
+                        format!("the scene `{}` has no such key: it exists only in {place}", self.name),
                     ))
                 }
-                None if file_only(key) => Err(SceneError::about(
-                    key,
-                    None,
-                    "only in the scene file: it cannot be changed from outside it",
-                )),
+                None if file_only(key) => {
+                    Err(SceneError::about(key, None, "only in the scene file: it cannot be changed from outside it"))
+                }
                 None => {
                     let here = self.parameters();
                     let table = here.iter().map(|parameter| parameter.key);
                     // Beyond this many the search takes longer than it helps.
-                    let numbers = self
-                        .source
-                        .numbers
-                        .keys()
-                        .map(String::as_str)
-                        .take(MOST_CHANGES);
+                    let numbers = self.source.numbers.keys().map(String::as_str).take(MOST_CHANGES);
                     let near = nearest_parameter(key, table.chain(numbers), &[]);
                     Err(SceneError::about(key, None, format!("unknown key{near}")))
                 }
             };
         };
         let Some(joint) = self.ball_joints.iter().position(|joint| joint.name == name) else {
-            let names: Vec<&str> = self
-                .ball_joints
-                .iter()
-                .map(|joint| joint.name.as_str())
-                .collect();
-            let listed = if names.len() > 12 {
-                format!("{}, …", names[..12].join(", "))
-            } else {
-                names.join(", ")
-            };
+            let names: Vec<&str> = self.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+            let listed = if names.len() > 12 { format!("{}, …", names[..12].join(", ")) } else { names.join(", ") };
             let first = name.split('.').next().unwrap_or(name);
             let mut others = self.joints.iter().chain(&self.closing_joints);
             let hinge = others.any(|joint| joint.name == first);
@@ -122,34 +91,20 @@ impl Scene {
                 format!(
                     "`{first}` is not a ball joint, and the file gives no such number of it{near}; its numbers: {}. Ball joints, \
                      {listed}, have joint.<ball joint>.<key>; keys: {}",
-                    if given.is_empty() {
-                        "none".to_owned()
-                    } else {
-                        given.join(", ")
-                    },
+                    if given.is_empty() { "none".to_owned() } else { given.join(", ") },
                     parts.join(", ")
                 )
             } else {
                 let near = nearest(name, names.iter().copied());
-                format!(
-                    "no ball joint `{}`{near}; ball joints: {listed}",
-                    brief(name)
-                )
+                format!("no ball joint `{}`{near}; ball joints: {listed}", brief(name))
             };
             return Err(SceneError::about(key, None, message));
         };
         match find(&format!("contact.{part}")) {
-            Some(parameter) => Ok(Resolved {
-                parameter,
-                joint: Some(joint),
-            }),
+            Some(parameter) => Ok(Resolved { parameter, joint: Some(joint) }),
             None => {
                 let parts = table().iter().filter_map(contact_part);
-                Err(SceneError::about(
-                    key,
-                    None,
-                    format!("unknown key{}", nearest(part, parts)),
-                ))
+                Err(SceneError::about(key, None, format!("unknown key{}", nearest(part, parts))))
             }
         }
     }
@@ -192,8 +147,7 @@ impl Scene {
         if REBUILDS.contains(&key) || matches!(parameter.access, Access::Number) {
             next = next.rebuilt()?;
         }
-        next.check_contacts()
-            .map_err(|fault| fault.blame_change(&next, key))?;
+        next.check_contacts().map_err(|fault| fault.blame_change(&next, key))?;
         *self = next;
         Ok(parameter)
     }
@@ -202,21 +156,13 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Self::set`]; [`Value::Unset`] reverts the change, as [`Self::undo_change`].
-    pub fn set_value(
-        &mut self,
-        key: &str,
-        value: &Value,
-    ) -> Result<&'static Parameter, SceneError> {
+    pub fn set_value(&mut self, key: &str, value: &Value) -> Result<&'static Parameter, SceneError> {
         let parameter = self.parameter(key)?;
         if *value == Value::Unset {
             return self.undo_change(key);
         }
         if matches!(value, Value::Number(number) if !number.is_finite()) {
-            return Err(SceneError::about(
-                key,
-                None,
-                format!("must be a finite number; {}", parameter.allowed()),
-            ));
+            return Err(SceneError::about(key, None, format!("must be a finite number; {}", parameter.allowed())));
         }
         self.set(key, &parameter.write(value))
     }
@@ -239,39 +185,23 @@ impl Scene {
         if let Some((_, links)) = changes.iter().find(|(key, _)| key == "chain.links") {
             // The ball joints of a chain are J1 to JN.
             let links: u64 = links.parse().unwrap_or(u64::MAX);
-            changes.retain(|(key, _)| {
-                match key
-                    .strip_prefix("joint.J")
-                    .and_then(|rest| rest.split('.').next())
-                {
-                    Some(index) => index.parse::<u64>().map_or(true, |index| index <= links),
-                    None => true,
-                }
+            changes.retain(|(key, _)| match key.strip_prefix("joint.J").and_then(|rest| rest.split('.').next()) {
+                Some(index) => index.parse::<u64>().map_or(true, |index| index <= links),
+                None => true,
             });
         }
         let source = &self.source;
-        Self::parse_with(
-            &source.text,
-            source.file.as_deref(),
-            &source.beside,
-            &changes,
-        )
+        Self::parse_with(&source.text, source.file.as_deref(), &source.beside, &changes)
     }
 
     /// Applies and records one change, without the checks across parameters.
-    pub(super) fn change(
-        &mut self,
-        key: &str,
-        text: &str,
-    ) -> Result<&'static Parameter, SceneError> {
+    pub(super) fn change(&mut self, key: &str, text: &str) -> Result<&'static Parameter, SceneError> {
         let text = text.trim();
         let Resolved { parameter, joint } = self.resolve(key).map_err(|mut error| {
             error.value = Some(text.into());
             error
         })?;
-        let value = parameter
-            .read(text)
-            .map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
+        let value = parameter.read(text).map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
         match (parameter.access, joint) {
             (Access::Contact(field), Some(joint)) => {
                 let joint = &mut self.ball_joints[joint];
@@ -285,8 +215,7 @@ impl Scene {
         }
         self.changes.retain(|(changed, _)| changed != key);
         if self.changes.len() >= MOST_CHANGES {
-            let message =
-                format!("too many parameters are changed; allowed at most {MOST_CHANGES}");
+            let message = format!("too many parameters are changed; allowed at most {MOST_CHANGES}");
             return Err(SceneError::about(key, Some(text), message));
         }
         self.changes.push((key.to_owned(), text.to_owned()));
@@ -317,8 +246,7 @@ impl Scene {
     /// Whatever the scene's text does not give by name follows the preset.
     pub(super) fn apply_preset(&mut self, preset: Preset) {
         let (method, step, tolerance) = preset.point();
-        let [method_free, step_free, tolerance_free] =
-            SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));
+        let [method_free, step_free, tolerance_free] = SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));
         let solver = &mut self.solver;
         solver.preset = Some(preset);
         if method_free {

@@ -55,9 +55,7 @@ fn encoded(bytes: &[u8]) -> Arc<str> {
 /// Why a scene does not get a file that it names.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum BesideFault {
-    #[error(
-        "is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`"
-    )]
+    #[error("is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`")]
     NotBeside,
     #[error(
         "this scene has no folder in which to find a file: choose or drop that file and the scene's at once, or load the scene \
@@ -77,10 +75,7 @@ pub(super) enum BesideFault {
     },
     #[error("not a text file: it is not valid UTF-8")]
     NotText,
-    #[error(
-        "is no file with a mesh; allowed names that end in {}",
-        Format::ENDINGS
-    )]
+    #[error("is no file with a mesh; allowed names that end in {}", Format::ENDINGS)]
     NotMesh,
 }
 
@@ -89,10 +84,7 @@ pub(super) enum NoMesh {
     /// It is not there, or not of a known kind.
     Nowhere(BesideFault),
     /// What is wrong in it, with its text if it is one.
-    Within {
-        text: Option<Arc<str>>,
-        fault: Fault,
-    },
+    Within { text: Option<Arc<str>>, fault: Fault },
 }
 
 /// What a file is for.
@@ -121,27 +113,17 @@ pub(super) struct Beside<'d> {
 impl<'d> Beside<'d> {
     /// Reads files in `folder`.
     pub fn in_folder(folder: &'d Path) -> Self {
-        Self {
-            folder: Some(folder),
-            ..Self::default()
-        }
+        Self { folder: Some(folder), ..Self::default() }
     }
 
     /// Uses what was read before.
     pub fn known(texts: &'d Texts) -> Self {
-        Self {
-            known: Some(texts),
-            ..Self::default()
-        }
+        Self { known: Some(texts), ..Self::default() }
     }
 
     /// Uses what was `given` with the scene, and its `folder`, if it has one.
     pub fn given(given: &'d BTreeMap<String, Vec<u8>>, folder: Option<&'d Path>) -> Self {
-        Self {
-            folder,
-            given: Some(given),
-            ..Self::default()
-        }
+        Self { folder, given: Some(given), ..Self::default() }
     }
 
     /// Text of the file `name`.
@@ -225,9 +207,7 @@ impl<'d> Beside<'d> {
     fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, BesideFault> {
         let path = self.folder.map(|folder| folder.join(name));
         // Only names come with a file that was dropped on a page.
-        let given = name
-            .file_name()
-            .and_then(|own| self.given?.get(own.to_str()?));
+        let given = name.file_name().and_then(|own| self.given?.get(own.to_str()?));
         match (given, path) {
             (Some(bytes), path) if !path.as_ref().is_some_and(|path| path.exists()) => {
                 let most = bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX));
@@ -251,13 +231,7 @@ mod tests {
 
     #[test]
     fn what_is_kept_gives_back_the_bytes() {
-        for bytes in [
-            &b"v 1 2 3"[..],
-            b"base64:AAAA",
-            b"base64:",
-            b"",
-            b"\xff\x00solid",
-        ] {
+        for bytes in [&b"v 1 2 3"[..], b"base64:AAAA", b"base64:", b"", b"\xff\x00solid"] {
             let text = kept(bytes.to_vec());
             assert_eq!(&*file_bytes(&text), bytes);
         }

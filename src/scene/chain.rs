@@ -13,10 +13,7 @@ use super::*;
 ///
 /// # Errors
 /// Anything wrong in the section, a name already used in the file, or a joint that the chain does not have.
-pub(super) fn expand<'d>(
-    node: &Node<'d>,
-    scene: &mut Scene,
-) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
+pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
     let section = node.section()?;
     let hang = section.vector("hang")?;
     let rotation = read_rotation(section.get("rotation"))?;
@@ -24,18 +21,14 @@ pub(super) fn expand<'d>(
     let template = read_rigid_body(&link, String::new())?;
     let ball = link.vector("ball")?;
     let socket = link.vector("socket")?;
-    let opening = link
-        .get("opening")
-        .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let opening = link.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
     let links = scene.chain.map_or(0, |chain| chain.links);
-    for (so_far, most, what) in [
-        (scene.bodies.len(), MOST_BODIES, "bodies"),
-        (scene.ball_joints.len(), MOST_BALL_JOINTS, "ball joints"),
-    ] {
+    for (so_far, most, what) in
+        [(scene.bodies.len(), MOST_BODIES, "bodies"), (scene.ball_joints.len(), MOST_BALL_JOINTS, "ball joints")]
+    {
         if so_far + links > most {
-            let message = format!(
-                "too many {what} with those of the file: {so_far} and {links}; allowed at most {most}"
-            );
+            let message =
+                format!("too many {what} with those of the file: {so_far} and {links}; allowed at most {most}");
             return Err(section.error("links", message));
         }
     }
@@ -46,18 +39,13 @@ pub(super) fn expand<'d>(
     }
 
     let used = |name: &str, prefix: &str| {
-        let number = name
-            .strip_prefix(prefix)
-            .and_then(|rest| rest.parse::<usize>().ok());
+        let number = name.strip_prefix(prefix).and_then(|rest| rest.parse::<usize>().ok());
         number.is_some_and(|number| (1..=links).contains(&number))
     };
     let joint_used = |name: &str| used(name, "free") || used(name, "J");
     if scene.bodies.iter().any(|body| used(&body.name, "link"))
         || scene.joints.iter().any(|joint| joint_used(&joint.name))
-        || scene
-            .ball_joints
-            .iter()
-            .any(|joint| joint_used(&joint.name))
+        || scene.ball_joints.iter().any(|joint| joint_used(&joint.name))
     {
         let message = "the file already uses a name that the chain needs: bodies link1, link2, …, joints free1, free2, … \
                        and J1, J2, …";
@@ -68,32 +56,16 @@ pub(super) fn expand<'d>(
     let step = rotation * (socket - ball);
     for index in 0..links {
         let number = index + 1;
-        let body = Body {
-            name: format!("link{number}"),
-            ..template.clone()
-        };
+        let body = Body { name: format!("link{number}"), ..template.clone() };
         let ball_joint = BallJoint {
             name: format!("J{number}"),
             socket: match index {
-                0 => Attachment {
-                    body: None,
-                    point: hang,
-                },
-                _ => Attachment {
-                    body: Some(first + index - 1),
-                    point: socket,
-                },
+                0 => Attachment { body: None, point: hang },
+                _ => Attachment { body: Some(first + index - 1), point: socket },
             },
-            ball: Attachment {
-                body: Some(first + index),
-                point: ball,
-            },
+            ball: Attachment { body: Some(first + index), point: ball },
             // The world's socket has world axes; the links' sockets rotate with the links.
-            opening: if index == 0 {
-                rotation * opening
-            } else {
-                opening
-            },
+            opening: if index == 0 { rotation * opening } else { opening },
             contact: scene.contact,
             overrides: Vec::new(),
         };
@@ -140,9 +112,7 @@ fn read_own<'d>(
         let number = name.strip_prefix('J').and_then(|n| n.parse::<usize>().ok());
         let found = number.and_then(|n| joints.get_mut(n.checked_sub(1)?));
         let Some(joint) = found.filter(|joint| joint.name == name) else {
-            let message = format!(
-                "the chain has no ball joint `{name}`; it has {links} links: J1 to J{links}"
-            );
+            let message = format!("the chain has no ball joint `{name}`; it has {links} links: J1 to J{links}");
             return Err(own.error("name", message));
         };
         if !joint.overrides.is_empty() {

@@ -47,10 +47,7 @@ impl Scene {
                 && contact.slip_speed_high < 1e-6
                 && contact.friction_law == FrictionLaw::ModifiedCoulomb
             {
-                warnings.push(Warning::StiffFriction {
-                    joints,
-                    slip_speed_high: contact.slip_speed_high,
-                });
+                warnings.push(Warning::StiffFriction { joints, slip_speed_high: contact.slip_speed_high });
             }
         }
         warnings
@@ -78,9 +75,7 @@ impl Scene {
                 && contact.friction_law != FrictionLaw::None
                 && contact.friction > 0.0
             {
-                doubts.push(Doubt::PrintedFriction {
-                    joints: joints.clone(),
-                });
+                doubts.push(Doubt::PrintedFriction { joints: joints.clone() });
             }
             if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
                 doubts.push(Doubt::Clearance {
@@ -99,10 +94,7 @@ impl Scene {
     fn tolerance_warning(&self) -> Option<Doubt> {
         let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
         let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
-        (rattles && loose).then_some(Doubt::Tolerance {
-            tolerance: self.solver.tolerance,
-            loosest: LOOSEST,
-        })
+        (rattles && loose).then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST })
     }
 
     /// Warns of a fixed step too long for the shortest expected impact, and recommends one that is not.
@@ -110,10 +102,7 @@ impl Scene {
         if self.solver.method.is_adaptive() {
             return None;
         }
-        let clearances = self
-            .ball_joints
-            .iter()
-            .filter(|j| j.contact.clearance > 0.0);
+        let clearances = self.ball_joints.iter().filter(|j| j.contact.clearance > 0.0);
         let pushes = self.pushes();
         let (joint, duration) = clearances
             .map(|joint| (joint, self.impact_duration(joint, &pushes)))
@@ -135,9 +124,7 @@ impl Scene {
             duration,
             sliding: friction > 1.0,
             // It integrates force elements explicitly.
-            stable: self.solver.method == Method::ImexEuler
-                && friction <= 1.0
-                && self.elements.is_empty(),
+            stable: self.solver.method == Method::ImexEuler && friction <= 1.0 && self.elements.is_empty(),
             recommended,
         })
     }
@@ -195,19 +182,14 @@ impl Scene {
         let (stiffness, damping) = (coefficients.stiffness, coefficients.damping);
         let duration = contact::impact_duration(stiffness, damping, 1.0 / normal, speed)
             .min(contact::settled_half_period(stiffness, 1.0 / normal, load));
-        (
-            duration,
-            (coefficients.friction * sliding / normal).max(1.0),
-        )
+        (duration, (coefficients.friction * sliding / normal).max(1.0))
     }
 
     /// An error found when the scene starts, about `title` (see [`Source::places`]): it points to that line of the file,
     /// and names the latest change whose key is among `keys` or, for those ending in a dot, begins with one.
     pub fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
-        let concerns = |changed: &str| {
-            keys.iter()
-                .any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)))
-        };
+        let concerns =
+            |changed: &str| keys.iter().any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)));
         let change = self.changes.iter().rfind(|(changed, _)| concerns(changed));
         let at = self.source.places.get(title);
         let place = at.map(|&at| place_of(&self.source.text, at));
@@ -241,10 +223,7 @@ impl Scene {
             [first, .., last] if group.len() > 6 => format!("{} to {}", name(first), name(last)),
             _ => group.iter().map(name).collect::<Vec<_>>().join(", "),
         };
-        groups
-            .into_iter()
-            .map(|group| (title(group), self.ball_joints[group[0].1].contact))
-            .collect()
+        groups.into_iter().map(|group| (title(group), self.ball_joints[group[0].1].contact)).collect()
     }
 }
 
@@ -265,9 +244,7 @@ pub(super) enum ContactFault {
         unit_names(Dimension::Speed).join(", ")
     )]
     SlipSpeeds { low: f64, high: f64 },
-    #[error(
-        "the law {0} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit"
-    )]
+    #[error("the law {0} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit")]
     DividesByRestitution(NormalLaw),
 }
 
@@ -315,37 +292,24 @@ impl Fault {
 
     /// The error for the change of `key` that introduced the fault.
     pub fn blame_change(&self, scene: &Scene, key: &str) -> SceneError {
-        let value = scene
-            .changes
-            .iter()
-            .rfind(|(changed, _)| changed == key)
-            .map(|(_, value)| value.as_str());
+        let value = scene.changes.iter().rfind(|(changed, _)| changed == key).map(|(_, value)| value.as_str());
         SceneError::about(key, value, self.text(scene, key))
     }
 
     /// The error for the latest change related to the fault; `None` if the fault was in the file.
     pub fn blame_changes(&self, scene: &Scene) -> Option<SceneError> {
         let keys = self.keys(scene);
-        let (key, _) = scene
-            .changes
-            .iter()
-            .rfind(|(changed, _)| keys.contains(changed))?;
+        let (key, _) = scene.changes.iter().rfind(|(changed, _)| keys.contains(changed))?;
         Some(self.blame_change(scene, key))
     }
 }
 
 fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
     if contact.clearance >= contact.ball_radius {
-        return Err(ContactFault::Clearance {
-            clearance: contact.clearance,
-            ball_radius: contact.ball_radius,
-        });
+        return Err(ContactFault::Clearance { clearance: contact.clearance, ball_radius: contact.ball_radius });
     }
     if contact.slip_speed_low >= contact.slip_speed_high {
-        return Err(ContactFault::SlipSpeeds {
-            low: contact.slip_speed_low,
-            high: contact.slip_speed_high,
-        });
+        return Err(ContactFault::SlipSpeeds { low: contact.slip_speed_low, high: contact.slip_speed_high });
     }
     let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
     if divides && contact.restitution == 0.0 {
@@ -360,10 +324,7 @@ mod tests {
 
     /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
     fn doubted(sections: &str) -> Option<f64> {
-        let text = format!(
-            "{}\n{sections}",
-            built_in_text("pendulum").expect("built in")
-        );
+        let text = format!("{}\n{sections}", built_in_text("pendulum").expect("built in"));
         let method = ("solver.method".to_owned(), "rk4".to_owned());
         let step = ("solver.step".to_owned(), "10 us".to_owned());
         let scene = Scene::parse(&text, None, &[method, step]).expect("reads");

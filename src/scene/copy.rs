@@ -37,11 +37,7 @@ impl Copy {
     }
 
     fn own<'a>(&self, names: &BTreeSet<String>, name: &'a str) -> Cow<'a, str> {
-        if names.contains(name) {
-            Cow::Owned(self.name(name))
-        } else {
-            Cow::Borrowed(name)
-        }
+        if names.contains(name) { Cow::Owned(self.name(name)) } else { Cow::Borrowed(name) }
     }
 
     /// Whether `name` is that of a body in this copy.

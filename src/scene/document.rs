@@ -70,13 +70,7 @@ impl<'d> Document<'d> {
     }
 
     /// An error at a position in the text.
-    pub fn error(
-        &self,
-        span: Range<usize>,
-        key: &str,
-        value: Option<&str>,
-        message: impl Into<String>,
-    ) -> SceneError {
+    pub fn error(&self, span: Range<usize>, key: &str, value: Option<&str>, message: impl Into<String>) -> SceneError {
         let key = Some(key).filter(|key| !key.is_empty());
         SceneError::in_text(self.file, self.text, span.start, key, value, message)
     }
@@ -99,14 +93,7 @@ impl<'d> Section<'d> {
         span: Range<usize>,
         rows: &'static FileTable,
     ) -> Result<Self, SceneError> {
-        let mut section = Self {
-            document,
-            path,
-            table,
-            span,
-            rows,
-            word: None,
-        };
+        let mut section = Self { document, path, table, span, rows, word: None };
         // First of all: a word may decide which other keys there are.
         for key in rows.keys {
             if let (Takes::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
@@ -144,14 +131,8 @@ impl<'d> Section<'d> {
             let own: Vec<&str> = own.map(|key| key.name).collect();
             let rows = self.rows.keys.iter().filter(|key| key.name == name);
             let words: Vec<&str> = rows.flat_map(|key| key.of).copied().collect();
-            let (one, its) = (
-                one.replace("{}", word),
-                one.replace("{}", &words.join(" or ")),
-            );
-            return node.error(format!(
-                "not allowed here: a {one} has {}; a {its} has `{name}`",
-                own.join(", ")
-            ));
+            let (one, its) = (one.replace("{}", word), one.replace("{}", &words.join(" or ")));
+            return node.error(format!("not allowed here: a {one} has {}; a {its} has `{name}`", own.join(", ")));
         }
         let near = nearest(name, known.iter().copied());
         let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
@@ -161,20 +142,12 @@ impl<'d> Section<'d> {
 
     /// Full path of a key in this table.
     pub fn key(&self, name: &str) -> String {
-        if self.path.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{}.{name}", self.path)
-        }
+        if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
     }
 
     /// An optional value.
     pub fn get(&self, name: &str) -> Option<Node<'d>> {
-        debug_assert!(
-            self.rows.key(name, None).is_some(),
-            "no row for `{name}` in the table `{}`",
-            self.rows.name
-        );
+        debug_assert!(self.rows.key(name, None).is_some(), "no row for `{name}` in the table `{}`", self.rows.name);
         self.find(name)
     }
 
@@ -189,10 +162,7 @@ impl<'d> Section<'d> {
         self.get(name).ok_or_else(|| {
             let row = self.rows.key(name, self.word);
             let like = row.map_or("", |row| row.like(self.document.on_hinge));
-            self.error(
-                name,
-                format!("missing; write for example `{name} = {like}`"),
-            )
+            self.error(name, format!("missing; write for example `{name} = {like}`"))
         })
     }
 
@@ -227,19 +197,13 @@ impl<'d> Section<'d> {
 
     /// An error about this table as a whole, or about a missing key.
     pub fn error(&self, name: &str, message: impl Into<String>) -> SceneError {
-        let key = if name.is_empty() {
-            self.path.clone()
-        } else {
-            self.key(name)
-        };
+        let key = if name.is_empty() { self.path.clone() } else { self.key(name) };
         self.document.error(self.span.clone(), &key, None, message)
     }
 
     /// Rejects a key that makes no sense here.
     pub fn refuse(&self, name: &str, why: &str) -> Result<(), SceneError> {
-        self.get(name).map_or(Ok(()), |node| {
-            Err(node.error(format!("not allowed here: {why}")))
-        })
+        self.get(name).map_or(Ok(()), |node| Err(node.error(format!("not allowed here: {why}"))))
     }
 }
 
@@ -280,12 +244,7 @@ impl<'d> Node<'d> {
             return SceneError::about(&self.key, Some(&brief(value)), message);
         }
         let span = self.value.span();
-        self.document.error(
-            span.clone(),
-            &self.key,
-            Some(&self.document.excerpt(span)),
-            message,
-        )
+        self.document.error(span.clone(), &self.key, Some(&self.document.excerpt(span)), message)
     }
 
     fn wrong_type(&self, wanted: &str) -> SceneError {
@@ -308,18 +267,12 @@ impl<'d> Node<'d> {
 
     /// A text.
     pub fn text(&self) -> Result<&'d str, SceneError> {
-        self.value
-            .get_ref()
-            .as_str()
-            .ok_or_else(|| self.wrong_type("a text in quotes"))
+        self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a text in quotes"))
     }
 
     /// A boolean.
     pub fn flag(&self) -> Result<bool, SceneError> {
-        self.value
-            .get_ref()
-            .as_bool()
-            .ok_or_else(|| self.wrong_type("true or false"))
+        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
     /// A finite quantity, SI: a number with its unit, or an expression. From now on it is a number of the scene, under this key.
@@ -340,9 +293,8 @@ impl<'d> Node<'d> {
     /// The quantity `text`, at `place`, as [`Self::quantity`].
     fn evaluated(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
         let reading = self.document.reading;
-        let value = reading
-            .evaluate(text, dimension, self.document.copy)
-            .map_err(|error| self.error(error.to_string()))?;
+        let value =
+            reading.evaluate(text, dimension, self.document.copy).map_err(|error| self.error(error.to_string()))?;
         self.limit(value, dimension)?;
         reading.record(&self.key, FileNumber::new(value, dimension, place, text));
         Ok(value)
@@ -376,11 +328,7 @@ impl<'d> Node<'d> {
     }
 
     /// A quantity in a closed range, SI.
-    pub fn within(
-        &self,
-        dimension: Dimension,
-        (least, most): (f64, f64),
-    ) -> Result<f64, SceneError> {
+    pub fn within(&self, dimension: Dimension, (least, most): (f64, f64)) -> Result<f64, SceneError> {
         let value = self.quantity(dimension)?;
         if (least..=most).contains(&value) {
             return Ok(value);
@@ -418,9 +366,7 @@ impl<'d> Node<'d> {
         };
         match self.scalar()?.parse() {
             Ok(number) if (least..=most).contains(&number) => Ok(number),
-            _ => Err(self.error(format!(
-                "out of range; allowed {least} to {most}; a whole number, no unit"
-            ))),
+            _ => Err(self.error(format!("out of range; allowed {least} to {most}; a whole number, no unit"))),
         }
     }
 
@@ -434,10 +380,7 @@ impl<'d> Node<'d> {
         let found = words.iter().copied().find(|word| *word == text);
         found.ok_or_else(|| {
             let near = nearest(text, words.iter().copied());
-            self.error(format!(
-                "is not one of the choices{near}; allowed {}",
-                words.join(", ")
-            ))
+            self.error(format!("is not one of the choices{near}; allowed {}", words.join(", ")))
         })
     }
 
@@ -490,21 +433,14 @@ impl<'d> Node<'d> {
                 first.value.span(),
                 &first.key,
                 None,
-                format!(
-                    "too many: {} {what}; allowed at most {most}",
-                    elements.len()
-                ),
+                format!("too many: {} {what}; allowed at most {most}", elements.len()),
             )),
         }
     }
 
     /// The elements of an array, keyed `key[0]`, `key[1]`, …
     pub fn elements(&self) -> Result<Vec<Node<'d>>, SceneError> {
-        let array = self
-            .value
-            .get_ref()
-            .as_array()
-            .ok_or_else(|| self.wrong_type("an array"))?;
+        let array = self.value.get_ref().as_array().ok_or_else(|| self.wrong_type("an array"))?;
         let node = |(index, value)| {
             let key = format!("{}[{index}]", self.key);
             Node::new(self.document, key, self.row, Some(value))
@@ -527,14 +463,9 @@ impl<'d> Node<'d> {
         let mut values = [0.0; N];
         if let Some(text) = self.value.get_ref().as_str() {
             let words: Vec<&str> = text.split_whitespace().collect();
-            let count = words
-                .iter()
-                .take_while(|word| word.parse::<f64>().is_ok())
-                .count();
+            let count = words.iter().take_while(|word| word.parse::<f64>().is_ok()).count();
             if count != N {
-                return Err(self.error(format!(
-                    "needs {N} numbers, then one unit for all; has {count} numbers"
-                )));
+                return Err(self.error(format!("needs {N} numbers, then one unit for all; has {count} numbers")));
             }
             let (numbers, unit) = words.split_at(N);
             let unit = unit.join(" ");
@@ -582,11 +513,7 @@ impl<'d> Node<'d> {
         let vector = Vec3::from(self.quantities::<3>(Dimension::None)?);
         // Scaled first: squares of huge or tiny components would leave the range of f64.
         let size = vector.amax();
-        if size > 0.0 {
-            Ok((vector / size).normalize())
-        } else {
-            Err(self.error("a direction must not be zero"))
-        }
+        if size > 0.0 { Ok((vector / size).normalize()) } else { Err(self.error("a direction must not be zero")) }
     }
 
     /// A table as its row says.
@@ -597,21 +524,13 @@ impl<'d> Node<'d> {
     /// As [`Self::section`], with a different path for its keys.
     pub fn section_as(&self, path: String) -> Result<Section<'d>, SceneError> {
         let rows = self.row.table().expect("a row that takes tables");
-        let table = self
-            .value
-            .get_ref()
-            .as_table()
-            .ok_or_else(|| self.wrong_type("a table"))?;
+        let table = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
         Section::new(self.document, path, table, self.value.span(), rows)
     }
 
     /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.
     pub fn title(&self, prefix: &str) -> String {
-        let name = self
-            .value
-            .get_ref()
-            .get("name")
-            .and_then(|name| name.get_ref().as_str());
+        let name = self.value.get_ref().get("name").and_then(|name| name.get_ref().as_str());
         let title = |name| format!("{prefix}.{}", self.numbered(name));
         name.map_or_else(|| self.key.clone(), title)
     }
@@ -632,10 +551,7 @@ impl<'d> Node<'d> {
         match read {
             Err(error) if matches!(error.fault, ValueFault::Quantity(_)) => {
                 // No quantity: an expression, perhaps.
-                let value = self
-                    .document
-                    .reading
-                    .evaluate(text, dimension, self.document.copy);
+                let value = self.document.reading.evaluate(text, dimension, self.document.copy);
                 let value = value.map_err(|why| self.error(format!("{why}; {}", error.allowed)))?;
                 let value = super::Value::Number(value);
                 let checked = parameter.check(&value);
@@ -651,11 +567,7 @@ impl<'d> Node<'d> {
 ///
 /// # Errors
 /// No list, or too many entries.
-pub(super) fn lists<'d>(
-    files: &[Section<'d>],
-    name: &str,
-    more: Vec<Node<'d>>,
-) -> Result<Vec<Node<'d>>, SceneError> {
+pub(super) fn lists<'d>(files: &[Section<'d>], name: &str, more: Vec<Node<'d>>) -> Result<Vec<Node<'d>>, SceneError> {
     let mut nodes = Vec::new();
     for file in files {
         if let Some(list) = file.get(name) {
@@ -681,9 +593,5 @@ pub(super) fn lists<'d>(
 }
 
 fn article(value: &DeValue<'_>) -> &'static str {
-    if value.is_integer() || value.is_array() {
-        "an"
-    } else {
-        "a"
-    }
+    if value.is_integer() || value.is_array() { "an" } else { "a" }
 }

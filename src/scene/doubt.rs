@@ -60,25 +60,17 @@ pub enum Doubt {
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::MoreJoints => f.write_str(
-                "More ball joints differ from one another: what speaks against each of them is not listed.",
-            ),
-            Self::Restitution {
-                joints,
-                law,
-                restitution,
-            } => write!(
+            Self::MoreJoints => {
+                f.write_str("More ball joints differ from one another: what speaks against each of them is not listed.")
+            }
+            Self::Restitution { joints, law, restitution } => write!(
                 f,
                 "{joints}: restitution {restitution} with {}, which is right only near 1 (asked for 0, it gives about \
                  {:.2}); flores or gonthier suit low restitution.",
                 law.word(),
                 contact::undisturbed_restitution(contact::damping_factor(*law, 0.0))
             ),
-            Self::Clearance {
-                joints,
-                clearance,
-                ball_radius,
-            } => write!(
+            Self::Clearance { joints, clearance, ball_radius } => write!(
                 f,
                 "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
                  (radius {}), which Hertz's theory assumes.",
@@ -90,14 +82,7 @@ impl fmt::Display for Doubt {
                 "{joints}: friction_velocity printed is there to compare with the paper: it reads (1 - c/e) of the centres' \
                  velocity, so that friction vanishes where sliding is slow. surface is what the contact feels."
             ),
-            Self::Step {
-                joint,
-                step,
-                duration,
-                sliding,
-                stable,
-                recommended,
-            } => {
+            Self::Step { joint, step, duration, sliding, stable, recommended } => {
                 let why = if *sliding {
                     format!("friction at ball joint {joint} is estimated to reverse the sliding in")
                 } else {
@@ -155,10 +140,7 @@ impl Warning {
 
     /// Whether other `[solver]` settings would remove it.
     pub fn is_about_solver(&self) -> bool {
-        matches!(
-            self,
-            Self::Doubt(Doubt::Step { .. } | Doubt::Tolerance { .. })
-        )
+        matches!(self, Self::Doubt(Doubt::Step { .. } | Doubt::Tolerance { .. }))
     }
 }
 
@@ -166,10 +148,7 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Doubt(doubt) => doubt.fmt(f),
-            Self::StiffFriction {
-                joints,
-                slip_speed_high,
-            } => write!(
+            Self::StiffFriction { joints, slip_speed_high } => write!(
                 f,
                 "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
                 format_quantity(*slip_speed_high, "mm/s")

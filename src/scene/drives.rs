@@ -22,37 +22,16 @@ const MEAN: FileKey = place("mean", "mean").zero();
 /// Amplitude, frequency and phase of a harmonic.
 const TERM: [FileKey; 3] = [
     place("amplitude", "amplitude"),
-    key(
-        "frequency",
-        positive(Dimension::Frequency, FASTEST_DRIVE),
-        "\"1 Hz\"",
-        "frequency",
-    ),
-    key(
-        "phase",
-        number(Dimension::Angle),
-        "\"90 deg\"",
-        "phase at t = 0",
-    )
-    .zero(),
+    key("frequency", positive(Dimension::Frequency, FASTEST_DRIVE), "\"1 Hz\"", "frequency"),
+    key("phase", number(Dimension::Angle), "\"90 deg\"", "phase at t = 0").zero(),
 ];
 
 static TERMS: FileTable = FileTable::new("term", "a term", "a harmonic of a sum", &TERM);
 
-const START: FileKey = key(
-    "start",
-    number(Dimension::Time),
-    "\"1 s\"",
-    "when it begins",
-)
-.zero();
+const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it begins").zero();
 
-const DURATION: FileKey = key(
-    "duration",
-    Takes::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)),
-    "\"0.5 s\"",
-    "how long it lasts",
-);
+const DURATION: FileKey =
+    key("duration", Takes::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
 
 /// Every law of a drive. On a hinge lengths are angles, and speeds angular speeds.
 pub static DRIVE_KINDS: [DriveKind; 8] = [
@@ -197,11 +176,7 @@ pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<
         "formula" => read_law_of_formula(&section)?,
         _ => DriveData::Numbers,
     };
-    Ok(Drive {
-        kind: row,
-        numbers,
-        data,
-    })
+    Ok(Drive { kind: row, numbers, data })
 }
 
 /// Dimension of the joint's coordinate.
@@ -212,11 +187,7 @@ fn coordinate(section: &Section<'_>) -> Dimension {
     }
 }
 
-fn read_slider(
-    section: &Section<'_>,
-    law: &Node<'_>,
-    scene: &Scene,
-) -> Result<DriveData, SceneError> {
+fn read_slider(section: &Section<'_>, law: &Node<'_>, scene: &Scene) -> Result<DriveData, SceneError> {
     if section.document.on_hinge {
         return Err(law.error(SLIDERS_ONLY));
     }
@@ -250,9 +221,7 @@ fn read_terms(section: &Section<'_>) -> Result<DriveData, SceneError> {
 }
 
 fn read_table(section: &Section<'_>) -> Result<DriveData, SceneError> {
-    let repeats = section
-        .get("repeat")
-        .map_or(Ok(false), |node| node.flag())?;
+    let repeats = section.get("repeat").map_or(Ok(false), |node| node.flag())?;
     let graph = Graph::motion(coordinate(section), repeats);
     let points = match (section.get("points"), section.get("file")) {
         (Some(_), Some(file)) => {

@@ -34,23 +34,12 @@ const PLAIN: ElementKind = ElementKind {
 };
 
 const fn on_hinge(key: &'static str, dimension: Dimension, like: &'static str) -> Option<OnHinge> {
-    Some(OnHinge {
-        key,
-        dimension,
-        like,
-    })
+    Some(OnHinge { key, dimension, like })
 }
 
 /// Stiffnesses or dampings along or about three axes.
 const fn stiff(key: &'static str, dimension: Dimension, help: &'static str) -> ElementVector {
-    ElementVector {
-        key,
-        dimension,
-        range: (0.0, LARGEST_FORCE),
-        direction: false,
-        upward: false,
-        help,
-    }
+    ElementVector { key, dimension, range: (0.0, LARGEST_FORCE), direction: false, upward: false, help }
 }
 
 /// Tension of a spring by its change of length.
@@ -64,10 +53,7 @@ const HINGE_CURVE: CurveAxes = (
     [("angle", Dimension::Angle), ("torque", Dimension::Torque)],
     "[[\"-10 deg\", \"-5 N m\"], [0, 0], [\"10 deg\", \"8 N m\"]]",
 );
-const SLIDE_CURVE: CurveAxes = (
-    [("position", Dimension::Length), ("force", Dimension::Force)],
-    SPRING_CURVE.1,
-);
+const SLIDE_CURVE: CurveAxes = ([("position", Dimension::Length), ("force", Dimension::Force)], SPRING_CURVE.1);
 
 /// What a curve of a spring takes the place of.
 const INSTEAD_OF: &[&str] = &["stiffness", "preload"];
@@ -317,31 +303,15 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
         vectors: &[
             stiff("stiffness", Dimension::Stiffness, "along its axes"),
             stiff("damping", Dimension::Damping, "along its axes"),
-            stiff(
-                "turning_stiffness",
-                Dimension::TurningStiffness,
-                "about its axes",
-            ),
-            stiff(
-                "turning_damping",
-                Dimension::TurningDamping,
-                "about its axes",
-            ),
+            stiff("turning_stiffness", Dimension::TurningStiffness, "about its axes"),
+            stiff("turning_damping", Dimension::TurningDamping, "about its axes"),
         ],
         frame: "its axes: `axes` in the body of `from`",
         rotations: &[
             ("axes", "its axes in the body of `from`"),
-            (
-                "rotation",
-                "orientation of the body of `to` in that of `from` in which it exerts no torque",
-            ),
+            ("rotation", "orientation of the body of `to` in that of `from` in which it exerts no torque"),
         ],
-        acts_by: &[
-            "stiffness",
-            "damping",
-            "turning_stiffness",
-            "turning_damping",
-        ],
+        acts_by: &["stiffness", "damping", "turning_stiffness", "turning_damping"],
         ..PLAIN
     },
     ElementKind {
@@ -433,10 +403,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
             upward: true,
             help: "which way is up",
         }],
-        law: Some((
-            "ground",
-            "height of the ground, along `up` from the world's origin; at rest there if left out",
-        )),
+        law: Some(("ground", "height of the ground, along `up` from the world's origin; at rest there if left out")),
         acts_by: &["stiffness"],
         fault: tyre_fault,
         look: ElementLook::Ground,
@@ -452,11 +419,9 @@ fn stop_fault(stop: &Element) -> Option<(&'static str, String)> {
     } else if lower >= upper {
         format!("must be above lower, {}", format_quantity(lower, unit))
     } else if stop.on_hinge && upper - lower >= TAU && upper.is_finite() && lower.is_finite() {
-        "must be less than a turn above lower: a hinge is taken within half a turn of their middle"
-            .to_owned()
+        "must be less than a turn above lower: a hinge is taken within half a turn of their middle".to_owned()
     } else if stop.number("restitution") < 1.0 && stop.number("speed") == 0.0 {
-        let why =
-            "missing; a restitution below 1 holds at one approach speed, which must be above 0";
+        let why = "missing; a restitution below 1 holds at one approach speed, which must be above 0";
         return Some(("speed", why.to_owned()));
     } else {
         return None;
@@ -465,15 +430,11 @@ fn stop_fault(stop: &Element) -> Option<(&'static str, String)> {
 }
 
 fn motor_fault(motor: &Element) -> Option<(&'static str, String)> {
-    let follows = ["stiffness", "damping"]
-        .map(|key| motor.number(key) > 0.0)
-        .contains(&true);
+    let follows = ["stiffness", "damping"].map(|key| motor.number(key) > 0.0).contains(&true);
     let why = match (follows, &motor.law) {
         (true, None) => "missing; stiffness and damping pull towards it",
         (false, Some(_)) => "has no effect: stiffness and damping, which pull towards it, are 0",
-        (_, Some(law)) if law.slider().is_some() => {
-            "a motor follows a law of its own, not that of the scene's sliders"
-        }
+        (_, Some(law)) if law.slider().is_some() => "a motor follows a law of its own, not that of the scene's sliders",
         _ => return None,
     };
     Some(("target", why.to_owned()))
@@ -507,27 +468,15 @@ impl Element {
 }
 
 /// The curve of `row`, if `section` gives one.
-fn read_curve(
-    section: &Section<'_>,
-    row: &ElementCurve,
-    on_hinge: bool,
-) -> Result<Option<Vec<[f64; 2]>>, SceneError> {
+fn read_curve(section: &Section<'_>, row: &ElementCurve, on_hinge: bool) -> Result<Option<Vec<[f64; 2]>>, SceneError> {
     let (axes, _) = if on_hinge { row.hinge } else { row.slide };
     let most = [MAX_SI, LARGEST_FORCE];
-    let axis = |i: usize| Axis {
-        name: axes[i].0,
-        dimension: axes[i].1,
-        most: most[i],
-    };
+    let axis = |i: usize| Axis { name: axes[i].0, dimension: axes[i].1, most: most[i] };
     let (least, unit) = match on_hinge {
         true => (1e-9, "1e-9 rad"),
         false => (1e-9, "1 nm"),
     };
-    let graph = Graph {
-        axes: [axis(0), axis(1)],
-        rise: (least, unit),
-        repeats: false,
-    };
+    let graph = Graph { axes: [axis(0), axis(1)], rise: (least, unit), repeats: false };
     let [points, file] = row.keys;
     let found = match (section.get(points), section.get(file)) {
         (Some(_), Some(node)) => {
@@ -538,10 +487,7 @@ fn read_curve(
         (None, None) => return Ok(None),
     };
     for key in row.instead_of {
-        section.refuse(
-            key,
-            &format!("`{points}`, or its `{file}`, says what the spring exerts"),
-        )?;
+        section.refuse(key, &format!("`{points}`, or its `{file}`, says what the spring exerts"))?;
     }
     Ok(Some(found))
 }
@@ -563,30 +509,17 @@ pub(super) fn read_element<'d>(
     let mut section = node.section_as(node.title(kind.section))?;
     let name = section.require("name")?.name()?.into_owned();
     let point = |key: &&str| read_attachment(&section, key, scene, bodies);
-    let mut points = kind
-        .points
-        .iter()
-        .map(point)
-        .collect::<Result<Vec<_>, _>>()?;
+    let mut points = kind.points.iter().map(point).collect::<Result<Vec<_>, _>>()?;
     if let [first, second] = points[..]
         && first.body == second.body
     {
         let [from, to] = [kind.points[0], kind.points[1]];
-        return Err(section.error(
-            to,
-            format!(
-                "{from} and {to} are on the same body: a {} needs two",
-                kind.section
-            ),
-        ));
+        return Err(section.error(to, format!("{from} and {to} are on the same body: a {} needs two", kind.section)));
     }
     if let [only] = points[..]
         && only.body.is_none()
     {
-        return Err(section.error(
-            kind.points[0],
-            format!("a {} acts on a body, not on the world", kind.section),
-        ));
+        return Err(section.error(kind.points[0], format!("a {} acts on a body, not on the world", kind.section)));
     }
     let mut joint = None;
     if let Some(which) = kind.joint {
@@ -595,10 +528,7 @@ pub(super) fn read_element<'d>(
         let of = of.next().expect("a joint of the scene");
         let driven = of.drives().any(|(driven, _)| driven == freedom);
         if which == ElementJoint::Undriven && driven {
-            let why = format!(
-                "this joint has a drive, which leaves a {} nothing to move",
-                kind.section
-            );
+            let why = format!("this joint has a drive, which leaves a {} nothing to move", kind.section);
             return Err(section.require("joint")?.error(why));
         }
         points = of.points().to_vec();
@@ -609,13 +539,8 @@ pub(super) fn read_element<'d>(
     let number = |row: &ElementNumber| {
         let [key, other] = [on_hinge, !on_hinge].map(|hinge| row.on(hinge).0);
         if other != key {
-            let (here, there) = if on_hinge {
-                ("hinge", "slide")
-            } else {
-                ("slide", "hinge")
-            };
-            let why =
-                format!("the joint is a {here}, where `{key}` belongs; `{other}` is for a {there}");
+            let (here, there) = if on_hinge { ("hinge", "slide") } else { ("slide", "hinge") };
+            let why = format!("the joint is a {here}, where `{key}` belongs; `{other}` is for a {there}");
             section.refuse(other, &why)?;
         }
         section.number(key)
@@ -635,7 +560,8 @@ pub(super) fn read_element<'d>(
     });
     let vector = |row: &ElementVector| {
         if row.upward && section.get(row.key).is_none() {
-            let why = "missing; without gravity only the file can say which way is up: write for example `up = [0, 0, 1]`";
+            let why =
+                "missing; without gravity only the file can say which way is up: write for example `up = [0, 0, 1]`";
             return up_of(scene).ok_or_else(|| section.error(row.key, why));
         }
         let value = match row.upward {
@@ -645,11 +571,7 @@ pub(super) fn read_element<'d>(
         let turns = turns.filter(|_| row.direction);
         Ok(turns.map_or(value, |copy| copy.direction(value)))
     };
-    let vectors = kind
-        .vectors
-        .iter()
-        .map(vector)
-        .collect::<Result<_, SceneError>>()?;
+    let vectors = kind.vectors.iter().map(vector).collect::<Result<_, SceneError>>()?;
     // Whether the first and second point are on bodies of the pattern's copy that is read; all are of a copy that does not turn.
     let owned = |place: usize| {
         let copy = section.document.copy.filter(|copy| !copy.keeps_axes());
@@ -663,15 +585,10 @@ pub(super) fn read_element<'d>(
         Ok(turned.map_or(rotation, |copy| copy.rotation(rotation)))
     };
     if !kind.rotations.is_empty() && owned(0) && !owned(1) {
-        let why =
-            "a body outside the pattern does not turn with its copies: make it that of `from`";
+        let why = "a body outside the pattern does not turn with its copies: make it that of `from`";
         return Err(section.error(kind.points[1], why));
     }
-    let rotations = kind
-        .rotations
-        .iter()
-        .map(rotation)
-        .collect::<Result<_, SceneError>>()?;
+    let rotations = kind.rotations.iter().map(rotation).collect::<Result<_, SceneError>>()?;
     let curve = kind.curve.map(|row| read_curve(&section, row, on_hinge));
     let law = kind.law.and_then(|(key, _)| section.get(key));
     let law = law.map(|node| read_drive(&node, on_hinge, scene));
@@ -700,10 +617,7 @@ pub(super) fn read_element<'d>(
         };
         let keys: Vec<&str> = kind.acts_by.iter().map(own).collect();
         let (kind, keys) = (kind.section, keys.join(", "));
-        return Err(section.error(
-            "",
-            format!("this {kind} does nothing: {keys} are 0; one must not be"),
-        ));
+        return Err(section.error("", format!("this {kind} does nothing: {keys} are 0; one must not be")));
     }
     if let Some((key, why)) = (kind.fault)(&element) {
         return Err(match section.get(key) {

@@ -50,12 +50,7 @@ impl SceneError {
 
     /// An error about a key and its value, outside any file.
     pub(super) fn about(key: &str, value: Option<&str>, message: impl Into<String>) -> Self {
-        Self {
-            key: Some(key.to_owned()),
-            value: value.map(Box::from),
-            message: message.into(),
-            ..Self::default()
-        }
+        Self { key: Some(key.to_owned()), value: value.map(Box::from), message: message.into(), ..Self::default() }
     }
 }
 
@@ -80,13 +75,7 @@ impl fmt::Display for SceneError {
         if let (Some(text), Some((line, column))) = (&self.line_text, self.position) {
             let number = line.to_string();
             let mark = column.saturating_sub(1) as usize;
-            write!(
-                f,
-                "\n {number} | {text}\n {:width$} | {:mark$}^",
-                "",
-                "",
-                width = number.len()
-            )?;
+            write!(f, "\n {number} | {text}\n {:width$} | {:mark$}^", "", "", width = number.len())?;
         }
         Ok(())
     }
@@ -96,10 +85,7 @@ impl fmt::Display for SceneError {
 pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     let line_start = before.rfind('\n').map_or(0, |at| at + 1);
     let from_one = |count: usize| u32::try_from(count + 1).unwrap_or(u32::MAX);
-    (
-        from_one(before.matches('\n').count()),
-        from_one(before[line_start..].chars().count()),
-    )
+    (from_one(before.matches('\n').count()), from_one(before[line_start..].chars().count()))
 }
 
 /// Line and column, from 1, of byte `at` of `text`.
@@ -118,10 +104,7 @@ pub(super) fn brief(text: &str) -> String {
 
 /// Line number `line`, from 1, of a text; `None` if it is too long for a terminal or contains control characters.
 pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
-    let line = text
-        .lines()
-        .nth(line.saturating_sub(1) as usize)
-        .unwrap_or("");
+    let line = text.lines().nth(line.saturating_sub(1) as usize).unwrap_or("");
     let line = line.replace('\t', " ");
     let fit = line.len() <= 160 && visible_line(&line) == line;
     fit.then(|| line.into())
@@ -131,22 +114,14 @@ pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
 const LONGEST_SLIP: usize = 100;
 
 /// The one of `names` nearest to `wrong`; `None` if none is near.
-pub(super) fn nearest_name<'a>(
-    wrong: &str,
-    names: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(super) fn nearest_name<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if wrong.len() > LONGEST_SLIP {
         return None;
     }
     let wrong_lower = wrong.to_lowercase();
     names
         .into_iter()
-        .map(|name| {
-            (
-                strsim::jaro_winkler(&wrong_lower, &name.to_lowercase()),
-                name,
-            )
-        })
+        .map(|name| (strsim::jaro_winkler(&wrong_lower, &name.to_lowercase()), name))
         .filter(|(score, _)| *score > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, name)| name)
@@ -172,9 +147,8 @@ pub(super) fn nearest_parameter<'a>(
     // Keys without their section are a common slip: compare both forms.
     let forms = keys.clone().map(last).chain(keys.clone());
     let near = nearest_name(wrong, words.iter().copied().chain(forms));
-    let full = near
-        .filter(|name| !words.contains(name))
-        .and_then(|name| keys.find(|key| *key == name || last(key) == name));
+    let full =
+        near.filter(|name| !words.contains(name)).and_then(|name| keys.find(|key| *key == name || last(key) == name));
     did_you_mean(full.or(near))
 }
 
@@ -182,14 +156,6 @@ pub(super) fn nearest_parameter<'a>(
 pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
     let near = nearest(wanted, names.clone());
     let listed: Vec<&str> = names.clone().take(12).collect();
-    let more = if names.count() > listed.len() {
-        ", …"
-    } else {
-        ""
-    };
-    format!(
-        "no body `{}`{near}; bodies: {}{more}",
-        brief(wanted),
-        listed.join(", ")
-    )
+    let more = if names.count() > listed.len() { ", …" } else { "" };
+    format!("no body `{}`{near}; bodies: {}{more}", brief(wanted), listed.join(", "))
 }

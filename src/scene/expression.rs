@@ -16,10 +16,7 @@ const STACK: usize = 32;
 
 /// An operation on one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(
-    missing_docs,
-    reason = "each is what its name says in the table of functions"
-)]
+#[allow(missing_docs, reason = "each is what its name says in the table of functions")]
 pub enum Unary {
     Negate,
     Sin,
@@ -41,10 +38,7 @@ pub enum Unary {
 
 /// An operation on two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(
-    missing_docs,
-    reason = "each is what its name says in the table of functions"
-)]
+#[allow(missing_docs, reason = "each is what its name says in the table of functions")]
 pub enum Binary {
     Add,
     Subtract,
@@ -116,11 +110,7 @@ pub fn smooth_step(x: f64) -> (f64, f64, f64) {
         return (1.0, 0.0, 0.0);
     }
     let y = 1.0 - x;
-    (
-        x * x * x * (10.0 + x * (6.0 * x - 15.0)),
-        30.0 * (x * y) * (x * y),
-        60.0 * x * y * (y - x),
-    )
+    (x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * (x * y) * (x * y), 60.0 * x * y * (y - x))
 }
 
 /// What a name before `(` stands for.
@@ -208,10 +198,7 @@ impl Program {
         angles: bool,
     ) -> Result<Self, ExpressionError> {
         if text.len() > LONGEST_EXPRESSION {
-            return Err(ExpressionError {
-                at: 0,
-                fault: Fault::TooLong,
-            });
+            return Err(ExpressionError { at: 0, fault: Fault::TooLong });
         }
         let mut parser = Parser {
             text,
@@ -227,10 +214,7 @@ impl Program {
         };
         parser.sum()?;
         match parser.peek() {
-            None => Ok(Self {
-                steps: parser.steps,
-                kink: parser.kink,
-            }),
+            None => Ok(Self { steps: parser.steps, kink: parser.kink }),
             Some(_) => Err(parser.unexpected("an operator")),
         }
     }
@@ -282,10 +266,7 @@ impl Program {
                 _ => steps.push(step),
             }
         }
-        Self {
-            steps,
-            kink: self.kink,
-        }
+        Self { steps, kink: self.kink }
     }
 
     /// A function in it whose derivatives jump.
@@ -354,14 +335,8 @@ impl std::error::Error for ExpressionError {}
 impl fmt::Display for ExpressionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.fault {
-            Fault::Expected {
-                wanted,
-                found: None,
-            } => write!(f, "ends where {wanted} should follow"),
-            Fault::Expected {
-                wanted,
-                found: Some(found),
-            } => write!(f, "`{found}` where {wanted} should stand"),
+            Fault::Expected { wanted, found: None } => write!(f, "ends where {wanted} should follow"),
+            Fault::Expected { wanted, found: Some(found) } => write!(f, "`{found}` where {wanted} should stand"),
             Fault::Unknown { name, near, called } => {
                 let what = if *called { "function" } else { "variable" };
                 let near = did_you_mean(near.as_deref());
@@ -376,10 +351,7 @@ impl fmt::Display for ExpressionError {
                 _ => write!(f, "`{function}` takes {wanted} arguments"),
             },
             Fault::NotCalled(function) => {
-                write!(
-                    f,
-                    "`{function}` is a function: its argument follows in parentheses"
-                )
+                write!(f, "`{function}` is a function: its argument follows in parentheses")
             }
             Fault::NoNumber => f.write_str("no finite number"),
             Fault::TooDeep => f.write_str("nested too deeply"),
@@ -436,10 +408,8 @@ impl<'t> Parser<'t> {
 
     /// Adds a step, or its result if it is constant.
     fn push(&mut self, step: Step) -> Parsed {
-        let gives_angle = matches!(
-            step,
-            Step::Unary(Unary::Asin | Unary::Acos | Unary::Atan) | Step::Binary(Binary::Atan2)
-        );
+        let gives_angle =
+            matches!(step, Step::Unary(Unary::Asin | Unary::Acos | Unary::Atan) | Step::Binary(Binary::Atan2));
         let folds = !(self.angles && gives_angle);
         match (step, &mut self.steps[..]) {
             (Step::Unary(operation), [.., Step::Constant(x)]) if folds => *x = x.unary(operation),
@@ -583,9 +553,7 @@ impl<'t> Parser<'t> {
     /// A variable, a constant or a call. A name may contain dots.
     fn name(&mut self) -> Parsed {
         let (start, rest) = (self.at, &self.text[self.at..]);
-        let end = rest
-            .find(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
-            .unwrap_or(rest.len());
+        let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.')).unwrap_or(rest.len());
         let name = &rest[..end];
         self.at += end;
         let row = FUNCTIONS.iter().find(|row| row.0 == name);
@@ -653,11 +621,7 @@ mod tests {
 
     fn parse(text: &str) -> Result<Program, ExpressionError> {
         let names = ["t", "arm.length"];
-        Program::parse(
-            text,
-            |name| names.iter().position(|known| *known == name),
-            &names,
-        )
+        Program::parse(text, |name| names.iter().position(|known| *known == name), &names)
     }
 
     fn value(text: &str) -> f64 {
@@ -723,11 +687,7 @@ mod tests {
             ("3 $ t", 2, "`$` where an operator should stand"),
             ("sin t", 0, "`sin` is a function"),
             ("sqr(t)", 0, "no function `sqr` (did you mean `sqrt`?)"),
-            (
-                "2 * arm.lenght",
-                4,
-                "no variable `arm.lenght` (did you mean `arm.length`?)",
-            ),
+            ("2 * arm.lenght", 4, "no variable `arm.lenght` (did you mean `arm.length`?)"),
             ("1 + sin(t, 2)", 4, "`sin` takes one argument"),
             ("atan2(t)", 0, "`atan2` takes 2 arguments"),
             ("cos()", 0, "`cos` takes one argument"),

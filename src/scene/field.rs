@@ -91,12 +91,7 @@ macro_rules! field {
 macro_rules! optional_field {
     ($part:ident.$name:ident) => {
         Field {
-            get: |scene: &Scene| {
-                scene
-                    .$part
-                    .as_ref()
-                    .map_or(Value::Unset, |it| it.$name.to_value())
-            },
+            get: |scene: &Scene| scene.$part.as_ref().map_or(Value::Unset, |it| it.$name.to_value()),
             set: |scene, value| {
                 if let Some(it) = &mut scene.$part {
                     it.$name = Held::of_value(value);

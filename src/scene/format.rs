@@ -6,9 +6,7 @@ use std::sync::LazyLock;
 
 use super::drives::DRIVE_KINDS;
 use super::elements::ELEMENT_KINDS;
-use super::key::{
-    Absent, FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector,
-};
+use super::key::{Absent, FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector};
 use super::points::MOST_POINTS;
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
@@ -58,44 +56,18 @@ fn contact_keys() -> Vec<FileKey> {
 /// The whole file.
 pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     let names = [
-        key("name", Takes::Name, "\"press\"", "short name, for outputs")
-            .absent("the file's")
-            .fixed(),
-        key("title", Takes::Text, "\"A press\"", "a line, for lists")
-            .absent("`name`")
-            .fixed(),
-        key("description", Takes::Text, "\"It jumps.\"", "a paragraph")
-            .absent("none")
-            .fixed(),
+        key("name", Takes::Name, "\"press\"", "short name, for outputs").absent("the file's").fixed(),
+        key("title", Takes::Text, "\"A press\"", "a line, for lists").absent("`name`").fixed(),
+        key("description", Takes::Text, "\"It jumps.\"", "a paragraph").absent("none").fixed(),
         of_parameter("start", "start"),
         of_parameter("formulation", "formulation"),
     ];
     let sections = [
-        key(
-            "gravity",
-            Takes::Table(&GRAVITY),
-            "{ z = \"-9.81 m/s^2\" }",
-            GRAVITY.help,
-        ),
-        key(
-            "contact",
-            Takes::Table(&CONTACT),
-            "{ clearance = \"0.2 mm\" }",
-            CONTACT.help,
-        ),
-        key(
-            "solver",
-            Takes::Table(&SOLVER),
-            "{ method = \"automatic\" }",
-            SOLVER.help,
-        ),
+        key("gravity", Takes::Table(&GRAVITY), "{ z = \"-9.81 m/s^2\" }", GRAVITY.help),
+        key("contact", Takes::Table(&CONTACT), "{ clearance = \"0.2 mm\" }", CONTACT.help),
+        key("solver", Takes::Table(&SOLVER), "{ method = \"automatic\" }", SOLVER.help),
         key("view", Takes::Table(&VIEW), "{ down = \"-z\" }", VIEW.help),
-        key(
-            "output",
-            Takes::Table(&OUTPUT),
-            "{ body = \"rod\" }",
-            OUTPUT.help,
-        ),
+        key("output", Takes::Table(&OUTPUT), "{ body = \"rod\" }", OUTPUT.help),
     ]
     .map(|key| key.absent("the defaults"));
     let others = [
@@ -136,16 +108,8 @@ pub(super) static INCLUDED: LazyLock<FileTable> = LazyLock::new(|| {
 /// Lists that a file may have.
 fn lists() -> Vec<FileKey> {
     let own = [
-        list_of(
-            &PARAMETER,
-            many(MOST_OWN, "parameters"),
-            "{ name = \"stroke\", value = \"20 mm\" }",
-        ),
-        list_of(
-            &PATTERN,
-            many(MOST_BODIES, "patterns"),
-            "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }",
-        ),
+        list_of(&PARAMETER, many(MOST_OWN, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
+        list_of(&PATTERN, many(MOST_BODIES, "patterns"), "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }"),
     ];
     own.into_iter().chain(parts()).collect()
 }
@@ -205,27 +169,11 @@ static SOLVER: LazyLock<FileTable> = LazyLock::new(|| {
 
 static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
-        key(
-            "floor",
-            number(D::Length),
-            "\"340 mm\"",
-            "where the floor lies along `down`",
-        )
-        .absent("chosen by the view"),
-        key(
-            "yaw",
-            number(D::Angle),
-            "\"-35 deg\"",
-            "azimuth of the isometric view, with `pitch`",
-        )
-        .absent("the usual one"),
-        key(
-            "pitch",
-            number(D::Angle),
-            "\"12 deg\"",
-            "elevation of the isometric view, with `yaw`",
-        )
-        .absent("the usual one"),
+        key("floor", number(D::Length), "\"340 mm\"", "where the floor lies along `down`").absent("chosen by the view"),
+        key("yaw", number(D::Angle), "\"-35 deg\"", "azimuth of the isometric view, with `pitch`")
+            .absent("the usual one"),
+        key("pitch", number(D::Angle), "\"12 deg\"", "elevation of the isometric view, with `yaw`")
+            .absent("the usual one"),
     ];
     let keys = joined(&[&parameters("view"), &own]);
     FileTable::new("view", "[view]", "how the machine is looked at", keys)
@@ -236,17 +184,10 @@ static OUTPUT: FileTable = FileTable::new(
     "[output]",
     "what is reported",
     &[
-        key("body", Takes::Body, "\"rod\"", "whose pose is reported")
-            .absent("the last one")
-            .fixed(),
-        key(
-            "probe",
-            vector(D::Length),
-            "\"60 0 0 mm\"",
-            "a point of that body, reported as well",
-        )
-        .absent("none")
-        .frame("the body's"),
+        key("body", Takes::Body, "\"rod\"", "whose pose is reported").absent("the last one").fixed(),
+        key("probe", vector(D::Length), "\"60 0 0 mm\"", "a point of that body, reported as well")
+            .absent("none")
+            .frame("the body's"),
     ],
 );
 
@@ -256,20 +197,8 @@ static SPCMM: LazyLock<FileTable> = LazyLock::new(|| {
         key(name, takes, "\"52 mm\"", help).fixed()
     };
     let own = [
-        key(
-            "mean_x",
-            number(D::Length),
-            "\"203 mm\"",
-            "mean of the platform's x",
-        )
-        .fixed(),
-        key(
-            "gamma",
-            number(D::Angle),
-            "\"15 deg\"",
-            "the platform's constant angle",
-        )
-        .fixed(),
+        key("mean_x", number(D::Length), "\"203 mm\"", "mean of the platform's x").fixed(),
+        key("gamma", number(D::Angle), "\"15 deg\"", "the platform's constant angle").fixed(),
         length("hinge_radius", "from the platform's middle to a hinge, b"),
         length("driving_rod", "from a slider to its socket, L1"),
         length("driven_rod", "from ball to hinge, L2"),
@@ -284,14 +213,9 @@ static SPCMM: LazyLock<FileTable> = LazyLock::new(|| {
 
 static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
-        key(
-            "hang",
-            vector(D::Length),
-            "\"0 0 500 mm\"",
-            "the socket from which the first link hangs",
-        )
-        .zero()
-        .frame(WORLD),
+        key("hang", vector(D::Length), "\"0 0 500 mm\"", "the socket from which the first link hangs")
+            .zero()
+            .frame(WORLD),
         key(
             "rotation",
             Takes::Table(&ROTATION),
@@ -324,20 +248,10 @@ static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
 
 static LINK: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
-        key(
-            "ball",
-            vector(D::Length),
-            "\"0 0 100 mm\"",
-            "its ball, in the socket of the link before",
-        )
-        .frame("the link's"),
-        key(
-            "socket",
-            vector(D::Length),
-            "\"0 0 -100 mm\"",
-            "its socket, for the ball of the next link",
-        )
-        .frame("the link's"),
+        key("ball", vector(D::Length), "\"0 0 100 mm\"", "its ball, in the socket of the link before")
+            .frame("the link's"),
+        key("socket", vector(D::Length), "\"0 0 -100 mm\"", "its socket, for the ball of the next link")
+            .frame("the link's"),
         opening().frame("the link's"),
     ];
     let keys = joined(&[&own, &mass()]);
@@ -345,12 +259,7 @@ static LINK: LazyLock<FileTable> = LazyLock::new(|| {
 });
 
 static CHAIN_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
-    let name = [key(
-        "name",
-        Takes::Joint,
-        "\"J1\"",
-        "which one: `J1`, `J2`, …, from the top",
-    )];
+    let name = [key("name", Takes::Joint, "\"J1\"", "which one: `J1`, `J2`, …, from the top")];
     FileTable::new(
         "chain_joint",
         "[[chain.joint]]",
@@ -367,12 +276,7 @@ fn opening() -> FileKey {
 
 static BODY: LazyLock<FileTable> = LazyLock::new(|| {
     let name = [key("name", Takes::Name, "\"rod\"", "its name, not `world`")];
-    FileTable::new(
-        "body",
-        "[[body]]",
-        "a rigid body",
-        joined(&[&name, &mass()]),
-    )
+    FileTable::new("body", "[[body]]", "a rigid body", joined(&[&name, &mass()]))
 });
 
 /// What a body weighs and looks like.
@@ -419,13 +323,8 @@ fn mass() -> [FileKey; 6] {
 static SHAPE: LazyLock<FileTable> = LazyLock::new(|| of_shape("shape", "a shape", &[]));
 
 static FIXED_SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
-    let own = [key(
-        "at_slider_plane",
-        Takes::Flag,
-        "true",
-        "whether it is moved along X by `spcmm.slider_plane`",
-    )
-    .absent("false")];
+    let own = [key("at_slider_plane", Takes::Flag, "true", "whether it is moved along X by `spcmm.slider_plane`")
+        .absent("false")];
     of_shape("fixed_shape", "[[fixed_shape]]", &own).also(&SHAPE)
 });
 
@@ -441,41 +340,16 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         key(name, takes, "\"4 mm\"", help).of(of)
     };
     let own = [
-        key(
-            "form",
-            Takes::Word(Form::WORDS),
-            "\"capsule\"",
-            "what form it has",
-        ),
-        key(
-            "role",
-            Takes::Word(Role::WORDS),
-            "\"frame\"",
-            "what it is part of, which decides its colour",
-        )
-        .absent("that of what its body does"),
-        key(
-            "colour",
-            Takes::Text,
-            "\"#c2255c\"",
-            "red, green and blue in place of the role's colour",
-        )
-        .absent("the role's"),
+        key("form", Takes::Word(Form::WORDS), "\"capsule\"", "what form it has"),
+        key("role", Takes::Word(Role::WORDS), "\"frame\"", "what it is part of, which decides its colour")
+            .absent("that of what its body does"),
+        key("colour", Takes::Text, "\"#c2255c\"", "red, green and blue in place of the role's colour")
+            .absent("the role's"),
         point("from", LONG, "one end of the axis; of a cone, its base"),
         point("to", LONG, "the other end; of a cone, its tip"),
         point("centre", &["box", "sphere"], "its middle"),
-        length(
-            "radius",
-            &["capsule", "cylinder", "cone", "sphere"],
-            "radius; of a cone, that of its base",
-        ),
-        key(
-            "size",
-            vector(D::Length),
-            "\"10 20 30 mm\"",
-            "edge lengths along x, y and z",
-        )
-        .of(&["box"]),
+        length("radius", &["capsule", "cylinder", "cone", "sphere"], "radius; of a cone, that of its base"),
+        key("size", vector(D::Length), "\"10 20 30 mm\"", "edge lengths along x, y and z").of(&["box"]),
         key(
             "corners",
             Takes::Vectors(D::Length, many(MOST_CORNERS, "corners")),
@@ -485,13 +359,7 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         .of(&["plate"])
         .frame(BODY_FRAME),
         length("thickness", &["plate"], "half to each side of the corners"),
-        key(
-            "file",
-            Takes::File,
-            "\"arm.stl\"",
-            "its triangles: STL, OBJ or glTF, beside the scene",
-        )
-        .of(&["mesh"]),
+        key("file", Takes::File, "\"arm.stl\"", "its triangles: STL, OBJ or glTF, beside the scene").of(&["mesh"]),
         key(
             "unit",
             positive(D::Length, LARGEST),
@@ -664,13 +532,8 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         )
         .absent("false"),
     ];
-    FileTable::new(
-        "joint",
-        "[[joint]]",
-        "a joint on which a body hangs",
-        keys.to_vec().leak(),
-    )
-    .by(Variants::Word("kind", "{} joint"))
+    FileTable::new("joint", "[[joint]]", "a joint on which a body hangs", keys.to_vec().leak())
+        .by(Variants::Word("kind", "{} joint"))
 });
 
 static START: FileTable = FileTable::new(
@@ -678,12 +541,8 @@ static START: FileTable = FileTable::new(
     "`start` of a slide or a hinge",
     "where it starts",
     &[
-        key("position", number(D::Length), "\"10 mm\"", "its coordinate")
-            .on_hinge(D::Angle, "\"10 deg\"")
-            .zero(),
-        key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate")
-            .on_hinge(D::AngularSpeed, "\"6 rad/s\"")
-            .zero(),
+        key("position", number(D::Length), "\"10 mm\"", "its coordinate").on_hinge(D::Angle, "\"10 deg\"").zero(),
+        key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate").on_hinge(D::AngularSpeed, "\"6 rad/s\"").zero(),
     ],
 );
 
@@ -695,13 +554,7 @@ static CYLINDRICAL_START: FileTable = FileTable::new(
         key("position", number(D::Length), "\"10 mm\"", "along it").zero(),
         key("angle", number(D::Angle), "\"30 deg\"", "about it").zero(),
         key("velocity", number(D::Speed), "\"10 mm/s\"", "along it").zero(),
-        key(
-            "angular_velocity",
-            number(D::AngularSpeed),
-            "\"6 rad/s\"",
-            "about it",
-        )
-        .zero(),
+        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about it").zero(),
     ],
 );
 
@@ -729,11 +582,7 @@ static CYLINDRICAL_DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
 static UNIVERSAL_DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     let keys = [
         motion(Freedom::FirstTurn, TURNING, "its motion about `axis`"),
-        motion(
-            Freedom::SecondTurn,
-            TURNING,
-            "its motion about `child_axis`",
-        ),
+        motion(Freedom::SecondTurn, TURNING, "its motion about `child_axis`"),
     ];
     FileTable::new(
         "universal_drive",
@@ -749,27 +598,9 @@ static UNIVERSAL_START: FileTable = FileTable::new(
     "where it starts, about its axes",
     &[
         key("angle", number(D::Angle), "\"10 deg\"", "about `axis`").zero(),
-        key(
-            "child_angle",
-            number(D::Angle),
-            "\"30 deg\"",
-            "about `child_axis`",
-        )
-        .zero(),
-        key(
-            "angular_velocity",
-            number(D::AngularSpeed),
-            "\"6 rad/s\"",
-            "about `axis`",
-        )
-        .zero(),
-        key(
-            "child_angular_velocity",
-            number(D::AngularSpeed),
-            "\"6 rad/s\"",
-            "about `child_axis`",
-        )
-        .zero(),
+        key("child_angle", number(D::Angle), "\"30 deg\"", "about `child_axis`").zero(),
+        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `axis`").zero(),
+        key("child_angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `child_axis`").zero(),
     ],
 );
 
@@ -778,13 +609,7 @@ static FREE_START: FileTable = FileTable::new(
     "`start` of a free joint",
     "where a free body starts",
     &[
-        key(
-            "position",
-            vector(D::Length),
-            "\"0 0 100 mm\"",
-            "where `child_point` is",
-        )
-        .frame(WORLD),
+        key("position", vector(D::Length), "\"0 0 100 mm\"", "where `child_point` is").frame(WORLD),
         key(
             "rotation",
             Takes::Table(&ROTATION),
@@ -793,22 +618,10 @@ static FREE_START: FileTable = FileTable::new(
         )
         .zero()
         .frame(WORLD),
-        key(
-            "velocity",
-            vector(D::Speed),
-            "\"1 0 0 m/s\"",
-            "velocity of `child_point`",
-        )
-        .zero()
-        .frame(WORLD),
-        key(
-            "angular_velocity",
-            vector(D::AngularSpeed),
-            "\"0 0 6 rad/s\"",
-            "angular velocity of the child",
-        )
-        .zero()
-        .frame(WORLD),
+        key("velocity", vector(D::Speed), "\"1 0 0 m/s\"", "velocity of `child_point`").zero().frame(WORLD),
+        key("angular_velocity", vector(D::AngularSpeed), "\"0 0 6 rad/s\"", "angular velocity of the child")
+            .zero()
+            .frame(WORLD),
     ],
 );
 
@@ -818,12 +631,7 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         key(name, Takes::Table(&ATTACHMENT), like, help)
     };
     let own = [
-        key(
-            "name",
-            Takes::Name,
-            "\"S1\"",
-            "its name, that of no other joint",
-        ),
+        key("name", Takes::Name, "\"S1\"", "its name, that of no other joint"),
         end("socket", "the socket's centre"),
         end("ball", "the ball's centre, on another body"),
         opening().frame("that of the socket's body"),
@@ -843,9 +651,7 @@ static ATTACHMENT: FileTable = FileTable::new(
     "where something holds a body",
     &[
         key("body", Takes::Body, "\"rod\"", "the body, or `world`"),
-        key("at", vector(D::Length), "\"0 0 100 mm\"", "the point")
-            .zero()
-            .frame("that of its `body`"),
+        key("at", vector(D::Length), "\"0 0 100 mm\"", "the point").zero().frame("that of its `body`"),
     ],
 );
 
@@ -856,35 +662,13 @@ static ROTATION: FileTable = FileTable::new(
     &[
         key("axis", Takes::Direction, "[0, 1, 0]", "axis of the turn").of(&["axis"]),
         key("angle", number(D::Angle), "\"15 deg\"", "angle of the turn").of(&["axis"]),
-        key(
-            "sequence",
-            Takes::Text,
-            "\"xzy\"",
-            "axes of three turns: `\"xzy\"` is Rx Rz Ry, as in paper eq. (2)",
-        )
-        .of(&["sequence"]),
-        key(
-            "angles",
-            Takes::Numbers(3, D::Angle),
-            "\"0 2 15 deg\"",
-            "their angles, in that order",
-        )
-        .of(&["sequence"]),
+        key("sequence", Takes::Text, "\"xzy\"", "axes of three turns: `\"xzy\"` is Rx Rz Ry, as in paper eq. (2)")
+            .of(&["sequence"]),
+        key("angles", Takes::Numbers(3, D::Angle), "\"0 2 15 deg\"", "their angles, in that order").of(&["sequence"]),
         key("x", Takes::Direction, "[1, 0, 0]", "the x axis").of(&["x"]),
-        key(
-            "y",
-            Takes::Direction,
-            "[0, 1, 0]",
-            "on which side of it the y axis lies",
-        )
-        .of(&["x"]),
-        key(
-            "quaternion",
-            Takes::Numbers(4, D::None),
-            "[1, 0, 0, 0]",
-            "a quaternion: w, x, y, z, of any length",
-        )
-        .of(&["quaternion"]),
+        key("y", Takes::Direction, "[0, 1, 0]", "on which side of it the y axis lies").of(&["x"]),
+        key("quaternion", Takes::Numbers(4, D::None), "[1, 0, 0, 0]", "a quaternion: w, x, y, z, of any length")
+            .of(&["quaternion"]),
     ],
 )
 .by(Variants::Presence(&["axis", "sequence", "x", "quaternion"]));
@@ -894,23 +678,12 @@ static PARAMETER: FileTable = FileTable::new(
     "[[parameter]]",
     "a parameter of the scene's own, for expressions, sliders and `--set`",
     &[
-        key(
-            "name",
-            Takes::Name,
-            "\"stroke\"",
-            "its name in expressions: letters, digits and `_`",
-        ),
+        key("name", Takes::Name, "\"stroke\"", "its name in expressions: letters, digits and `_`"),
         key("value", Takes::Quantity, "\"20 mm\"", "its value"),
         key("label", Takes::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
         key("unit", Takes::Text, "\"mm\"", "unit in which it is shown")
             .absent("that of `value`; must be given where that is an expression"),
-        key(
-            "range",
-            Takes::Range,
-            "[\"10 mm\", \"40 mm\"]",
-            "least and greatest value",
-        )
-        .absent("any value"),
+        key("range", Takes::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
         key("help", Takes::Text, "\"How far it goes.\"", "what it is").absent("none"),
     ],
 );
@@ -918,12 +691,7 @@ static PARAMETER: FileTable = FileTable::new(
 static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
         key("name", Takes::Name, "\"leg\"", "its name"),
-        key(
-            "count",
-            Takes::Whole(1, MOST_BODIES as u32),
-            "6",
-            "number of copies",
-        ),
+        key("count", Takes::Whole(1, MOST_BODIES as u32), "6", "number of copies"),
         key(
             "about",
             Takes::Table(&ABOUT),
@@ -931,14 +699,9 @@ static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
             "the axis about which each copy is turned from the one before",
         )
         .or("along"),
-        key(
-            "along",
-            vector(D::Length),
-            "\"100 0 0 mm\"",
-            "by which each copy is shifted from the one before",
-        )
-        .or("about")
-        .frame(WORLD),
+        key("along", vector(D::Length), "\"100 0 0 mm\"", "by which each copy is shifted from the one before")
+            .or("about")
+            .frame(WORLD),
     ];
     let keys = joined(&[&own, &parts()]);
     FileTable::new("pattern", "[[pattern]]", "a group that is repeated", keys)
@@ -949,17 +712,9 @@ static ABOUT: FileTable = FileTable::new(
     "`about` of a pattern",
     "about which copies are turned",
     &[
-        key(
-            "point",
-            vector(D::Length),
-            "\"0 0 100 mm\"",
-            "a point on it",
-        )
-        .zero()
-        .frame(WORLD),
+        key("point", vector(D::Length), "\"0 0 100 mm\"", "a point on it").zero().frame(WORLD),
         key("axis", Takes::Direction, "[0, 0, 1]", "its direction").frame(WORLD),
-        key("angle", number(D::Angle), "\"60 deg\"", "from copy to copy")
-            .absent("a turn over `count`"),
+        key("angle", number(D::Angle), "\"60 deg\"", "from copy to copy").absent("a turn over `count`"),
     ],
 );
 
@@ -973,21 +728,15 @@ static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     };
     let keys = DRIVE_KINDS.iter().enumerate().flat_map(of_kind);
     let keys: Vec<FileKey> = std::iter::once(law).chain(keys).collect();
-    FileTable::new(
-        "drive",
-        "a drive",
-        "coordinate of a slide or a hinge as a function of time",
-        keys.leak(),
-    )
-    .by(Variants::Word("law", ""))
+    FileTable::new("drive", "a drive", "coordinate of a slide or a hinge as a function of time", keys.leak())
+        .by(Variants::Word("law", ""))
 });
 
 /// Names of coordinates.
 const COORDINATES: [&str; 3] = ["position", "angle", "child_angle"];
 
 /// Force elements, in the order of their rows.
-static ELEMENTS: LazyLock<Vec<FileTable>> =
-    LazyLock::new(|| ELEMENT_KINDS.iter().map(of_element).collect());
+static ELEMENTS: LazyLock<Vec<FileTable>> = LazyLock::new(|| ELEMENT_KINDS.iter().map(of_element).collect());
 
 fn of_element(kind: &'static ElementKind) -> FileTable {
     let name = key("name", Takes::Name, "\"s1\"", "its name, that of no joint");
@@ -1013,12 +762,7 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
     for number in kind.numbers {
         let row = |name, dimension, like| FileKey {
             absent: number.default.map_or(Absent::Fault, Absent::Is),
-            ..key(
-                name,
-                Takes::Number(dimension, number.range),
-                like,
-                number.help,
-            )
+            ..key(name, Takes::Number(dimension, number.range), like, number.help)
         };
         let slide = row(number.key, number.dimension, number.like);
         match number.on_hinge {
@@ -1029,10 +773,7 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
             // On a hinge it has another key.
             Some(own) => {
                 let hinge = row(own.key, own.dimension, own.like);
-                let on = |row: FileKey, what| FileKey {
-                    help: format!("{}, on a {what}", number.help).leak(),
-                    ..row
-                };
+                let on = |row: FileKey, what| FileKey { help: format!("{}, on a {what}", number.help).leak(), ..row };
                 let (slide, hinge) = (on(slide, "slide"), on(hinge, "hinge"));
                 keys.extend(match number.default {
                     None => [slide.or(own.key), hinge.or(number.key)],
@@ -1065,11 +806,7 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
         let absent = "`stiffness` and `preload` hold";
         let row = key(points, pairs(curve.slide), curve.slide.1, curve.help).absent(absent);
         let (hinge, like) = curve.hinge;
-        keys.push(if like == curve.slide.1 {
-            row
-        } else {
-            row.on_hinge(hinge[1].1, like)
-        });
+        keys.push(if like == curve.slide.1 { row } else { row.on_hinge(hinge[1].1, like) });
         let help = "instead of the points: a CSV file beside the scene, two columns under a header with units";
         keys.push(key(file, Takes::File, "\"coil.csv\"", help).absent(absent));
     }

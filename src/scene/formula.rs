@@ -108,7 +108,8 @@ pub(super) fn read_formula(
     let scale = match unit {
         None => 1.0,
         Some(unit) if of_quantities => {
-            let why = "not allowed here: a formula with quantities has its own unit; a parameter without one is a number";
+            let why =
+                "not allowed here: a formula with quantities has its own unit; a parameter without one is a number";
             return Err(unit.error(why));
         }
         Some(unit) => {
@@ -131,15 +132,10 @@ fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
     let span = node.value.span();
     let inner = span.start + 1;
     // With escapes, or in three quotes, the value as a whole is marked.
-    let plain = node
-        .document
-        .text
-        .get(inner..)
-        .is_some_and(|rest| rest.starts_with(text));
+    let plain = node.document.text.get(inner..).is_some_and(|rest| rest.starts_with(text));
     let start = if plain { inner + at } else { span.start };
     let excerpt = node.document.excerpt(span.clone());
-    node.document
-        .error(start..span.end, &node.key, Some(&excerpt), message)
+    node.document.error(start..span.end, &node.key, Some(&excerpt), message)
 }
 
 #[cfg(test)]
@@ -180,10 +176,7 @@ mod tests {
                 assert_eq!(now.value, program.eval(&[t]), "{text}");
                 let rate = (at(t + h).value - at(t - h).value) / (2.0 * h);
                 let acceleration = (at(t + h).rate - at(t - h).rate) / (2.0 * h);
-                assert!(
-                    (now.rate - rate).abs() < 1e-7 * (1.0 + rate.abs()),
-                    "{text} at {t}"
-                );
+                assert!((now.rate - rate).abs() < 1e-7 * (1.0 + rate.abs()), "{text} at {t}");
                 let off = (now.acceleration - acceleration).abs();
                 assert!(off < 1e-6 * (1.0 + acceleration.abs()), "{text} at {t}");
             }
@@ -193,12 +186,9 @@ mod tests {
     #[test]
     fn whole_powers_have_derivatives_at_zero() {
         let zero = Jet::new(0.0, 1.0, 0.0);
-        for (exponent, expected) in [
-            (0.0, Jet::constant(1.0)),
-            (1.0, zero),
-            (2.0, Jet::new(0.0, 0.0, 2.0)),
-            (3.0, Jet::default()),
-        ] {
+        for (exponent, expected) in
+            [(0.0, Jet::constant(1.0)), (1.0, zero), (2.0, Jet::new(0.0, 0.0, 2.0)), (3.0, Jet::default())]
+        {
             let found = zero.binary(Binary::Power, Jet::constant(exponent));
             assert_eq!(found, expected, "{exponent}");
         }

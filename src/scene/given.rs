@@ -32,12 +32,7 @@ pub(super) enum Place {
 impl FileNumber {
     /// Written as `text` at `place`.
     pub(super) fn new(value: f64, dimension: Dimension, place: Place, text: &str) -> Self {
-        Self {
-            value,
-            dimension,
-            place,
-            unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)),
-        }
+        Self { value, dimension, place, unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)) }
     }
 }
 

@@ -12,9 +12,7 @@ use super::*;
 ///
 /// # Errors
 /// No list of names, a name that is there twice, or a file that cannot be read.
-pub(super) fn included_texts<'d>(
-    top: &Section<'d>,
-) -> Result<Vec<(&'d str, Arc<str>)>, SceneError> {
+pub(super) fn included_texts<'d>(top: &Section<'d>) -> Result<Vec<(&'d str, Arc<str>)>, SceneError> {
     let mut texts: Vec<(&str, Arc<str>)> = Vec::new();
     let nodes = top.get("include").map(|node| node.entries());
     for node in nodes.transpose()?.unwrap_or_default() {
@@ -30,21 +28,13 @@ pub(super) fn included_texts<'d>(
 
 /// The document of an included file.
 pub(super) fn document<'d>(of: Document<'d>, name: &'d str, text: &'d str) -> Document<'d> {
-    Document {
-        file: Some(name),
-        text,
-        included: true,
-        ..of
-    }
+    Document { file: Some(name), text, included: true, ..of }
 }
 
 /// What an included file holds.
 ///
 /// # Errors
 /// A key that only the scene's own file may have.
-pub(super) fn section<'d>(
-    document: Document<'d>,
-    parsed: &'d Spanned<DeTable<'d>>,
-) -> Result<Section<'d>, SceneError> {
+pub(super) fn section<'d>(document: Document<'d>, parsed: &'d Spanned<DeTable<'d>>) -> Result<Section<'d>, SceneError> {
     Section::new(document, String::new(), parsed.get_ref(), 0..0, &INCLUDED)
 }

@@ -142,14 +142,7 @@ impl FileTable {
         help: &'static str,
         keys: &'static [FileKey],
     ) -> Self {
-        Self {
-            name,
-            head,
-            help,
-            keys,
-            variants: None,
-            also: None,
-        }
+        Self { name, head, help, keys, variants: None, also: None }
     }
 
     /// With all keys of `other` among its own.
@@ -173,9 +166,7 @@ impl FileTable {
     /// Row of the key `name`: that of the variant `word` if it has one.
     pub fn key(&self, name: &str, word: Option<&'static str>) -> Option<&'static FileKey> {
         let named = |key: &&FileKey| key.name == name;
-        self.of(word)
-            .find(named)
-            .or_else(|| self.keys.iter().find(named))
+        self.of(word).find(named).or_else(|| self.keys.iter().find(named))
     }
 
     /// Words of its variants; none if it has no variants.
@@ -192,23 +183,8 @@ impl FileTable {
 }
 
 /// A key that must be given.
-pub(super) const fn key(
-    name: &'static str,
-    takes: Takes,
-    like: &'static str,
-    help: &'static str,
-) -> FileKey {
-    FileKey {
-        name,
-        takes,
-        like,
-        on_hinge: None,
-        absent: Absent::Fault,
-        frame: "",
-        help,
-        of: &[],
-        fixed: false,
-    }
+pub(super) const fn key(name: &'static str, takes: Takes, like: &'static str, help: &'static str) -> FileKey {
+    FileKey { name, takes, like, on_hinge: None, absent: Absent::Fault, frame: "", help, of: &[], fixed: false }
 }
 
 impl FileKey {
@@ -303,10 +279,7 @@ impl FileKey {
     /// Most entries of its list.
     pub fn many(&self) -> Option<Many> {
         match self.takes {
-            Takes::List(_, many)
-            | Takes::Vectors(_, many)
-            | Takes::Pairs(_, many)
-            | Takes::Files(many) => Some(many),
+            Takes::List(_, many) | Takes::Vectors(_, many) | Takes::Pairs(_, many) | Takes::Files(many) => Some(many),
             _ => None,
         }
     }

@@ -39,10 +39,7 @@ pub const MOST_CHANGES: usize = 4096;
 
 /// The message for a larger one.
 pub fn too_large() -> String {
-    format!(
-        "too large for a scene file: more than {} MiB",
-        LARGEST_FILE >> 20
-    )
+    format!("too large for a scene file: more than {} MiB", LARGEST_FILE >> 20)
 }
 
 /// TOML text of a built-in scene.
@@ -68,10 +65,7 @@ impl Scene {
     ///
     /// # Errors
     /// Unreadable file, anything wrong in it, or a bad change.
-    pub fn load(
-        argument: impl AsRef<OsStr>,
-        changes: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    pub fn load(argument: impl AsRef<OsStr>, changes: &[(String, String)]) -> Result<Self, SceneError> {
         let path = argument.as_ref();
         // A file name need not be valid UTF-8; messages about it must be.
         let argument = &*path.to_string_lossy();
@@ -89,10 +83,7 @@ impl Scene {
                     visible_line(&brief(argument)),
                     BUILT_IN.join(", ")
                 );
-                Err(SceneError {
-                    message,
-                    ..SceneError::default()
-                })
+                Err(SceneError { message, ..SceneError::default() })
             }
         }
     }
@@ -108,7 +99,10 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
     let metadata = std::fs::metadata(path).map_err(|cause| {
         let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
         let near = nearest(stem, BUILT_IN);
-        error(format!("cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {}{near}", BUILT_IN.join(", ")))
+        error(format!(
+            "cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {}{near}",
+            BUILT_IN.join(", ")
+        ))
     })?;
     if metadata.is_dir() {
         return Err(error("this is a directory, not a scene file".to_owned()));
@@ -119,10 +113,7 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(SceneError {
-            unreadable: false,
-            ..error(too_large())
-        });
+        return Err(SceneError { unreadable: false, ..error(too_large()) });
     }
     String::from_utf8(bytes).map_err(|cause| {
         let good = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
@@ -130,9 +121,7 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
         SceneError {
             position: Some(line_and_column(good)),
             unreadable: false,
-            ..error(
-                "not a text file: this byte is not valid UTF-8, so it is no scene file".to_owned(),
-            )
+            ..error("not a text file: this byte is not valid UTF-8, so it is no scene file".to_owned())
         }
     })
 }

@@ -47,9 +47,7 @@ pub use doubt::{Doubt, Warning, WarningKind};
 pub use drives::DRIVE_KINDS;
 pub use elements::ELEMENT_KINDS;
 pub use error::SceneError;
-pub use expression::{
-    Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step,
-};
+pub use expression::{Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step};
 pub use format::{FILE, file_tables};
 pub use given::{FileNumber, OwnParameter};
 pub use key::{ABOVE_ZERO, Absent, FileKey, FileTable, Many, Takes, Variants};

@@ -440,14 +440,8 @@ pub struct Joint {
 impl Joint {
     /// The points that it connects: the parent's, then the child's.
     pub fn points(&self) -> [Attachment; 2] {
-        let parent = Attachment {
-            body: self.parent,
-            point: self.parent_point,
-        };
-        let child = Attachment {
-            body: Some(self.child),
-            point: self.child_point,
-        };
+        let parent = Attachment { body: self.parent, point: self.parent_point };
+        let child = Attachment { body: Some(self.child), point: self.child_point };
         [parent, child]
     }
 

@@ -60,8 +60,7 @@ struct Row<'a> {
 /// Rows live as long as the program, like those of the table: one for each
 /// key that was asked for, whatever values it takes.
 fn interned(row: Row<'_>) -> &'static Parameter {
-    static ROWS: LazyLock<Mutex<BTreeMap<String, &'static Parameter>>> =
-        LazyLock::new(Mutex::default);
+    static ROWS: LazyLock<Mutex<BTreeMap<String, &'static Parameter>>> = LazyLock::new(Mutex::default);
     let bits = |(a, b): (f64, f64)| (a.to_bits(), b.to_bits());
     let identity = format!(
         "{} {} {} {:?} {} {:?} {:?} {}",

@@ -2,9 +2,7 @@
 
 use super::error::{did_you_mean, nearest_name};
 use super::field::Access;
-use super::units::{
-    Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names,
-};
+use super::units::{Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
 use super::value::Value;
 
 /// What kind of value a parameter takes.
@@ -148,14 +146,8 @@ impl Parameter {
             Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
                 format!("{} to below the ball radius", format_quantity(min, display))
             }
-            Kind::Number {
-                min, max, display, ..
-            } => {
-                format!(
-                    "{} to {}",
-                    format_quantity(min, display),
-                    format_quantity(max, display)
-                )
+            Kind::Number { min, max, display, .. } => {
+                format!("{} to {}", format_quantity(min, display), format_quantity(max, display))
             }
             Kind::Count { min, max } => format!("{min} to {max}"),
             Kind::Choice(words) => words.join(", "),
@@ -206,9 +198,8 @@ impl Parameter {
             Kind::Choice(words) => {
                 // "x" means "+x".
                 let word = text.to_lowercase();
-                let found = words.iter().find(|choice| {
-                    **choice == word || choice.strip_prefix('+') == Some(word.as_str())
-                });
+                let found =
+                    words.iter().find(|choice| **choice == word || choice.strip_prefix('+') == Some(word.as_str()));
                 let Some(choice) = found else {
                     let nearest = nearest_name(text, words.iter().copied());
                     return Err(self.refuse(ValueFault::NoChoice { nearest }));
@@ -231,29 +222,17 @@ impl Parameter {
             (Kind::Choice(words), Value::Choice(word)) => words.contains(word),
             _ => return Err(self.refuse(ValueFault::WrongKind)),
         };
-        if fine {
-            Ok(())
-        } else {
-            Err(self.refuse(ValueFault::OutOfRange))
-        }
+        if fine { Ok(()) } else { Err(self.refuse(ValueFault::OutOfRange)) }
     }
 
     fn refuse(&self, fault: ValueFault) -> ValueError {
-        ValueError {
-            fault,
-            allowed: self.allowed(),
-        }
+        ValueError { fault, allowed: self.allowed() }
     }
 
     /// A text that [`Self::read`] turns back into exactly this value.
     pub fn write(&self, value: &Value) -> String {
         match (self.kind, value) {
-            (
-                Kind::Number {
-                    dimension, display, ..
-                },
-                Value::Number(si),
-            ) => exact_quantity(*si, display, dimension),
+            (Kind::Number { dimension, display, .. }, Value::Number(si)) => exact_quantity(*si, display, dimension),
             _ => self.show(value),
         }
     }

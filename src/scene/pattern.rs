@@ -75,9 +75,8 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
         return Err(section.error("", message));
     }
     if size.saturating_mul(count as usize) > MOST_VALUES {
-        return Err(count_node.error(format!(
-            "{count} copies of {size} values are too many; allowed at most {MOST_VALUES} in all"
-        )));
+        return Err(count_node
+            .error(format!("{count} copies of {size} values are too many; allowed at most {MOST_VALUES} in all")));
     }
     let (centre, axis, angle) = match section.get("about") {
         None => (Vec3::zeros(), Vec3::z(), 0.0),

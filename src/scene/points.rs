@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use super::document::{Document, Node};
 use super::key::MAX_SI;
-use super::{
-    Dimension, QuantityError, SceneError, format_quantity, parse_quantity, si_unit, unit_names,
-};
+use super::{Dimension, QuantityError, SceneError, format_quantity, parse_quantity, si_unit, unit_names};
 
 /// Shortest interval of a table, ramp or pulse, s.
 pub(super) const SHORTEST_PART: f64 = 1e-6;
@@ -23,10 +21,7 @@ enum PointsFault {
     #[error("has {count} points; allowed {least} to {MOST_POINTS}")]
     Count { count: usize, least: usize },
     #[error("{name}s must rise, by at least {least} from one point to the next")]
-    NotRising {
-        name: &'static str,
-        least: &'static str,
-    },
+    NotRising { name: &'static str, least: &'static str },
     #[error("repeats, so the last position must be the first")]
     NotClosed,
     #[error(
@@ -66,11 +61,7 @@ pub(super) struct Axis {
 impl Axis {
     /// `a time`.
     fn article(self) -> String {
-        let article = if self.name.starts_with('a') {
-            "an"
-        } else {
-            "a"
-        };
+        let article = if self.name.starts_with('a') { "an" } else { "a" };
         format!("{article} {}", self.name)
     }
 }
@@ -88,11 +79,7 @@ pub(super) struct Graph {
 impl Graph {
     /// A motion, whose coordinate has this dimension.
     pub fn motion(dimension: Dimension, repeats: bool) -> Self {
-        let axis = |name, dimension| Axis {
-            name,
-            dimension,
-            most: MAX_SI,
-        };
+        let axis = |name, dimension| Axis { name, dimension, most: MAX_SI };
         Self {
             axes: [axis("time", Dimension::Time), axis("position", dimension)],
             rise: (SHORTEST_PART, "1 us"),
@@ -105,10 +92,7 @@ impl Graph {
         let (least, words) = self.rise;
         match points {
             [.., [before, _], [now, _]] if !(now - before >= least) => {
-                Err(PointsFault::NotRising {
-                    name: self.axes[0].name,
-                    least: words,
-                })
+                Err(PointsFault::NotRising { name: self.axes[0].name, least: words })
             }
             _ => Ok(()),
         }
@@ -130,8 +114,7 @@ pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, Scen
                 pair.len()
             )));
         };
-        let value =
-            |node: &Node<'_>, axis: Axis| node.within(axis.dimension, (-axis.most, axis.most));
+        let value = |node: &Node<'_>, axis: Axis| node.within(axis.dimension, (-axis.most, axis.most));
         points.push([value(x, first)?, value(y, second)?]);
         let risen = graph.check_rise(&points);
         risen.map_err(|fault| x.error(fault.to_string()))?;
@@ -149,11 +132,7 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
     let beside = node.document.beside;
     let text = beside.text(name);
     let text = text.map_err(|fault| node.error(fault.to_string()))?;
-    let file = Document {
-        file: Some(name),
-        text: &text,
-        ..node.document
-    };
+    let file = Document { file: Some(name), text: &text, ..node.document };
     let mut columns = None;
     let mut points = Points::new();
     let mut start = 0;
@@ -185,9 +164,7 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
         };
         let value = |cell: &Range<usize>, column: Column<'_>| {
             let number = &text[cell.clone()];
-            let error = |fault: PointsFault| {
-                file.error(cell.clone(), column.header, Some(number), fault.to_string())
-            };
+            let error = |fault: PointsFault| file.error(cell.clone(), column.header, Some(number), fault.to_string());
             column.read(number).map_err(error)
         };
         points.push([value(x, of_x)?, value(y, of_y)?]);
@@ -232,9 +209,7 @@ impl<'t> Column<'t> {
             let inner = header.strip_suffix(close)?;
             Some(inner.rsplit_once(open)?.1.trim())
         };
-        let unit = bracketed('[', ']')
-            .or_else(|| bracketed('(', ')'))
-            .or_else(|| Some(header.rsplit_once('_')?.1));
+        let unit = bracketed('[', ']').or_else(|| bracketed('(', ')')).or_else(|| Some(header.rsplit_once('_')?.1));
         let known = |unit: &&str| parse_quantity(&format!("1 {unit}"), dimension).is_ok();
         match unit.filter(known) {
             Some(unit) => Ok(Self { header, unit, axis }),
@@ -247,17 +222,9 @@ impl<'t> Column<'t> {
         if number.parse::<f64>().is_err() {
             return Err(PointsFault::NotANumber);
         }
-        let Axis {
-            dimension,
-            most: limit,
-            ..
-        } = self.axis;
+        let Axis { dimension, most: limit, .. } = self.axis;
         let value = parse_quantity(&format!("{number} {}", self.unit), dimension)?;
-        if value.abs() <= limit {
-            Ok(value)
-        } else {
-            Err(PointsFault::OutOfRange { limit, dimension })
-        }
+        if value.abs() <= limit { Ok(value) } else { Err(PointsFault::OutOfRange { limit, dimension }) }
     }
 }
 
@@ -270,8 +237,7 @@ fn close(points: &mut Points, repeats: bool) -> Result<(), PointsFault> {
     }
     if repeats {
         let places = || points.iter().map(|point| point[1]);
-        let range =
-            places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
+        let range = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
         let (first, last) = (points[0][1], points[points.len() - 1][1]);
         if !((last - first).abs() <= CLOSED * range) {
             return Err(PointsFault::NotClosed);

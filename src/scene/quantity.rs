@@ -42,10 +42,7 @@ pub enum DimensionError {
 impl Quantity {
     /// `value` in SI units.
     pub fn new(value: f64, dimension: Dimension) -> Self {
-        Self {
-            value,
-            powers: Ok(powers(dimension)),
-        }
+        Self { value, powers: Ok(powers(dimension)) }
     }
 
     /// Its SI value, whatever its dimension.
@@ -78,11 +75,7 @@ impl Quantity {
         if found[..3] == wanted[..3] && angle {
             return Ok(self.value + 0.0);
         }
-        Err(DimensionError::Foreign {
-            value: self.value,
-            powers: found,
-            wanted: dimension,
-        })
+        Err(DimensionError::Foreign { value: self.value, powers: found, wanted: dimension })
     }
 }
 
@@ -125,11 +118,7 @@ fn unit_of(powers: [i8; 4]) -> String {
         1 => Some(unit.to_owned()),
         _ => Some(format!("{unit}^{power}")),
     };
-    let parts: Vec<String> = ["kg", "m", "s", "rad"]
-        .into_iter()
-        .zip(powers)
-        .filter_map(part)
-        .collect();
+    let parts: Vec<String> = ["kg", "m", "s", "rad"].into_iter().zip(powers).filter_map(part).collect();
     parts.join(" ")
 }
 
@@ -141,9 +130,7 @@ fn common(a: Quantity, b: Quantity) -> Result<[i8; 4], DimensionError> {
         return Ok(of_b);
     }
     let same = of_a == of_b || of_a[..3] == of_b[..3] && of_a[..3] != [0; 3];
-    (same || zero(b, of_b))
-        .then_some(of_a)
-        .ok_or(DimensionError::Mixed)
+    (same || zero(b, of_b)).then_some(of_a).ok_or(DimensionError::Mixed)
 }
 
 /// Powers times `factor`, if whole and small.
@@ -161,10 +148,7 @@ fn scaled(powers: [i8; 4], factor: f64) -> Result<[i8; 4], DimensionError> {
 
 impl Number for Quantity {
     fn constant(value: f64) -> Self {
-        Self {
-            value,
-            powers: Ok([0; 4]),
-        }
+        Self { value, powers: Ok([0; 4]) }
     }
 
     fn unary(self, operation: Unary) -> Self {
@@ -178,10 +162,7 @@ impl Number for Quantity {
             Unary::Asin | Unary::Acos | Unary::Atan => pure(powers).map(|_| [0, 0, 0, 1]),
             _ => pure(powers),
         });
-        Self {
-            value: self.value.unary(operation),
-            powers,
-        }
+        Self { value: self.value.unary(operation), powers }
     }
 
     fn binary(self, operation: Binary, other: Self) -> Self {
@@ -204,9 +185,6 @@ impl Number for Quantity {
                 (Err(fault), _) | (_, Err(fault)) => Err(fault),
             },
         };
-        Self {
-            value: self.value.binary(operation, other.value),
-            powers,
-        }
+        Self { value: self.value.binary(operation, other.value), powers }
     }
 }

@@ -27,11 +27,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn parse(
-        text: &str,
-        file: Option<&str>,
-        changes: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    pub fn parse(text: &str, file: Option<&str>, changes: &[(String, String)]) -> Result<Self, SceneError> {
         Self::parse_beside(text, file, Beside::default(), changes)
     }
 
@@ -85,39 +81,22 @@ impl Scene {
     ) -> Result<Self, SceneError> {
         let of_text = changes.iter().filter(|(key, _)| is_of_text(key));
         let reading = Reading::new(of_text);
-        let document = Document {
-            file,
-            text,
-            reading: &reading,
-            beside: &beside,
-            included: false,
-            copy: None,
-            on_hinge: false,
-        };
+        let document =
+            Document { file, text, reading: &reading, beside: &beside, included: false, copy: None, on_hinge: false };
         let mut scene = Self::read_document(document, changes)?;
         scene.source.beside = beside.into_texts();
         Ok(scene)
     }
 
-    fn read_document(
-        document: Document<'_>,
-        changes: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    fn read_document(document: Document<'_>, changes: &[(String, String)]) -> Result<Self, SceneError> {
         let Document { file, text, .. } = document;
         if text.trim().is_empty() {
-            return Err(document.error(
-                0..0,
-                "",
-                None,
-                "the file is empty; a scene needs at least one body",
-            ));
+            return Err(document.error(0..0, "", None, "the file is empty; a scene needs at least one body"));
         }
         let parsed = document.parse()?;
         let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &FILE)?;
         let texts = included_texts(&top)?;
-        let documents = texts
-            .iter()
-            .map(|(name, text)| include::document(document, name, text));
+        let documents = texts.iter().map(|(name, text)| include::document(document, name, text));
         let documents: Vec<Document<'_>> = documents.collect();
         let tables = documents.iter().map(Document::parse);
         let tables = tables.collect::<Result<Vec<_>, _>>()?;
@@ -132,10 +111,7 @@ impl Scene {
         scene.source.places = places
             .iter()
             .map(|(key, node)| (key.clone(), node.place()))
-            .chain(
-                top.get("spcmm")
-                    .map(|node| ("spcmm".to_owned(), node.place())),
-            )
+            .chain(top.get("spcmm").map(|node| ("spcmm".to_owned(), node.place())))
             .collect();
         for (key, value) in changes {
             if REBUILDS.contains(&key.as_str()) {
@@ -156,15 +132,9 @@ impl Scene {
                     .find_map(|key| places.get(key))
                     .map(|node| node.error(fault.fault.to_string()))
             };
-            let message = || SceneError {
-                file: file.map(str::to_owned),
-                message: fault.fault.to_string(),
-                ..Default::default()
-            };
-            fault
-                .blame_changes(&scene)
-                .or_else(place)
-                .unwrap_or_else(message)
+            let message =
+                || SceneError { file: file.map(str::to_owned), message: fault.fault.to_string(), ..Default::default() };
+            fault.blame_changes(&scene).or_else(place).unwrap_or_else(message)
         })?;
         Ok(scene)
     }
@@ -172,9 +142,7 @@ impl Scene {
 
 /// Whether a key may be one of the numbers that the text gives, and not a parameter of the table.
 fn is_of_text(key: &str) -> bool {
-    let of_joint = key
-        .strip_prefix("joint.")
-        .and_then(|key| key.rsplit_once('.'));
+    let of_joint = key.strip_prefix("joint.").and_then(|key| key.rsplit_once('.'));
     let in_table = |part: &str| find(&format!("contact.{part}")).is_some();
     find(key).is_none() && !of_joint.is_some_and(|(_, part)| in_table(part)) && !file_only(key)
 }
@@ -196,10 +164,7 @@ pub(super) fn file_only(key: &str) -> bool {
 fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     let document = top.document;
     let text = |name: &str| top.get(name).map(|node| node.text()).transpose();
-    let stem = document
-        .file
-        .and_then(|file| Path::new(file).file_stem())
-        .and_then(|stem| stem.to_str());
+    let stem = document.file.and_then(|file| Path::new(file).file_stem()).and_then(|stem| stem.to_str());
     let name = match top.get("name") {
         Some(node) => node.name()?.into_owned(),
         None => visible_line(stem.unwrap_or("scene")).into_owned(),
@@ -245,15 +210,8 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         },
         spcmm,
         chain: top.get("chain").map(|_| Chain { links: 0 }),
-        view: ViewSettings {
-            down: SignedAxis::MinusZ,
-            floor,
-            isometric,
-        },
-        output: Output {
-            body: 0,
-            probe: None,
-        },
+        view: ViewSettings { down: SignedAxis::MinusZ, floor, isometric },
+        output: Output { body: 0, probe: None },
         start: StartRule::default(),
         bodies: Vec::new(),
         joints: Vec::new(),
@@ -261,11 +219,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         closing_joints: Vec::new(),
         elements: Vec::new(),
         fixed_shapes: Vec::new(),
-        source: Source {
-            file: document.file.map(str::to_owned),
-            text: document.text.to_owned(),
-            ..Source::default()
-        },
+        source: Source { file: document.file.map(str::to_owned), text: document.text.to_owned(), ..Source::default() },
         changes: Vec::new(),
     })
 }
@@ -286,14 +240,8 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         None => top.get(key),
     };
     // The preset first: other settings in the file take precedence over it.
-    let preset = table()
-        .iter()
-        .filter(|parameter| parameter.key == "solver.preset");
-    let others = || {
-        table()
-            .iter()
-            .filter(|parameter| parameter.key != "solver.preset")
-    };
+    let preset = table().iter().filter(|parameter| parameter.key == "solver.preset");
+    let others = || table().iter().filter(|parameter| parameter.key != "solver.preset");
     for parameter in others() {
         scene.write(parameter, &default_of(parameter, &sections));
     }
@@ -340,11 +288,8 @@ fn read_mechanism<'d>(
         body_sections.push(section);
     }
     let file_order: Vec<String> = bodies.iter().map(|body| body.name.clone()).collect();
-    let file_places: BTreeMap<&str, usize> = file_order
-        .iter()
-        .enumerate()
-        .map(|(place, name)| (name.as_str(), place))
-        .collect();
+    let file_places: BTreeMap<&str, usize> =
+        file_order.iter().enumerate().map(|(place, name)| (name.as_str(), place)).collect();
     let mut joint_names = Names::default();
     let mut joints: Vec<JointText<'d>> = Vec::new();
     for node in list("joint")? {
@@ -352,15 +297,10 @@ fn read_mechanism<'d>(
         joint_names.add(&joint.section, "joint", &joint.name)?;
         let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.slider();
         if let Some(coordinate) = slider(&joint)
-            && let Some(other) = joints
-                .iter()
-                .find(|other| slider(other) == Some(coordinate))
+            && let Some(other) = joints.iter().find(|other| slider(other) == Some(coordinate))
         {
-            let message = format!(
-                "slider {} already drives joint `{}`; allowed 1, 2, 3, each once",
-                coordinate + 1,
-                other.name
-            );
+            let message =
+                format!("slider {} already drives joint `{}`; allowed 1, 2, 3, each once", coordinate + 1, other.name);
             return Err(joint.section.error("drive", message));
         }
         joints.push(joint);
@@ -374,18 +314,10 @@ fn read_mechanism<'d>(
             scene.source.places.insert(title, section.place());
         }
         let sorted = |body: usize| by_name[&file_order[body]];
-        scene.closing_joints.push(Joint {
-            parent: joint.parent.map(sorted),
-            child: sorted(joint.child),
-            ..joint
-        });
+        scene.closing_joints.push(Joint { parent: joint.parent.map(sorted), child: sorted(joint.child), ..joint });
     }
     for node in list("ball_joint")? {
-        let BallJointText {
-            joint,
-            section,
-            places: own,
-        } = read_ball_joint(&node, scene, &by_name)?;
+        let BallJointText { joint, section, places: own } = read_ball_joint(&node, scene, &by_name)?;
         joint_names.add(&section, "joint", &joint.name)?;
         let title = format!("joint.{}", joint.name);
         if !section.document.included {
@@ -429,12 +361,7 @@ fn read_mechanism<'d>(
         return Err(top.document.error(0..0, "shapes", None, message));
     }
     if scene.bodies.is_empty() {
-        return Err(top.document.error(
-            0..0,
-            "body",
-            None,
-            "a scene needs at least one [[body]], or a [chain]",
-        ));
+        return Err(top.document.error(0..0, "body", None, "a scene needs at least one [[body]], or a [chain]"));
     }
     read_output(top, scene, &file_order)
 }
@@ -445,24 +372,13 @@ fn indices_by_name(bodies: &[Body]) -> BTreeMap<String, usize> {
     bodies.iter().enumerate().map(place).collect()
 }
 
-fn read_output(
-    top: &Section<'_>,
-    scene: &mut Scene,
-    file_order: &[String],
-) -> Result<(), SceneError> {
+fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> Result<(), SceneError> {
     // Default: the last body (the end of a chain, the platform of most files).
     let last = scene.bodies.last().map_or("", |body| body.name.as_str());
-    let last = if scene.chain.is_some() {
-        last
-    } else {
-        file_order.last().map_or(last, String::as_str)
-    }
-    .to_owned();
+    let last = if scene.chain.is_some() { last } else { file_order.last().map_or(last, String::as_str) }.to_owned();
     let section = top.get("output").map(|node| node.section()).transpose()?;
     let node = section.as_ref().and_then(|section| section.get("body"));
-    let wanted = node
-        .as_ref()
-        .map_or(Ok(last.as_str()), |node| node.text())?;
+    let wanted = node.as_ref().map_or(Ok(last.as_str()), |node| node.text())?;
     let found = scene.bodies.iter().position(|body| body.name == wanted);
     let names = || scene.bodies.iter().map(|body| body.name.as_str());
     let body = match (found, node) {
@@ -470,10 +386,7 @@ fn read_output(
         (None, Some(node)) => return Err(node.error(no_body(wanted, names()))),
         (None, None) => 0,
     };
-    let probe = section
-        .and_then(|section| section.get("probe"))
-        .map(|node| node.vector())
-        .transpose()?;
+    let probe = section.and_then(|section| section.get("probe")).map(|node| node.vector()).transpose()?;
     scene.output = Output { body, probe };
     Ok(())
 }
@@ -488,9 +401,7 @@ struct Names<'d> {
 impl<'d> Names<'d> {
     /// Reserves `name` for the item at `node`, unless already taken.
     fn taken(&mut self, name: &str, node: &Node<'d>) {
-        self.places
-            .entry(name.to_owned())
-            .or_insert_with(|| node.clone());
+        self.places.entry(name.to_owned()).or_insert_with(|| node.clone());
     }
 
     fn add(&mut self, section: &Section<'d>, what: &str, name: &str) -> Result<(), SceneError> {
@@ -501,8 +412,7 @@ impl<'d> Names<'d> {
                 let document = &first.document;
                 let (line, _) = place_of(document.text, first.place());
                 let file = document.file.filter(|_| document.included);
-                let of_file =
-                    file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
+                let of_file = file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
                 Err(node.error(format!(
                     "there is already a {what} of this name, in line {line}{of_file}; names must differ, for example `{name}2`"
                 )))

@@ -59,11 +59,7 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
 /// Mass, centroid, inertia and shapes.
 pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Body, SceneError> {
     let shapes = match section.get("shapes") {
-        Some(node) => node
-            .entries()?
-            .iter()
-            .map(|shape| read_shape(shape, false, None))
-            .collect::<Result<_, _>>()?,
+        Some(node) => node.entries()?.iter().map(|shape| read_shape(shape, false, None)).collect::<Result<_, _>>()?,
         None => Vec::new(),
     };
     if let Some(node) = section.get("density") {
@@ -80,12 +76,7 @@ pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Bod
 }
 
 /// A body whose mass, centroid and inertia follow from its shapes and the density in `node`.
-fn read_solid(
-    section: &Section<'_>,
-    node: &Node<'_>,
-    name: String,
-    shapes: Vec<Shape>,
-) -> Result<Body, SceneError> {
+fn read_solid(section: &Section<'_>, node: &Node<'_>, name: String, shapes: Vec<Shape>) -> Result<Body, SceneError> {
     for key in ["mass", "centre", "inertia", "products"] {
         section.refuse(key, "it follows from `density` and `shapes`")?;
     }
@@ -95,8 +86,7 @@ fn read_solid(
         };
         if let Some(ends) = mesh.open_edge() {
             let [from, to] = ends.map(|end| {
-                let [x, y, z] =
-                    end.map(|x| format_quantity_digits(f64::from(x) * unit * 1e3, "", 4));
+                let [x, y, z] = end.map(|x| format_quantity_digits(f64::from(x) * unit * 1e3, "", 4));
                 format!("({x}, {y}, {z})")
             });
             return Err(section.error(
@@ -121,14 +111,7 @@ fn read_solid(
             format_quantity(MAX_MASS, "kg"),
         )));
     }
-    Ok(Body {
-        name,
-        mass,
-        centre: solid.centre,
-        inertia,
-        shapes,
-        density: Some(density),
-    })
+    Ok(Body { name, mass, centre: solid.centre, inertia, shapes, density: Some(density) })
 }
 
 /// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not principal,
@@ -163,11 +146,7 @@ fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
 }
 
 /// One shape; a `fixed` one may follow the slider plane of `spcmm`.
-pub(super) fn read_shape(
-    node: &Node<'_>,
-    fixed: bool,
-    spcmm: Option<&Spcmm>,
-) -> Result<Shape, SceneError> {
+pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) -> Result<Shape, SceneError> {
     let section = node.section()?;
     let role = section.get("role").map(|node| node.word()).transpose()?;
     let colour = section.get("colour").as_ref().map(read_colour);
@@ -187,15 +166,9 @@ pub(super) fn read_shape(
             if size.min() <= 0.0 {
                 return Err(node.error("edge lengths must be above 0; units m, mm, um"));
             }
-            Geometry::Box {
-                centre: point("centre")?,
-                size,
-            }
+            Geometry::Box { centre: point("centre")?, size }
         }
-        Form::Sphere => Geometry::Sphere {
-            centre: point("centre")?,
-            radius: size("radius")?,
-        },
+        Form::Sphere => Geometry::Sphere { centre: point("centre")?, radius: size("radius")? },
         Form::Plate => {
             let node = section.require("corners")?;
             let corners = node
@@ -204,15 +177,9 @@ pub(super) fn read_shape(
                 .map(|corner| Ok(corner.vector()? + shift))
                 .collect::<Result<Vec<_>, SceneError>>()?;
             if corners.len() < 3 {
-                return Err(node.error(format!(
-                    "a plate needs at least 3 corners, has {}",
-                    corners.len()
-                )));
+                return Err(node.error(format!("a plate needs at least 3 corners, has {}", corners.len())));
             }
-            Geometry::Plate {
-                corners,
-                thickness: size("thickness")?,
-            }
+            Geometry::Plate { corners, thickness: size("thickness")? }
         }
         Form::Capsule | Form::Cylinder | Form::Cone => {
             let (from, to, radius) = (point("from")?, point("to")?, size("radius")?);
@@ -227,11 +194,7 @@ pub(super) fn read_shape(
         }
         Form::Mesh => read_mesh(&section, shift)?,
     };
-    let mut shape = Shape {
-        geometry,
-        role,
-        colour,
-    };
+    let mut shape = Shape { geometry, role, colour };
     // A body's shapes move with it.
     if let Some(copy) = node.document.copy.filter(|_| fixed) {
         shape.follow(copy, &form_node)?;
@@ -255,14 +218,10 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
         None => read_unit(&section.require("unit")?)?,
     };
     let bounds = mesh.bounds();
-    let largest = bounds
-        .as_flattened()
-        .iter()
-        .fold(0.0, |most, x| x.abs().max(most));
+    let largest = bounds.as_flattened().iter().fold(0.0, |most, x| x.abs().max(most));
     if f64::from(largest) * unit > LARGEST_SHAPE {
         let size = format_quantity(f64::from(largest) * unit, "m");
-        let message =
-            format!("with this unit, the mesh reaches {size} far; allowed up to {LARGEST_SHAPE} m");
+        let message = format!("with this unit, the mesh reaches {size} far; allowed up to {LARGEST_SHAPE} m");
         return Err(section.get("unit").unwrap_or(file).error(message));
     }
     Ok(Geometry::Mesh {
@@ -277,11 +236,7 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
 fn error_in(name: &str, text: Option<&str>, fault: Fault, document: &Document<'_>) -> SceneError {
     match (text, fault.at) {
         (Some(text), Some(at)) => {
-            let file = Document {
-                file: Some(name),
-                text,
-                ..*document
-            };
+            let file = Document { file: Some(name), text, ..*document };
             file.error(at..at, "", None, fault.why.to_string())
         }
         (_, at) => SceneError {
@@ -315,7 +270,8 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
     });
     match parts {
         [Some(red), Some(green), Some(blue)] => Ok([red, green, blue]),
-        _ => Err(node.error("no colour; allowed `#` and six hexadecimal digits, red, green and blue, for example \"#c2255c\"")),
+        _ => Err(node
+            .error("no colour; allowed `#` and six hexadecimal digits, red, green and blue, for example \"#c2255c\"")),
     }
 }
 
@@ -348,9 +304,7 @@ impl Shape {
                 }
             }
             Geometry::Box { centre, .. } if copy.keeps_axes() => *centre = copy.point(*centre),
-            Geometry::Mesh {
-                position, rotation, ..
-            } => {
+            Geometry::Mesh { position, rotation, .. } => {
                 *position = copy.point(*position);
                 *rotation = copy.rotation(*rotation);
             }

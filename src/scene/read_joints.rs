@@ -64,10 +64,7 @@ pub(super) fn read_joint<'d>(
         rotation: read_rotation(section.get("rotation"))?,
         drive: None,
         second_drive: None,
-        start: JointStart::Scalar {
-            position: 0.0,
-            velocity: 0.0,
-        },
+        start: JointStart::Scalar { position: 0.0, velocity: 0.0 },
         drawn: section.get("drawn").map_or(Ok(true), |node| node.flag())?,
     };
     let closes_loop = match section.get("closes_loop") {
@@ -93,12 +90,7 @@ pub(super) fn read_joint<'d>(
     if let Some(copy) = node.document.copy.filter(outside) {
         joint.follow_in_child(copy);
     }
-    Ok(JointText {
-        name,
-        section,
-        joint,
-        closes_loop,
-    })
+    Ok(JointText { name, section, joint, closes_loop })
 }
 
 /// What a joint that closes a loop may be.
@@ -111,15 +103,11 @@ fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError>
     }
     if joint.parent == Some(joint.child) {
         let node = section.require("child")?;
-        return Err(
-            node.error("parent and child are the same body: a joint that closes a loop needs two")
-        );
+        return Err(node.error("parent and child are the same body: a joint that closes a loop needs two"));
     }
-    let drive =
-        "a joint that closes a loop has no drive; drive a slide or a hinge that a body hangs on";
+    let drive = "a joint that closes a loop has no drive; drive a slide or a hinge that a body hangs on";
     section.refuse("drive", drive)?;
-    let start =
-        "a joint that closes a loop starts where the joints that its bodies hang on put them";
+    let start = "a joint that closes a loop starts where the joints that its bodies hang on put them";
     section.refuse("start", start)
 }
 
@@ -136,13 +124,7 @@ impl Joint {
         self.parent_point = copy.point(self.parent_point);
         self.axis = copy.direction(self.axis);
         self.rotation = copy.rotation(self.rotation);
-        if let JointStart::Pose {
-            position,
-            rotation,
-            velocity,
-            angular_velocity,
-        } = &mut self.start
-        {
+        if let JointStart::Pose { position, rotation, velocity, angular_velocity } = &mut self.start {
             *position = copy.point(*position);
             *rotation = copy.rotation(*rotation);
             *velocity = copy.direction(*velocity);
@@ -181,10 +163,7 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
         joint.drive = Some(drive);
         if let (Some(coordinate), Some(spcmm)) = (slider, scene.spcmm.as_ref()) {
             for key in ["axis", "parent_point", "parent", "rotation"] {
-                section.refuse(
-                    key,
-                    "the law spcmm places this joint: in the slider plane, along its own axis",
-                )?;
+                section.refuse(key, "the law spcmm places this joint: in the slider plane, along its own axis")?;
             }
             joint.axis = [Vec3::z(), -Vec3::z(), Vec3::y()][coordinate];
             joint.parent_point = Vec3::new(spcmm.slider_plane, 0.0, 0.0);
@@ -193,21 +172,14 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     } else if let Some(node) = section.get("start") {
         let mut start = node.section()?;
         start.document.on_hinge = joint.kind == JointKind::Revolute;
-        joint.start = JointStart::Scalar {
-            position: start.number("position")?,
-            velocity: start.number("velocity")?,
-        };
+        joint.start = JointStart::Scalar { position: start.number("position")?, velocity: start.number("velocity")? };
     }
     joint.axis = section.require("axis")?.direction()?;
     Ok(())
 }
 
 /// A joint that slides and turns, or turns about two axes.
-fn read_two_degrees(
-    section: &Section<'_>,
-    scene: &Scene,
-    joint: &mut Joint,
-) -> Result<(), SceneError> {
+fn read_two_degrees(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
     let universal = joint.kind == JointKind::Universal;
     joint.axis = section.require("axis")?.direction()?;
     if universal {
@@ -223,19 +195,10 @@ fn read_two_degrees(
         let square = (second - joint.axis * along).normalize();
         joint.child_axis = joint.rotation.inverse() * square;
     }
-    let rates = if universal {
-        ["angular_velocity", "child_angular_velocity"]
-    } else {
-        ["velocity", "angular_velocity"]
-    };
-    let drive = section
-        .get("drive")
-        .map(|node| node.section())
-        .transpose()?;
-    let start = section
-        .get("start")
-        .map(|node| node.section())
-        .transpose()?;
+    let rates =
+        if universal { ["angular_velocity", "child_angular_velocity"] } else { ["velocity", "angular_velocity"] };
+    let drive = section.get("drive").map(|node| node.section()).transpose()?;
+    let start = section.get("start").map(|node| node.section()).transpose()?;
     let (mut position, mut velocity) = ([0.0; 2], [0.0; 2]);
     let drives = [&mut joint.drive, &mut joint.second_drive];
     let coordinates = joint.kind.freedoms().iter().zip(rates).zip(drives);
@@ -249,9 +212,7 @@ fn read_two_degrees(
             *driven = Some(own);
             for key in [word, rate] {
                 let why = "the drive of this coordinate says where it starts";
-                start
-                    .as_ref()
-                    .map_or(Ok(()), |start| start.refuse(key, why))?;
+                start.as_ref().map_or(Ok(()), |start| start.refuse(key, why))?;
             }
         } else if let Some(start) = &start {
             position[part] = start.number(word)?;
@@ -261,10 +222,7 @@ fn read_two_degrees(
     if let (Some(drive), None) = (drive, joint.drives().next()) {
         let words = joint.kind.freedoms().iter().map(|freedom| freedom.word());
         let words: Vec<&str> = words.collect();
-        return Err(drive.error(
-            "",
-            format!("drives nothing: give `{}` or both", words.join("`, `")),
-        ));
+        return Err(drive.error("", format!("drives nothing: give `{}` or both", words.join("`, `"))));
     }
     joint.start = JointStart::Pair { position, velocity };
     Ok(())
@@ -281,12 +239,9 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
     };
     let section = node.section()?;
     let Some(form) = section.word else {
-        return Err(node.error(
-            "needs exactly one form: axis and angle, sequence and angles, x and y, or quaternion",
-        ));
+        return Err(node.error("needs exactly one form: axis and angle, sequence and angles, x and y, or quaternion"));
     };
-    let turn =
-        |axis: Vec3, angle: f64| Quat::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle);
+    let turn = |axis: Vec3, angle: f64| Quat::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle);
     match form {
         "axis" => {
             let axis = section.require("axis")?.direction()?;
@@ -297,26 +252,19 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
             let letters = node.text()?;
             let angles = section.require("angles")?.numbers::<3>()?;
             if letters.chars().count() != 3 {
-                return Err(
-                    node.error("must be three of the letters x, y and z, for example \"xzy\"")
-                );
+                return Err(node.error("must be three of the letters x, y and z, for example \"xzy\""));
             }
-            letters
-                .chars()
-                .zip(angles)
-                .try_fold(Quat::identity(), |so_far, (letter, angle)| {
-                    let axis = match letter {
-                        'x' => Vec3::x(),
-                        'y' => Vec3::y(),
-                        'z' => Vec3::z(),
-                        _ => {
-                            return Err(node.error(
-                                "must be three of the letters x, y and z, for example \"xzy\"",
-                            ));
-                        }
-                    };
-                    Ok(so_far * turn(axis, angle))
-                })
+            letters.chars().zip(angles).try_fold(Quat::identity(), |so_far, (letter, angle)| {
+                let axis = match letter {
+                    'x' => Vec3::x(),
+                    'y' => Vec3::y(),
+                    'z' => Vec3::z(),
+                    _ => {
+                        return Err(node.error("must be three of the letters x, y and z, for example \"xzy\""));
+                    }
+                };
+                Ok(so_far * turn(axis, angle))
+            })
         }
         "x" => {
             let x = section.require("x")?.direction()?;
@@ -327,9 +275,7 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
             }
             let z = z.normalize();
             let matrix = Mat3::from_columns(&[x, z.cross(&x), z]);
-            Ok(Quat::from_rotation_matrix(
-                &nalgebra::Rotation3::from_matrix_unchecked(matrix),
-            ))
+            Ok(Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix)))
         }
         _ => {
             let node = section.require("quaternion")?;
@@ -338,9 +284,7 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
             if size == 0.0 {
                 return Err(node.error("a quaternion must not be zero"));
             }
-            Ok(Quat::new_normalize(
-                nalgebra::Quaternion::new(w, x, y, z) / size,
-            ))
+            Ok(Quat::new_normalize(nalgebra::Quaternion::new(w, x, y, z) / size))
         }
     }
 }
@@ -359,10 +303,7 @@ pub(super) fn sort_forest(
         let child = text.joint.child;
         if let Some(first) = of_child[child].replace(text) {
             let node = text.section.require("child")?;
-            return Err(node.error(format!(
-                "this body is already the child of joint `{}`: {closing}",
-                first.name
-            )));
+            return Err(node.error(format!("this body is already the child of joint `{}`: {closing}", first.name)));
         }
     }
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); bodies.len()];
@@ -393,14 +334,9 @@ pub(super) fn sort_forest(
     for (new, &old) in order.iter().enumerate() {
         place[old] = new;
     }
-    if let Some(text) = joints
-        .iter()
-        .find(|text| place[text.joint.child] == usize::MAX)
-    {
+    if let Some(text) = joints.iter().find(|text| place[text.joint.child] == usize::MAX) {
         let node = text.section.require("parent")?;
-        return Err(node.error(format!(
-            "these joints form a cycle that does not reach the world: {closing}"
-        )));
+        return Err(node.error(format!("these joints form a cycle that does not reach the world: {closing}")));
     }
     let mut sorted_joints: Vec<Joint> = joints.into_iter().map(|text| text.joint).collect();
     for joint in &mut sorted_joints {
@@ -408,16 +344,10 @@ pub(super) fn sort_forest(
         joint.parent = joint.parent.map(|parent| place[parent]);
     }
     sorted_joints.sort_by_key(|joint| joint.child);
-    let mut sorted_bodies: Vec<(usize, Body)> = bodies
-        .into_iter()
-        .enumerate()
-        .map(|(old, body)| (place[old], body))
-        .collect();
+    let mut sorted_bodies: Vec<(usize, Body)> =
+        bodies.into_iter().enumerate().map(|(old, body)| (place[old], body)).collect();
     sorted_bodies.sort_by_key(|(new, _)| *new);
-    Ok((
-        sorted_bodies.into_iter().map(|(_, body)| body).collect(),
-        sorted_joints,
-    ))
+    Ok((sorted_bodies.into_iter().map(|(_, body)| body).collect(), sorted_joints))
 }
 
 /// A point on a body or the world, under `key`; `bodies` maps names to indices in the sorted scene.
@@ -463,9 +393,7 @@ pub(super) fn read_coordinate(
             Some(joint) => format!("a {} joint is neither a slide nor a hinge", joint.kind),
             None => "no such joint that slides or turns".to_owned(),
         };
-        let moving = scene
-            .kinematic_joints()
-            .filter(|joint| !joint.kind.freedoms().is_empty());
+        let moving = scene.kinematic_joints().filter(|joint| !joint.kind.freedoms().is_empty());
         let names = moving.map(|joint| joint.name.as_str());
         let near = nearest(wanted, names.clone());
         let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
@@ -488,13 +416,10 @@ pub(super) fn read_coordinate(
             Ok((index, *freedom))
         }
         None if freedoms.len() == 1 => Ok((index, *first)),
-        None => Err(section.error(
-            "coordinate",
-            format!(
-                "missing: {has}; write for example `coordinate = \"{}\"`",
-                words[0]
-            ),
-        )),
+        None => {
+            Err(section
+                .error("coordinate", format!("missing: {has}; write for example `coordinate = \"{}\"`", words[0])))
+        }
     }
 }
 
@@ -509,36 +434,16 @@ pub(super) fn read_ball_joint<'d>(
     let attachment = |key: &str| read_attachment(&section, key, scene, bodies);
     let (socket, ball) = (attachment("socket")?, attachment("ball")?);
     if socket.body == ball.body {
-        return Err(section.error(
-            "ball",
-            "socket and ball are on the same body: a ball joint needs two",
-        ));
+        return Err(section.error("ball", "socket and ball are on the same body: a ball joint needs two"));
     }
-    let mut opening = section
-        .get("opening")
-        .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
-    let own = |copy: &Copy| {
-        socket
-            .body
-            .is_some_and(|body| copy.made(&scene.bodies[body].name))
-    };
+    let mut opening = section.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let own = |copy: &Copy| socket.body.is_some_and(|body| copy.made(&scene.bodies[body].name));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
         opening = copy.direction(opening);
     }
-    let mut joint = BallJoint {
-        name,
-        socket,
-        ball,
-        opening,
-        contact: scene.contact,
-        overrides: Vec::new(),
-    };
+    let mut joint = BallJoint { name, socket, ball, opening, contact: scene.contact, overrides: Vec::new() };
     let places = read_own_contact(&section, &mut joint)?;
-    Ok(BallJointText {
-        joint,
-        section,
-        places,
-    })
+    Ok(BallJointText { joint, section, places })
 }
 
 /// Applies the contact overrides of `section` to `joint`; returns where each is given, by parameter.

@@ -10,9 +10,7 @@ use super::copy::Copy;
 use super::expression::{ExpressionError, Number as _, Program};
 use super::given::FileNumber;
 use super::quantity::{DimensionError, Quantity};
-use super::units::{
-    Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start,
-};
+use super::units::{Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start};
 
 /// Why a text is neither a quantity nor an expression that gives one.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -51,12 +49,7 @@ impl<'d> Reading<'d> {
     /// With these changes, of keys that are not parameters of the table.
     pub fn new(changes: impl Iterator<Item = &'d (String, String)>) -> Self {
         let value = |text: &'d str| Spanned::new(0..0, DeValue::String(text.trim().into()));
-        Self {
-            changes: changes
-                .map(|(key, text)| (key.as_str(), value(text)))
-                .collect(),
-            ..Self::default()
-        }
+        Self { changes: changes.map(|(key, text)| (key.as_str(), value(text))).collect(), ..Self::default() }
     }
 
     /// What `key` was changed to.
@@ -71,12 +64,7 @@ impl<'d> Reading<'d> {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn evaluate(
-        &self,
-        text: &str,
-        dimension: Dimension,
-        copy: Option<&Copy>,
-    ) -> Result<f64, ReadingError> {
+    pub fn evaluate(&self, text: &str, dimension: Dimension, copy: Option<&Copy>) -> Result<f64, ReadingError> {
         let error = match parse_quantity(text, dimension) {
             Ok(value) => return Ok(value),
             Err(error) => error,
@@ -130,9 +118,7 @@ impl<'d> Reading<'d> {
         let variable = |name: &str| names.iter().position(|of| *of == name);
         let numbers: Vec<f64> = values[1..].iter().map(Quantity::value).collect();
         let bare = Program::parse(text, variable, &names);
-        let has_unit = |program: &Program| {
-            (1..first_unit).any(|own| program.uses(own) && !values[own].is_pure())
-        };
+        let has_unit = |program: &Program| (1..first_unit).any(|own| program.uses(own) && !values[own].is_pure());
         if let Ok(program) = &bare
             && !has_unit(program)
         {
@@ -179,10 +165,7 @@ impl<'d> Reading<'d> {
 }
 
 /// Names and values that expressions may use: the scene's own parameters, and the number of a pattern's copy.
-fn named<'a>(
-    own: &'a BTreeMap<String, Quantity>,
-    copy: Option<&Copy>,
-) -> (Vec<&'a str>, Vec<Quantity>) {
+fn named<'a>(own: &'a BTreeMap<String, Quantity>, copy: Option<&Copy>) -> (Vec<&'a str>, Vec<Quantity>) {
     let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
     let mut values: Vec<Quantity> = own.values().copied().collect();
     if let Some(copy) = copy {
@@ -206,9 +189,6 @@ fn plain(text: &str) -> Cow<'_, str> {
     if text.is_ascii() {
         return Cow::Borrowed(text);
     }
-    let spelt = text
-        .replace(['µ', 'μ'], "u")
-        .replace('²', "^2")
-        .replace('³', "^3");
+    let spelt = text.replace(['µ', 'μ'], "u").replace('²', "^2").replace('³', "^3");
     Cow::Owned(spelt.replace(['·', '⋅'], " ").replace('°', " deg"))
 }

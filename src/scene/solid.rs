@@ -50,17 +50,8 @@ impl Solid {
                 Self::together(ends.into_iter().chain(bar))
             }
             Geometry::Plate { corners, thickness } => Self::plate(corners, *thickness),
-            Geometry::Mesh {
-                mesh,
-                unit,
-                position,
-                rotation,
-            } => {
-                let Self {
-                    volume,
-                    centre,
-                    second,
-                } = Self::inside(mesh);
+            Geometry::Mesh { mesh, unit, position, rotation } => {
+                let Self { volume, centre, second } = Self::inside(mesh);
                 let turn = rotation.to_rotation_matrix().into_inner();
                 let area = unit * unit;
                 Self::new(
@@ -81,11 +72,7 @@ impl Solid {
             second += part.second + part.centre * part.centre.transpose() * part.volume;
         }
         let centre = if volume > 0.0 { first / volume } else { first };
-        Self::new(
-            volume,
-            centre,
-            second - centre * centre.transpose() * volume,
-        )
+        Self::new(volume, centre, second - centre * centre.transpose() * volume)
     }
 
     /// All shapes of a body.
@@ -99,11 +86,7 @@ impl Solid {
     }
 
     fn new(volume: f64, centre: Vec3, second: Mat3) -> Self {
-        Self {
-            volume,
-            centre,
-            second,
-        }
+        Self { volume, centre, second }
     }
 
     fn cylinder(from: &Vec3, to: &Vec3, radius: f64) -> Self {
@@ -140,14 +123,10 @@ impl Solid {
             let volume = area * thickness;
             let centre = (a + b) / 3.0;
             let sum = a + b;
-            let flat = (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) / 12.0
-                - centre * centre.transpose();
+            let flat =
+                (a * a.transpose() + b * b.transpose() + sum * sum.transpose()) / 12.0 - centre * centre.transpose();
             let across = normal * normal.transpose() / normal.norm_squared();
-            let square = if area > 0.0 {
-                flat + across * (thickness * thickness / 12.0)
-            } else {
-                Mat3::zeros()
-            };
+            let square = if area > 0.0 { flat + across * (thickness * thickness / 12.0) } else { Mat3::zeros() };
             Self::new(volume, origin + centre, square * volume)
         });
         Self::together(triangles)
@@ -157,11 +136,7 @@ impl Solid {
 /// Unit vector from one point to the other, x if they coincide, and their distance, m.
 fn direction(from: &Vec3, to: &Vec3) -> (Vec3, f64) {
     let length = (to - from).norm();
-    if length > 0.0 {
-        ((to - from) / length, length)
-    } else {
-        (Vec3::x(), 0.0)
-    }
+    if length > 0.0 { ((to - from) / length, length) } else { (Vec3::x(), 0.0) }
 }
 
 /// Mean of r r' of a solid of revolution, from its mean squares across and along the axis, m^2.
@@ -186,8 +161,7 @@ mod tests {
         match geometry {
             Geometry::Sphere { centre, radius } => (point - centre).norm() <= *radius,
             Geometry::Box { centre, size } => {
-                (point - centre).abs().zip_map(size, |x, s| x <= 0.5 * s)
-                    == nalgebra::Vector3::repeat(true)
+                (point - centre).abs().zip_map(size, |x, s| x <= 0.5 * s) == nalgebra::Vector3::repeat(true)
             }
             Geometry::Cylinder { from, to, radius } => {
                 let (along, across) = on_axis(from, to);
@@ -203,15 +177,12 @@ mod tests {
                 (point - near).norm() <= *radius
             }
             Geometry::Plate { corners, thickness } => {
-                let normal = (corners[1] - corners[0])
-                    .cross(&(corners[2] - corners[0]))
-                    .normalize();
+                let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
                 let inside = |i: usize| {
                     let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
                     normal.dot(&(b - a).cross(&(point - a))) >= 0.0
                 };
-                (point - corners[0]).dot(&normal).abs() <= 0.5 * thickness
-                    && (0..corners.len()).all(inside)
+                (point - corners[0]).dot(&normal).abs() <= 0.5 * thickness && (0..corners.len()).all(inside)
             }
             Geometry::Mesh { .. } => unreachable!("tested against forms"),
         }
@@ -221,29 +192,11 @@ mod tests {
     fn moments_are_those_of_the_points_inside() {
         let (a, b) = (Vec3::new(-0.3, 0.1, -0.2), Vec3::new(0.4, 0.3, 0.25));
         let forms = [
-            Geometry::Sphere {
-                centre: a,
-                radius: 0.4,
-            },
-            Geometry::Box {
-                centre: b,
-                size: Vec3::new(0.3, 0.7, 0.5),
-            },
-            Geometry::Cylinder {
-                from: a,
-                to: b,
-                radius: 0.3,
-            },
-            Geometry::Cone {
-                from: a,
-                to: b,
-                radius: 0.5,
-            },
-            Geometry::Capsule {
-                from: a,
-                to: b,
-                radius: 0.25,
-            },
+            Geometry::Sphere { centre: a, radius: 0.4 },
+            Geometry::Box { centre: b, size: Vec3::new(0.3, 0.7, 0.5) },
+            Geometry::Cylinder { from: a, to: b, radius: 0.3 },
+            Geometry::Cone { from: a, to: b, radius: 0.5 },
+            Geometry::Capsule { from: a, to: b, radius: 0.25 },
             Geometry::Plate {
                 corners: vec![
                     Vec3::new(-0.6, -0.3, 0.1),
@@ -276,16 +229,8 @@ mod tests {
             second -= centre * centre.transpose() * volume;
             let inertia = Mat3::identity() * second.trace() - second;
             let solid = Solid::of(form);
-            assert!(
-                (solid.volume / volume - 1.0).abs() < 0.01,
-                "{form:?}: {} {volume}",
-                solid.volume
-            );
-            assert!(
-                (solid.centre - centre).norm() < 0.003,
-                "{form:?}: {} {centre}",
-                solid.centre
-            );
+            assert!((solid.volume / volume - 1.0).abs() < 0.01, "{form:?}: {} {volume}", solid.volume);
+            assert!((solid.centre - centre).norm() < 0.003, "{form:?}: {} {centre}", solid.centre);
             let off = (solid.inertia() - inertia).amax() / inertia.amax();
             assert!(off < 0.02, "{form:?}: {} {inertia}", solid.inertia());
         }
@@ -294,28 +239,15 @@ mod tests {
     #[test]
     fn a_capsule_without_length_is_a_ball_and_parts_add_up() {
         let centre = Vec3::new(0.1, 0.2, 0.3);
-        let ball = Solid::of(&Geometry::Sphere {
-            centre,
-            radius: 0.2,
-        });
-        let capsule = Solid::of(&Geometry::Capsule {
-            from: centre,
-            to: centre,
-            radius: 0.2,
-        });
+        let ball = Solid::of(&Geometry::Sphere { centre, radius: 0.2 });
+        let capsule = Solid::of(&Geometry::Capsule { from: centre, to: centre, radius: 0.2 });
         assert!((ball.volume - capsule.volume).abs() < 1e-15);
         assert!((ball.inertia() - capsule.inertia()).amax() < 1e-15);
         let half = |x: f64| {
             let size = Vec3::new(0.1, 0.3, 0.4);
-            Solid::of(&Geometry::Box {
-                centre: Vec3::new(x, 0.0, 0.0),
-                size,
-            })
+            Solid::of(&Geometry::Box { centre: Vec3::new(x, 0.0, 0.0), size })
         };
-        let whole = Solid::of(&Geometry::Box {
-            centre: Vec3::zeros(),
-            size: Vec3::new(0.2, 0.3, 0.4),
-        });
+        let whole = Solid::of(&Geometry::Box { centre: Vec3::zeros(), size: Vec3::new(0.2, 0.3, 0.4) });
         let both = Solid::together([half(-0.05), half(0.05)]);
         assert!((whole.inertia() - both.inertia()).amax() < 1e-16 && both.centre.norm() < 1e-16);
     }
@@ -335,12 +267,7 @@ mod tests {
 
     /// Deviations of volume and inertia from those of the form, relative, and of the centroid from `position`, m.
     fn off(mesh: &Geometry, form: &Geometry) -> [f64; 3] {
-        let Geometry::Mesh {
-            position, rotation, ..
-        } = mesh
-        else {
-            panic!("a mesh")
-        };
+        let Geometry::Mesh { position, rotation, .. } = mesh else { panic!("a mesh") };
         let (found, wanted) = (Solid::of(mesh), Solid::of(form));
         let turn = rotation.to_rotation_matrix().into_inner();
         let inertia = turn * wanted.inertia() * turn.transpose();
@@ -368,10 +295,7 @@ mod tests {
     #[test]
     fn a_mesh_of_a_ball_weighs_what_the_ball_does() {
         let centre = Vec3::zeros();
-        let ball = Geometry::Sphere {
-            centre,
-            radius: 0.05,
-        };
+        let ball = Geometry::Sphere { centre, radius: 0.05 };
         let errors = [40_usize, 80].map(|n| {
             let mut text = format!("v 0 0 {}\nv 0 0 {}\n", 50.0, -50.0);
             for i in 1..n {
@@ -394,10 +318,7 @@ mod tests {
             off(&of_file(&text), &ball)
         });
         // The polyhedron lies within the ball, by a part that falls with the square of its edges.
-        assert!(
-            errors[1][0] < 2e-3 && errors[1][1] < 1e-8 && errors[1][2] < 3e-3,
-            "{errors:?}"
-        );
+        assert!(errors[1][0] < 2e-3 && errors[1][1] < 1e-8 && errors[1][2] < 3e-3, "{errors:?}");
         for i in [0, 2] {
             let order = errors[0][i] / errors[1][i];
             assert!((order - 4.0).abs() < 0.05, "{order}");

@@ -1,9 +1,7 @@
 //! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, Held, SWITCH, field, optional_field};
-use super::{
-    Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value,
-};
+use super::{Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value};
 use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use crate::words::Words;
@@ -28,18 +26,7 @@ const fn row(
     help: &'static str,
     equation: &'static str,
 ) -> Parameter {
-    Parameter {
-        key,
-        access,
-        label,
-        group,
-        kind,
-        default,
-        scope,
-        at_reset: false,
-        help,
-        equation,
-    }
+    Parameter { key, access, label, group, kind, default, scope, at_reset: false, help, equation }
 }
 
 const fn contact(
@@ -51,17 +38,7 @@ const fn contact(
     help: &'static str,
     equation: &'static str,
 ) -> Parameter {
-    row(
-        key,
-        Access::Contact(field),
-        label,
-        "Contact",
-        kind,
-        default,
-        Scope::Contact,
-        help,
-        equation,
-    )
+    row(key, Access::Contact(field), label, "Contact", kind, default, Scope::Contact, help, equation)
 }
 
 const fn drive(
@@ -73,17 +50,7 @@ const fn drive(
     help: &'static str,
     equation: &'static str,
 ) -> Parameter {
-    at_reset(row(
-        key,
-        Access::Scene(field),
-        label,
-        "Drive",
-        kind,
-        default,
-        Scope::Spcmm,
-        help,
-        equation,
-    ))
+    at_reset(row(key, Access::Scene(field), label, "Drive", kind, default, Scope::Spcmm, help, equation))
 }
 
 const fn at_reset(mut parameter: Parameter) -> Parameter {
@@ -91,38 +58,12 @@ const fn at_reset(mut parameter: Parameter) -> Parameter {
     parameter
 }
 
-const fn number(
-    dimension: D,
-    min: f64,
-    max: f64,
-    display: &'static str,
-    slider: (f64, f64),
-) -> Kind {
-    Kind::Number {
-        dimension,
-        min,
-        max,
-        display,
-        slider,
-        logarithmic: false,
-    }
+const fn number(dimension: D, min: f64, max: f64, display: &'static str, slider: (f64, f64)) -> Kind {
+    Kind::Number { dimension, min, max, display, slider, logarithmic: false }
 }
 
-const fn logarithmic(
-    dimension: D,
-    min: f64,
-    max: f64,
-    display: &'static str,
-    slider: (f64, f64),
-) -> Kind {
-    Kind::Number {
-        dimension,
-        min,
-        max,
-        display,
-        slider,
-        logarithmic: true,
-    }
+const fn logarithmic(dimension: D, min: f64, max: f64, display: &'static str, slider: (f64, f64)) -> Kind {
+    Kind::Number { dimension, min, max, display, slider, logarithmic: true }
 }
 
 const fn gravity(
@@ -482,11 +423,7 @@ pub fn reference_page() -> String {
          | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for parameter in table() {
-        let effect = if parameter.at_reset {
-            "at reset"
-        } else {
-            "at once"
-        };
+        let effect = if parameter.at_reset { "at reset" } else { "at once" };
         let cells = [
             format!("`{}`", parameter.key),
             parameter.label.to_owned(),

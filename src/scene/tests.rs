@@ -10,20 +10,13 @@ fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
     let sliders = [0.136_493_548_0, 0.240_922_773_5, 0.186_472_405_6];
     let mut poses: Vec<(Vec3, Quat)> = Vec::new();
     for joint in &scene.joints {
-        let (origin, frame) = joint
-            .parent
-            .map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
+        let (origin, frame) = joint.parent.map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
         let slider = joint.drive.as_ref().and_then(Drive::slider);
         let q = match (slider, joint.start) {
             (Some(coordinate), _) => sliders[coordinate],
             (_, JointStart::Scalar { position, .. }) => position,
             (_, JointStart::Pair { .. }) => panic!("no built-in scene has one"),
-            (
-                _,
-                JointStart::Pose {
-                    position, rotation, ..
-                },
-            ) => {
+            (_, JointStart::Pose { position, rotation, .. }) => {
                 poses.push((position, rotation));
                 continue;
             }
@@ -35,10 +28,7 @@ fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
             }
             _ => (frame * joint.rotation, joint.axis * q),
         };
-        poses.push((
-            origin + frame * (joint.parent_point + slide) - rotation * joint.child_point,
-            rotation,
-        ));
+        poses.push((origin + frame * (joint.parent_point + slide) - rotation * joint.child_point, rotation));
     }
     poses
 }
@@ -54,19 +44,11 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
             continue;
         }
         let poses = start_poses(&scene);
-        let point = |end: Attachment| {
-            end.body
-                .map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point)
-        };
+        let point = |end: Attachment| end.body.map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point);
         for joint in &scene.ball_joints {
             let e = point(joint.ball) - point(joint.socket);
             // The slider coordinates are given to ten digits.
-            assert!(
-                e.norm() < 1e-9,
-                "{name}: {} starts {:e} m off its socket's centre",
-                joint.name,
-                e.norm()
-            );
+            assert!(e.norm() < 1e-9, "{name}: {} starts {:e} m off its socket's centre", joint.name, e.norm());
         }
     }
 }
@@ -83,10 +65,7 @@ fn joints_follow_their_bodies_and_parents_come_first() {
 }
 
 fn changed(name: &str, changes: &[(&str, &str)]) -> Scene {
-    let changes: Vec<_> = changes
-        .iter()
-        .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
-        .collect();
+    let changes: Vec<_> = changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
     Scene::load(name, &changes).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -95,36 +74,16 @@ fn every_row_of_the_table_reads_writes_and_shows_its_default() {
     for parameter in table() {
         if parameter.default != Value::Unset {
             let text = parameter.write(&parameter.default);
-            assert_eq!(
-                parameter.read(&text),
-                Ok(parameter.default.clone()),
-                "{}",
-                parameter.key
-            );
+            assert_eq!(parameter.read(&text), Ok(parameter.default.clone()), "{}", parameter.key);
         }
         assert!(parameter.help.ends_with('.'), "{}", parameter.key);
-        if let Kind::Number {
-            min,
-            max,
-            slider: (low, high),
-            dimension,
-            display,
-            logarithmic,
-            ..
-        } = parameter.kind
-        {
+        if let Kind::Number { min, max, slider: (low, high), dimension, display, logarithmic, .. } = parameter.kind {
             assert!(min <= low && low < high && high <= max, "{}", parameter.key);
             assert!(!logarithmic || low > 0.0, "{}", parameter.key);
             let units = unit_names(dimension);
             assert!(units.contains(&display) || units.is_empty() && display.is_empty());
         }
-        assert_eq!(
-            table()
-                .iter()
-                .filter(|other| other.key == parameter.key)
-                .count(),
-            1
-        );
+        assert_eq!(table().iter().filter(|other| other.key == parameter.key).count(), 1);
         assert!(reference_page().contains(&format!("| `{}` |", parameter.key)));
     }
 }
@@ -140,12 +99,7 @@ fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
                 continue;
             }
             scene.set_value(parameter.key, &value).unwrap();
-            assert_eq!(
-                scene.get(parameter.key).unwrap(),
-                value,
-                "{name}: {}",
-                parameter.key
-            );
+            assert_eq!(scene.get(parameter.key).unwrap(), value, "{name}: {}", parameter.key);
             assert_eq!(scene.changes.len(), 1);
             assert_eq!(scene.bodies, original.bodies);
             assert_eq!(scene.solver.method, original.solver.method);
@@ -155,24 +109,13 @@ fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
 
 #[test]
 fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
-    let orders = [
-        ["joint.S1.clearance", "contact.clearance"],
-        ["contact.clearance", "joint.S1.clearance"],
-    ];
+    let orders = [["joint.S1.clearance", "contact.clearance"], ["contact.clearance", "joint.S1.clearance"]];
     for [first, second] in orders {
         let value = |key: &str| {
-            if key.starts_with("joint") {
-                "0.7 mm"
-            } else {
-                "0.1 mm"
-            }
+            if key.starts_with("joint") { "0.7 mm" } else { "0.1 mm" }
         };
         let scene = changed("spcmm", &[(first, value(first)), (second, value(second))]);
-        let clearances: Vec<f64> = scene
-            .ball_joints
-            .iter()
-            .map(|joint| joint.contact.clearance)
-            .collect();
+        let clearances: Vec<f64> = scene.ball_joints.iter().map(|joint| joint.contact.clearance).collect();
         assert_eq!(clearances, [0.7e-3, 0.1e-3, 0.1e-3]);
         assert_eq!(scene.get("contact.clearance"), Ok(Value::Number(0.1e-3)));
         assert_eq!(scene.get("joint.S2.clearance"), Ok(Value::Number(0.1e-3)));
@@ -186,23 +129,11 @@ fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
 
 #[test]
 fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
-    let scene = changed(
-        "spcmm",
-        &[("contact.friction", "0.2"), ("contact.friction", "0.3")],
-    );
+    let scene = changed("spcmm", &[("contact.friction", "0.2"), ("contact.friction", "0.3")]);
     assert_eq!(scene.contact.friction, 0.3);
-    assert_eq!(
-        scene.changes,
-        [("contact.friction".to_owned(), "0.3".to_owned())]
-    );
+    assert_eq!(scene.changes, [("contact.friction".to_owned(), "0.3".to_owned())]);
     // A gap wider than the file's ball is fine with the larger ball that comes with it.
-    let scene = changed(
-        "spcmm",
-        &[
-            ("contact.clearance", "12 mm"),
-            ("contact.ball_radius", "20 mm"),
-        ],
-    );
+    let scene = changed("spcmm", &[("contact.clearance", "12 mm"), ("contact.ball_radius", "20 mm")]);
     assert_eq!(scene.ball_joints[2].contact.clearance, 0.012);
 }
 
@@ -218,10 +149,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
     }
     let text = |solver: &str| format!("{}\n{solver}", built_in_text("pendulum").unwrap());
     let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
-    assert_eq!(
-        Scene::parse(&file, None, &[]).unwrap().solver.tolerance,
-        1e-5
-    );
+    assert_eq!(Scene::parse(&file, None, &[]).unwrap().solver.tolerance, 1e-5);
     // Nor does a preset requested later replace what the file gives by name.
     let ask = [("solver.preset".to_owned(), "reference".to_owned())];
     let solver = Scene::parse(&file, None, &ask).unwrap().solver;
@@ -233,10 +161,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
 fn a_key_of_the_file_alone_says_so() {
     for key in ["spcmm.gamma", "output.body", "name", "title"] {
         let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
-        assert!(
-            error.message.starts_with("only in the scene file"),
-            "{error}"
-        );
+        assert!(error.message.starts_with("only in the scene file"), "{error}");
     }
 }
 
@@ -255,25 +180,15 @@ fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
 
 #[test]
 fn presets_say_in_their_help_what_they_are() {
-    let help = table()
-        .iter()
-        .find(|p| p.key == "solver.preset")
-        .unwrap()
-        .help;
+    let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
     for preset in Preset::ALL {
-        assert!(
-            help.contains(&format!("{:e}", preset.point().2)),
-            "{preset:?}"
-        );
+        assert!(help.contains(&format!("{:e}", preset.point().2)), "{preset:?}");
     }
 }
 
 #[test]
 fn a_change_can_be_taken_back() {
-    let mut scene = changed(
-        "spcmm",
-        &[("joint.S1.friction", "0"), ("contact.friction", "0.4")],
-    );
+    let mut scene = changed("spcmm", &[("joint.S1.friction", "0"), ("contact.friction", "0.4")]);
     scene.undo_change("joint.S1.friction").unwrap();
     assert_eq!(scene.get("joint.S1.friction"), Ok(Value::Number(0.4)));
     scene.undo_change("contact.friction").unwrap();
@@ -283,30 +198,17 @@ fn a_change_can_be_taken_back() {
 
 #[test]
 fn a_chain_is_rebuilt_with_its_links() {
-    let mut scene = changed(
-        "chain",
-        &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")],
-    );
+    let mut scene = changed("chain", &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")]);
     assert_eq!((scene.bodies.len(), scene.ball_joints.len()), (8, 8));
     scene.set("chain.links", "3").unwrap();
-    assert_eq!(
-        (
-            scene.bodies.len(),
-            scene.joints.len(),
-            scene.ball_joints.len()
-        ),
-        (3, 3, 3)
-    );
+    assert_eq!((scene.bodies.len(), scene.joints.len(), scene.ball_joints.len()), (3, 3, 3));
     assert_eq!(scene.ball_joints[1].contact.friction, 0.4);
     assert_eq!(scene.output.body, 2);
     assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
     // A change of a joint that no longer exists is dropped with it.
     assert!(scene.get("joint.J7.friction").is_err());
     assert_eq!(scene.changes.len(), 2);
-    assert_eq!(
-        changed("chain", &[("chain.links", "256")]).bodies.len(),
-        256
-    );
+    assert_eq!(changed("chain", &[("chain.links", "256")]).bodies.len(), 256);
 }
 
 #[test]
@@ -314,9 +216,7 @@ fn the_slider_plane_moves_sliders_and_rails() {
     let mut scene = changed("spcmm", &[]);
     scene.set("spcmm.slider_plane", "40mm").unwrap();
     assert_eq!(scene.joints[0].parent_point, Vec3::new(0.040, 0.0, 0.0));
-    let Geometry::Box { centre, .. } = scene.fixed_shapes[0].geometry else {
-        panic!("a rail is a box")
-    };
+    let Geometry::Box { centre, .. } = scene.fixed_shapes[0].geometry else { panic!("a rail is a box") };
     assert!((centre.x - 0.018).abs() < 1e-15);
     assert_eq!(scene.spcmm.map(|spcmm| spcmm.slider_plane), Some(0.040));
 }
@@ -325,57 +225,26 @@ fn the_slider_plane_moves_sliders_and_rails() {
 fn doubtful_choices_are_warned_of() {
     assert!(changed("spcmm", &[]).warnings().is_empty());
     let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).warnings();
-    assert!(
-        warnings.len() == 1
-            && warnings[0]
-                .to_string()
-                .contains("S1, S2, S3: restitution 0.3"),
-        "{warnings:?}"
-    );
-    let fine = [
-        ("contact.restitution", "0.3"),
-        ("contact.normal_law", "gonthier"),
-    ];
+    assert!(warnings.len() == 1 && warnings[0].to_string().contains("S1, S2, S3: restitution 0.3"), "{warnings:?}");
+    let fine = [("contact.restitution", "0.3"), ("contact.normal_law", "gonthier")];
     assert!(changed("spcmm", &fine).warnings().is_empty());
     let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).warnings();
-    assert!(
-        warnings.len() == 1 && warnings[0].to_string().starts_with("S2: clearance 0.01 mm"),
-        "{warnings:?}"
-    );
-    assert!(
-        changed("spcmm", &[("contact.clearance", "0")])
-            .warnings()
-            .is_empty()
-    );
+    assert!(warnings.len() == 1 && warnings[0].to_string().starts_with("S2: clearance 0.01 mm"), "{warnings:?}");
+    assert!(changed("spcmm", &[("contact.clearance", "0")]).warnings().is_empty());
     let coarse = [("solver.method", "rk4"), ("solver.step", "50 us")];
-    assert!(
-        changed("spcmm", &coarse).warnings()[0]
-            .to_string()
-            .contains("50 us")
-    );
+    assert!(changed("spcmm", &coarse).warnings()[0].to_string().contains("50 us"));
 }
 
 #[test]
 fn the_built_in_scenes_carry_the_published_numbers() {
     let scene = changed("spcmm", &[]);
     let find = |name: &str| scene.bodies.iter().find(|body| body.name == name).unwrap();
-    assert_eq!(
-        find("platform").inertia.diagonal(),
-        Vec3::new(4.44e-4, 3.31e-4, 1.35e-4)
-    );
+    assert_eq!(find("platform").inertia.diagonal(), Vec3::new(4.44e-4, 3.31e-4, 1.35e-4));
     // 1.92e-3 about the hinge axis: y for rods 1 and 2, z for rod 3.
-    for (rod, hinge) in [
-        ("rod1", Vec3::y()),
-        ("rod2", Vec3::y()),
-        ("rod3", Vec3::z()),
-    ] {
+    for (rod, hinge) in [("rod1", Vec3::y()), ("rod2", Vec3::y()), ("rod3", Vec3::z())] {
         let body = find(rod);
         assert_eq!(hinge.dot(&(body.inertia * hinge)), 1.92e-3);
-        let child = scene
-            .bodies
-            .iter()
-            .position(|other| other.name == rod)
-            .unwrap();
+        let child = scene.bodies.iter().position(|other| other.name == rod).unwrap();
         assert_eq!(scene.joints[child].axis, hinge);
     }
     let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
@@ -383,27 +252,14 @@ fn the_built_in_scenes_carry_the_published_numbers() {
     assert_eq!(scene.gravity, Vec3::new(9.81, 0.0, 0.0));
     assert_eq!(scene.start, StartRule::Ideal);
     assert_eq!(scene.bodies[scene.output.body].name, "platform");
-    assert_eq!(
-        scene.contact.friction_velocity,
-        crate::contact::FrictionVelocity::Centres
-    );
+    assert_eq!(scene.contact.friction_velocity, crate::contact::FrictionVelocity::Centres);
 }
 
 #[test]
 fn the_slider_crank_starts_with_velocities_that_fit_together() {
     let scene = changed("slider-crank", &[]);
-    let rod = scene
-        .bodies
-        .iter()
-        .position(|body| body.name == "rod")
-        .unwrap();
-    let JointStart::Pose {
-        rotation,
-        velocity,
-        angular_velocity,
-        ..
-    } = scene.joints[rod].start
-    else {
+    let rod = scene.bodies.iter().position(|body| body.name == "rod").unwrap();
+    let JointStart::Pose { rotation, velocity, angular_velocity, .. } = scene.joints[rod].start else {
         panic!("the rod is free")
     };
     let end = |x: f64| velocity + angular_velocity.cross(&(rotation * Vec3::new(x, 0.0, 0.0)));
@@ -413,14 +269,9 @@ fn the_slider_crank_starts_with_velocities_that_fit_together() {
     assert!(angular_velocity.dot(&(rotation * Vec3::x())).abs() < 1e-15);
     let driven = changed("slider-crank-driven", &[]);
     let crank = driven.joints.iter().find(|joint| joint.name == "crank");
-    let law = crank
-        .and_then(|joint| joint.drive.as_ref())
-        .expect("driven");
+    let law = crank.and_then(|joint| joint.drive.as_ref()).expect("driven");
     assert_eq!(law.kind.word, "constant");
-    assert_eq!(
-        ["position", "velocity"].map(|key| law.number(key)),
-        [0.0, 6.0]
-    );
+    assert_eq!(["position", "velocity"].map(|key| law.number(key)), [0.0, 6.0]);
     // Otherwise they are the same mechanism.
     assert_eq!(driven.bodies, scene.bodies);
     assert_eq!(driven.ball_joints, scene.ball_joints);
@@ -435,15 +286,7 @@ fn all_forms_of_a_rotation_agree() {
              angular_velocity = \"0 0 2 rad/s\" }}"
         );
         let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
-        let JointStart::Pose {
-            position,
-            rotation,
-            velocity,
-            ..
-        } = scene.joints[0].start
-        else {
-            panic!()
-        };
+        let JointStart::Pose { position, rotation, velocity, .. } = scene.joints[0].start else { panic!() };
         // The joint point, 1 m out on the body's x axis, is at the origin and at rest.
         assert!((position + rotation * Vec3::x()).norm() < 1e-15);
         assert!((velocity - Vec3::new(0.0, 0.0, 2.0).cross(&position)).norm() < 1e-15);
@@ -461,10 +304,7 @@ fn all_forms_of_a_rotation_agree() {
     // R = Rx Rz Ry, paper eq. (2): R12 = -sin beta.
     let r = rotation("{ sequence = \"xzy\", angles = \"10 20 30 deg\" }");
     assert!((r[(0, 1)] + libm::sin(20.0_f64.to_radians())).abs() < 1e-15);
-    assert!(
-        (r[(1, 1)] - libm::cos(10.0_f64.to_radians()) * libm::cos(20.0_f64.to_radians())).abs()
-            < 1e-15
-    );
+    assert!((r[(1, 1)] - libm::cos(10.0_f64.to_radians()) * libm::cos(20.0_f64.to_radians())).abs() < 1e-15);
 }
 
 /// A rod on a slide, with a parameter of its own.
@@ -500,10 +340,7 @@ fn every_number_of_a_file_is_a_key() {
     let scene = Scene::parse(OWN, None, &[]).expect("reads");
     let joint = |scene: &Scene| (scene.joints[0].parent_point, scene.joints[0].start);
     let start = |position, velocity| JointStart::Scalar { position, velocity };
-    assert_eq!(
-        joint(&scene),
-        (Vec3::new(0.01, 0.0, -0.03), start(0.01, 0.04))
-    );
+    assert_eq!(joint(&scene), (Vec3::new(0.01, 0.0, -0.03), start(0.01, 0.04)));
     let mut changed = scene.clone();
     for (key, value) in [
         ("parameter.stroke", "40 mm"),
@@ -512,24 +349,14 @@ fn every_number_of_a_file_is_a_key() {
         ("joint.slide.parent_point.x", "1 mm"),
         ("joint.slide.start.velocity", "5 mm/s"),
     ] {
-        changed
-            .set(key, value)
-            .unwrap_or_else(|error| panic!("{error}"));
+        changed.set(key, value).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(
             changed.get(key),
-            Ok(Value::Number(
-                parse_quantity(value, changed.source.numbers[key].dimension).unwrap()
-            ))
+            Ok(Value::Number(parse_quantity(value, changed.source.numbers[key].dimension).unwrap()))
         );
     }
-    assert_eq!(
-        joint(&changed),
-        (Vec3::new(0.001, 0.0, -0.05), start(0.02, 0.005))
-    );
-    assert_eq!(
-        (changed.bodies[0].mass, changed.bodies[0].centre.y),
-        (3.0, 0.007)
-    );
+    assert_eq!(joint(&changed), (Vec3::new(0.001, 0.0, -0.05), start(0.02, 0.005)));
+    assert_eq!((changed.bodies[0].mass, changed.bodies[0].centre.y), (3.0, 0.007));
     assert_eq!(changed.get("parameter.speed"), Ok(Value::Number(0.08)));
     // Written to the places where the text has them, and nowhere else.
     let text = changed.to_toml().expect("has its places");
@@ -544,9 +371,7 @@ fn every_number_of_a_file_is_a_key() {
     }
     let read = Scene::parse(&text, None, &[]).expect("reads");
     assert_eq!(joint(&read), joint(&changed));
-    changed
-        .undo_change("parameter.stroke")
-        .expect("was changed");
+    changed.undo_change("parameter.stroke").expect("was changed");
     assert_eq!(changed.joints[0].parent_point.z, -0.03);
 }
 
@@ -556,17 +381,11 @@ fn a_parameter_of_the_file_is_a_row_like_the_others() {
     let rows = scene.parameters();
     let row = rows.iter().find(|row| row.key == "parameter.stroke");
     let row = row.expect("listed");
-    assert_eq!(
-        (row.label, row.display_unit(), row.at_reset),
-        ("Stroke", "mm", true)
-    );
+    assert_eq!((row.label, row.display_unit(), row.at_reset), ("Stroke", "mm", true));
     assert_eq!(row.range(), "10 mm to 50 mm");
     let speed = scene.parameter("parameter.speed").expect("known");
     // What follows from others is a number like any other.
-    assert_eq!(
-        (speed.label, speed.display_unit()),
-        ("parameter.speed", "m/s")
-    );
+    assert_eq!((speed.label, speed.display_unit()), ("parameter.speed", "m/s"));
 }
 
 #[test]
@@ -574,100 +393,41 @@ fn wrong_numbers_and_expressions_say_what_is_wrong() {
     let error = |from: &str, to: &str| {
         let text = OWN.replace(from, to);
         assert_ne!(text, OWN);
-        Scene::parse(&text, Some("own.toml"), &[])
-            .expect_err(to)
-            .to_string()
+        Scene::parse(&text, Some("own.toml"), &[]).expect_err(to).to_string()
     };
     for (from, to, wanted) in [
-        (
-            "\"stroke / 2\"",
-            "\"strok / 2\"",
-            "no variable `strok` (did you mean `stroke`?)",
-        ),
-        (
-            "\"stroke / 2\"",
-            "\"stroke * stroke\"",
-            "gives 0.0004 m^2, which is not in m; units m, cm",
-        ),
-        (
-            "\"stroke / 2\"",
-            "\"stroke + speed\"",
-            "adds or compares quantities of different dimensions",
-        ),
-        (
-            "\"stroke / 2\"",
-            "\"sin(stroke) * 1 m\"",
-            "takes a function of a quantity that is not a pure number",
-        ),
+        ("\"stroke / 2\"", "\"strok / 2\"", "no variable `strok` (did you mean `stroke`?)"),
+        ("\"stroke / 2\"", "\"stroke * stroke\"", "gives 0.0004 m^2, which is not in m; units m, cm"),
+        ("\"stroke / 2\"", "\"stroke + speed\"", "adds or compares quantities of different dimensions"),
+        ("\"stroke / 2\"", "\"sin(stroke) * 1 m\"", "takes a function of a quantity that is not a pure number"),
         ("\"stroke / 2\"", "\"10\"", "needs a unit"),
         ("\"stroke / 2\"", "\"2 * 5\"", "gives 10, which is not in m"),
-        (
-            "\"1 kg\"",
-            "\"stroke * 1 kg\"",
-            "gives 0.02 kg m, which is not in kg",
-        ),
+        ("\"1 kg\"", "\"stroke * 1 kg\"", "gives 0.02 kg m, which is not in kg"),
         (
             "value = \"20 mm\"",
             "value = \"60 mm\"",
             "parameter.stroke = \"60 mm\": out of range; allowed 10 mm to 50 mm",
         ),
-        (
-            "[\"10 mm\", \"50 mm\"]",
-            "[\"60 mm\", \"50 mm\"]",
-            "the first value must be below the second",
-        ),
+        ("[\"10 mm\", \"50 mm\"]", "[\"60 mm\", \"50 mm\"]", "the first value must be below the second"),
         ("\"stroke\"\n", "\"i\"\n", "cannot name a parameter"),
-        (
-            "\"speed\"\nvalue",
-            "\"stroke\"\nvalue",
-            "there is already a parameter of this name",
-        ),
+        ("\"speed\"\nvalue", "\"stroke\"\nvalue", "there is already a parameter of this name"),
         ("unit = \"mm/s\"", "unit = \"mph\"", "unknown unit"),
-        (
-            "unit = \"mm/s\"\n",
-            "",
-            "its unit cannot be told from an expression",
-        ),
+        ("unit = \"mm/s\"\n", "", "its unit cannot be told from an expression"),
     ] {
         let error = error(from, to);
-        assert!(
-            error.contains(wanted) && error.starts_with("own.toml:"),
-            "{error}"
-        );
+        assert!(error.contains(wanted) && error.starts_with("own.toml:"), "{error}");
     }
     let change = |key: &str, value: &str| {
         let change = (key.to_owned(), value.to_owned());
-        Scene::parse(OWN, None, &[change])
-            .expect_err(key)
-            .to_string()
+        Scene::parse(OWN, None, &[change]).expect_err(key).to_string()
     };
     for (key, value, wanted) in [
-        (
-            "parameter.stroke",
-            "5 mm",
-            "parameter.stroke = 5 mm: out of range; allowed 10 mm to 50 mm",
-        ),
-        (
-            "body.rod.mass",
-            "-1 kg",
-            "body.rod.mass = -1 kg: out of range; allowed above 0",
-        ),
+        ("parameter.stroke", "5 mm", "parameter.stroke = 5 mm: out of range; allowed 10 mm to 50 mm"),
+        ("body.rod.mass", "-1 kg", "body.rod.mass = -1 kg: out of range; allowed above 0"),
         ("body.rod.mass", "1", "body.rod.mass = 1: needs a unit"),
-        (
-            "body.rod.maas",
-            "1 kg",
-            "unknown key (did you mean `body.rod.mass`?)",
-        ),
-        (
-            "joint.slide.start.velocit",
-            "1 m/s",
-            "did you mean `joint.slide.start.velocity`?",
-        ),
-        (
-            "body.rod.centre",
-            "0 0 0 mm",
-            "body.rod.centre = 0 0 0 mm: unknown key",
-        ),
+        ("body.rod.maas", "1 kg", "unknown key (did you mean `body.rod.mass`?)"),
+        ("joint.slide.start.velocit", "1 m/s", "did you mean `joint.slide.start.velocity`?"),
+        ("body.rod.centre", "0 0 0 mm", "body.rod.centre = 0 0 0 mm: unknown key"),
     ] {
         let error = change(key, value);
         assert!(error.contains(wanted), "{error}");
@@ -736,13 +496,7 @@ role = \"frame\"
         near(joint.ball.point, Vec3::new(0.0, 0.0, 0.001));
         near(joint.opening, radial);
         assert_eq!(joint.ball.body, Some(copy + 1));
-        let JointStart::Pose {
-            position,
-            velocity,
-            rotation,
-            ..
-        } = scene.joints[copy + 1].start
-        else {
+        let JointStart::Pose { position, velocity, rotation, .. } = scene.joints[copy + 1].start else {
             panic!("free");
         };
         near(position, place);
@@ -760,10 +514,7 @@ role = \"frame\"
     changed.set("body.rod2.mass", "9 kg").expect("a key");
     assert_eq!(changed.bodies[2].mass, 9.0);
     let error = changed.to_toml().expect_err("has no place of its own");
-    assert!(
-        error.message.contains("every copy of a pattern has it"),
-        "{error}"
-    );
+    assert!(error.message.contains("every copy of a pattern has it"), "{error}");
     for (from, to, wanted) in [
         ("count = 3", "count = 0", "out of range; allowed 1 to 10000"),
         (
@@ -824,35 +575,12 @@ ball = { body = \"leg\" }
     assert_eq!(scene.ball_joints[0].socket.point.x, 0.04);
     assert_eq!(scene.bodies[0].mass, 3.0);
     let error = scene.to_toml().expect_err("two files").to_string();
-    assert!(
-        error.contains("another file, which this one includes"),
-        "{error}"
-    );
+    assert!(error.contains("another file, which this one includes"), "{error}");
     for (leg, text, place, wanted) in [
-        (
-            leg.replace("2 kg", "2"),
-            text.to_owned(),
-            "leg.toml:8:8: body.leg.mass",
-            "needs a unit",
-        ),
-        (
-            leg.replace("[[body]]", "[[body"),
-            text.to_owned(),
-            "leg.toml:6:7: ",
-            "not valid TOML",
-        ),
-        (
-            format!("start = \"ideal\"\n{leg}"),
-            text.to_owned(),
-            "leg.toml:1:1: start",
-            "unknown key",
-        ),
-        (
-            leg.to_owned(),
-            text.replace("leg.toml", "arm.toml"),
-            "scene.toml:2:12: include[0]",
-            "has no folder",
-        ),
+        (leg.replace("2 kg", "2"), text.to_owned(), "leg.toml:8:8: body.leg.mass", "needs a unit"),
+        (leg.replace("[[body]]", "[[body"), text.to_owned(), "leg.toml:6:7: ", "not valid TOML"),
+        (format!("start = \"ideal\"\n{leg}"), text.to_owned(), "leg.toml:1:1: start", "unknown key"),
+        (leg.to_owned(), text.replace("leg.toml", "arm.toml"), "scene.toml:2:12: include[0]", "has no folder"),
         (
             leg.to_owned(),
             text.replace("\"leg.toml\"", "\"leg.toml\", \"leg.toml\""),
@@ -867,10 +595,7 @@ ball = { body = \"leg\" }
         ),
     ] {
         let error = with(&leg, &text, &[]).expect_err(wanted).to_string();
-        assert!(
-            error.starts_with(place) && error.contains(wanted),
-            "{error}"
-        );
+        assert!(error.starts_with(place) && error.contains(wanted), "{error}");
     }
 }
 
@@ -885,15 +610,8 @@ fn a_body_of_a_density_weighs_what_its_shapes_do() {
     let read = |body: String| Scene::parse(&text(&body), Some("bar.toml"), &[]);
     let scene = read(format!("density = \"7.85 g/cm^3\"\n{bar}")).expect("reads");
     let body = &scene.bodies[0];
-    assert!(
-        (body.mass - 0.157).abs() < 1e-15
-            && (body.centre - Vec3::new(0.05, 0.0, 0.0)).norm() < 1e-17
-    );
-    let moments = Vec3::new(
-        0.01 * 0.01 + 0.02 * 0.02,
-        0.1 * 0.1 + 0.01 * 0.01,
-        0.1 * 0.1 + 0.02 * 0.02,
-    );
+    assert!((body.mass - 0.157).abs() < 1e-15 && (body.centre - Vec3::new(0.05, 0.0, 0.0)).norm() < 1e-17);
+    let moments = Vec3::new(0.01 * 0.01 + 0.02 * 0.02, 0.1 * 0.1 + 0.01 * 0.01, 0.1 * 0.1 + 0.02 * 0.02);
     let expected = Mat3::from_diagonal(&(moments * (0.157 / 12.0)));
     assert!((body.inertia - expected).amax() < 1e-18);
     for (body, wanted) in [
@@ -901,10 +619,7 @@ fn a_body_of_a_density_weighs_what_its_shapes_do() {
             format!("density = \"7850 kg/m^3\"\nmass = \"1 kg\"\n{bar}"),
             "bar.toml:4:8: body.bar.mass = \"1 kg\": not allowed here: it follows",
         ),
-        (
-            "density = \"7850 kg/m^3\"".to_owned(),
-            "needs `shapes` with a volume",
-        ),
+        ("density = \"7850 kg/m^3\"".to_owned(), "needs `shapes` with a volume"),
         (
             format!("density = \"0 kg/m^3\"\n{bar}"),
             "out of range; allowed above 0 up to 100000 kg/m^3; units kg/m^3, g/cm^3",
@@ -927,8 +642,7 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     let read = |value: &str, more: &str| Scene::parse(&text(value, more), Some("own.toml"), &[]);
     let start = |value: &str| {
         let scene = read(&format!("start = {{ position = \"{value}\" }}"), "");
-        let JointStart::Scalar { position, .. } =
-            scene.unwrap_or_else(|error| panic!("{error}")).joints[0].start
+        let JointStart::Scalar { position, .. } = scene.unwrap_or_else(|error| panic!("{error}")).joints[0].start
         else {
             panic!("a hinge");
         };
@@ -937,11 +651,7 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     assert_eq!(start("asin(0.5)"), libm::asin(0.5));
     assert_eq!(start("atan2(1, 2) + 0 deg"), libm::atan2(1.0, 2.0));
     assert!((start("2 * 15°") - 0.5235987755982988).abs() < 1e-15);
-    let scene = read(
-        "",
-        "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"",
-    )
-    .expect("reads");
+    let scene = read("", "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"").expect("reads");
     assert!((scene.contact.clearance - 0.21e-3).abs() < 1e-18);
     assert_eq!(scene.contact.friction, 1.0 / 3.0);
     let drive = |law: &str| format!("drive = {{ law = {law} }}");
@@ -958,29 +668,15 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
             "",
             "`*` where an operator other than a power should stand",
         ),
-        (
-            String::new(),
-            "clearance = \"radius\"",
-            "clearance 50 mm must be below the ball radius",
-        ),
-        (
-            String::new(),
-            "friction = \"2 * radius\"",
-            "gives 0.1 m, but must be a pure number; allowed 0 to 10",
-        ),
-        (
-            String::new(),
-            "friction = \"2 * radiu\"",
-            "no variable `radiu` (did you mean `radius`?)",
-        ),
+        (String::new(), "clearance = \"radius\"", "clearance 50 mm must be below the ball radius"),
+        (String::new(), "friction = \"2 * radius\"", "gives 0.1 m, but must be a pure number; allowed 0 to 10"),
+        (String::new(), "friction = \"2 * radiu\"", "no variable `radiu` (did you mean `radius`?)"),
     ] {
         let error = read(&value, more).expect_err(wanted).to_string();
         assert!(error.contains(wanted), "{error}");
     }
     let unit = text("", "").replace("\"radius\"", "\"mm\"");
-    let error = Scene::parse(&unit, None, &[])
-        .expect_err("a unit")
-        .to_string();
+    let error = Scene::parse(&unit, None, &[]).expect_err("a unit").to_string();
     assert!(error.contains("or a unit"), "{error}");
 }
 
@@ -1034,8 +730,6 @@ stiffness = \"1 N m/rad\"
     let twice = format!(
         "{text}[[pattern]]\nname = \"blades\"\ncount = 1\nalong = [0, 0, 0]\nfixed_shape = [{{ form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", role = \"pin\" }}]\n"
     );
-    let error = Scene::parse(&twice, None, &[])
-        .expect_err("twice")
-        .to_string();
+    let error = Scene::parse(&twice, None, &[]).expect_err("twice").to_string();
     assert!(error.contains("already a pattern of this name"), "{error}");
 }

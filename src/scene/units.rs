@@ -102,29 +102,10 @@ const UNITS: [(Dimension, &str, &[Unit]); 18] = [
     (
         Dimension::Time,
         "time",
-        &[
-            ("s", Decimal(0)),
-            ("ms", Decimal(-3)),
-            ("us", Decimal(-6)),
-            ("ns", Decimal(-9)),
-            ("min", Ratio(60.0, 1.0)),
-        ],
+        &[("s", Decimal(0)), ("ms", Decimal(-3)), ("us", Decimal(-6)), ("ns", Decimal(-9)), ("min", Ratio(60.0, 1.0))],
     ),
-    (
-        Dimension::Mass,
-        "mass",
-        &[
-            ("kg", Decimal(0)),
-            ("g", Decimal(-3)),
-            ("mg", Decimal(-6)),
-            ("t", Decimal(3)),
-        ],
-    ),
-    (
-        Dimension::Density,
-        "density",
-        &[("kg/m^3", Decimal(0)), ("g/cm^3", Decimal(3))],
-    ),
+    (Dimension::Mass, "mass", &[("kg", Decimal(0)), ("g", Decimal(-3)), ("mg", Decimal(-6)), ("t", Decimal(3))]),
+    (Dimension::Density, "density", &[("kg/m^3", Decimal(0)), ("g/cm^3", Decimal(3))]),
     (
         Dimension::Inertia,
         "moment of inertia",
@@ -139,23 +120,9 @@ const UNITS: [(Dimension, &str, &[Unit]); 18] = [
     (
         Dimension::Stress,
         "stress",
-        &[
-            ("Pa", Decimal(0)),
-            ("kPa", Decimal(3)),
-            ("MPa", Decimal(6)),
-            ("GPa", Decimal(9)),
-            ("N/mm^2", Decimal(6)),
-        ],
+        &[("Pa", Decimal(0)), ("kPa", Decimal(3)), ("MPa", Decimal(6)), ("GPa", Decimal(9)), ("N/mm^2", Decimal(6))],
     ),
-    (
-        Dimension::Angle,
-        "angle",
-        &[
-            ("rad", Decimal(0)),
-            ("mrad", Decimal(-3)),
-            ("deg", Ratio(PI, 180.0)),
-        ],
-    ),
+    (Dimension::Angle, "angle", &[("rad", Decimal(0)), ("mrad", Decimal(-3)), ("deg", Ratio(PI, 180.0))]),
     (
         Dimension::Speed,
         "speed",
@@ -171,79 +138,30 @@ const UNITS: [(Dimension, &str, &[Unit]); 18] = [
     (
         Dimension::AngularSpeed,
         "angular speed",
-        &[
-            ("rad/s", Decimal(0)),
-            ("mrad/s", Decimal(-3)),
-            ("deg/s", Ratio(PI, 180.0)),
-            ("rpm", Ratio(PI, 30.0)),
-        ],
+        &[("rad/s", Decimal(0)), ("mrad/s", Decimal(-3)), ("deg/s", Ratio(PI, 180.0)), ("rpm", Ratio(PI, 30.0))],
     ),
     (
         Dimension::Acceleration,
         "acceleration",
-        &[
-            ("m/s^2", Decimal(0)),
-            ("cm/s^2", Decimal(-2)),
-            ("mm/s^2", Decimal(-3)),
-        ],
+        &[("m/s^2", Decimal(0)), ("cm/s^2", Decimal(-2)), ("mm/s^2", Decimal(-3))],
     ),
     (
         Dimension::Frequency,
         "frequency",
-        &[
-            ("Hz", Decimal(0)),
-            ("mHz", Decimal(-3)),
-            ("kHz", Decimal(3)),
-            ("1/s", Decimal(0)),
-        ],
+        &[("Hz", Decimal(0)), ("mHz", Decimal(-3)), ("kHz", Decimal(3)), ("1/s", Decimal(0))],
     ),
-    (
-        Dimension::Force,
-        "force",
-        &[
-            ("N", Decimal(0)),
-            ("mN", Decimal(-3)),
-            ("kN", Decimal(3)),
-            ("MN", Decimal(6)),
-        ],
-    ),
-    (
-        Dimension::Torque,
-        "torque",
-        &[
-            ("N m", Decimal(0)),
-            ("N mm", Decimal(-3)),
-            ("kN m", Decimal(3)),
-        ],
-    ),
+    (Dimension::Force, "force", &[("N", Decimal(0)), ("mN", Decimal(-3)), ("kN", Decimal(3)), ("MN", Decimal(6))]),
+    (Dimension::Torque, "torque", &[("N m", Decimal(0)), ("N mm", Decimal(-3)), ("kN m", Decimal(3))]),
     (
         Dimension::Stiffness,
         "stiffness",
-        &[
-            ("N/m", Decimal(0)),
-            ("N/mm", Decimal(3)),
-            ("kN/m", Decimal(3)),
-            ("kN/mm", Decimal(6)),
-        ],
+        &[("N/m", Decimal(0)), ("N/mm", Decimal(3)), ("kN/m", Decimal(3)), ("kN/mm", Decimal(6))],
     ),
-    (
-        Dimension::Damping,
-        "damping",
-        &[
-            ("N s/m", Decimal(0)),
-            ("N s/mm", Decimal(3)),
-            ("kN s/m", Decimal(3)),
-        ],
-    ),
+    (Dimension::Damping, "damping", &[("N s/m", Decimal(0)), ("N s/mm", Decimal(3)), ("kN s/m", Decimal(3))]),
     (
         Dimension::TurningStiffness,
         "turning stiffness",
-        &[
-            ("N m/rad", Decimal(0)),
-            ("N mm/rad", Decimal(-3)),
-            ("kN m/rad", Decimal(3)),
-            ("N m/deg", Ratio(180.0, PI)),
-        ],
+        &[("N m/rad", Decimal(0)), ("N mm/rad", Decimal(-3)), ("kN m/rad", Decimal(3)), ("N m/deg", Ratio(180.0, PI))],
     ),
     (
         Dimension::TurningDamping,
@@ -302,9 +220,7 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             QuantityError::NotANumber(dimension)
         });
     }
-    let bare: f64 = number
-        .parse()
-        .map_err(|_| QuantityError::NotANumber(dimension))?;
+    let bare: f64 = number.parse().map_err(|_| QuantityError::NotANumber(dimension))?;
     if let Some(rest) = unit.strip_prefix(',')
         && rest.starts_with(|c: char| c.is_ascii_digit())
     {
@@ -321,10 +237,7 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             .iter()
             .find(|(name, _)| normalise(name) == wanted)
             .map(|(_, scale)| *scale)
-            .ok_or_else(|| QuantityError::WrongUnit {
-                unit: unit.to_owned(),
-                dimension,
-            })?;
+            .ok_or_else(|| QuantityError::WrongUnit { unit: unit.to_owned(), dimension })?;
         apply(number, bare, scale)
     };
     if !value.is_finite() {
@@ -368,15 +281,11 @@ pub(super) fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)
 
 /// Length in bytes of the longest unit with which `text` begins, and its place in [`all_units`].
 pub(super) fn unit_at_start(text: &str) -> Option<(usize, usize)> {
-    let ends =
-        |length: usize| !text[length..].starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let ends = |length: usize| !text[length..].starts_with(|c: char| c.is_alphanumeric() || c == '_');
     let begins = |(place, (name, ..)): (usize, (&str, Dimension, f64))| {
         (text.starts_with(name) && ends(name.len())).then_some((name.len(), place))
     };
-    all_units()
-        .enumerate()
-        .filter_map(begins)
-        .max_by_key(|(length, _)| *length)
+    all_units().enumerate().filter_map(begins).max_by_key(|(length, _)| *length)
 }
 
 /// What follows the number with which `text` begins; empty if it does not begin with one.
@@ -412,11 +321,7 @@ pub fn from_display(value: f64, unit: &str) -> f64 {
 /// An SI value with its unit, at most `digits` significant digits, no trailing zeros: `0.3 mm`.
 pub fn format_quantity_digits(si: f64, unit: &str, digits: usize) -> String {
     let number = format_number(to_display(si, unit), digits);
-    if unit.is_empty() {
-        number
-    } else {
-        format!("{number} {unit}")
-    }
+    if unit.is_empty() { number } else { format!("{number} {unit}") }
 }
 
 /// An SI value with its unit for display: six significant digits.
@@ -431,46 +336,25 @@ pub(super) fn exact_quantity(si: f64, unit: &str, dimension: Dimension) -> Strin
         return friendly;
     }
     let unit = si_unit(dimension);
-    if unit.is_empty() {
-        format!("{si:e}")
-    } else {
-        format!("{si:e} {unit}")
-    }
+    if unit.is_empty() { format!("{si:e}") } else { format!("{si:e} {unit}") }
 }
 
 /// At most `digits` significant digits, in plain notation where that is short.
 fn format_number(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 {
-            "0".to_owned()
-        } else {
-            format!("{value}")
-        };
+        return if value == 0.0 { "0".to_owned() } else { format!("{value}") };
     }
-    let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1))
-        .parse()
-        .unwrap_or(value);
+    let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value);
     let size = rounded.abs();
-    if (1e-4..1e9).contains(&size) {
-        format!("{rounded}")
-    } else {
-        format!("{rounded:e}")
-    }
+    if (1e-4..1e9).contains(&size) { format!("{rounded}") } else { format!("{rounded:e}") }
 }
 
 fn units(dimension: Dimension) -> &'static [Unit] {
-    UNITS
-        .iter()
-        .find(|(d, _, _)| *d == dimension)
-        .map_or(&[], |(_, _, units)| units)
+    UNITS.iter().find(|(d, _, _)| *d == dimension).map_or(&[], |(_, _, units)| units)
 }
 
 fn scale_of(unit: &str) -> Option<Scale> {
-    UNITS
-        .iter()
-        .flat_map(|(_, _, units)| units.iter())
-        .find(|(name, _)| *name == unit)
-        .map(|(_, scale)| *scale)
+    UNITS.iter().flat_map(|(_, _, units)| units.iter()).find(|(name, _)| *name == unit).map(|(_, scale)| *scale)
 }
 
 fn apply(number: &str, bare: f64, scale: Scale) -> f64 {
@@ -486,9 +370,7 @@ fn shift(text: &str, by: i32) -> Option<f64> {
         Some(at) => (&text[..at], text[at + 1..].parse::<i64>().ok()?),
         None => (text, 0),
     };
-    format!("{mantissa}e{}", exponent.saturating_add(i64::from(by)))
-        .parse()
-        .ok()
+    format!("{mantissa}e{}", exponent.saturating_add(i64::from(by))).parse().ok()
 }
 
 /// Splits "0.3 mm" into "0.3" and "mm"; the number is "" if the text does not start with one.
@@ -540,11 +422,7 @@ fn example(dimension: Dimension) -> String {
     let names = unit_names(dimension);
     match names.first() {
         None => "; a pure number takes no unit".to_owned(),
-        Some(_) => format!(
-            "; units of {}: {}",
-            dimension_name(dimension),
-            names.join(", ")
-        ),
+        Some(_) => format!("; units of {}: {}", dimension_name(dimension), names.join(", ")),
     }
 }
 
@@ -563,20 +441,8 @@ mod tests {
 
     #[test]
     fn one_quantity_in_three_spellings_has_the_same_bits() {
-        for text in [
-            "0.3 mm",
-            "0.3mm",
-            "3e-4 m",
-            "300 µm",
-            "300μm",
-            "300 um",
-            "  0.3  mm ",
-        ] {
-            assert_eq!(
-                parse_quantity(text, Dimension::Length).map(f64::to_bits),
-                Ok(3e-4_f64.to_bits()),
-                "{text}"
-            );
+        for text in ["0.3 mm", "0.3mm", "3e-4 m", "300 µm", "300μm", "300 um", "  0.3  mm "] {
+            assert_eq!(parse_quantity(text, Dimension::Length).map(f64::to_bits), Ok(3e-4_f64.to_bits()), "{text}");
         }
     }
 
@@ -607,10 +473,7 @@ mod tests {
         for (text, dimension, si) in cases {
             let read = parse_quantity(text, dimension).unwrap();
             // pi brings one extra rounding.
-            assert!(
-                (read - si).abs() <= f64::EPSILON * si.abs(),
-                "{text}: {read}"
-            );
+            assert!((read - si).abs() <= f64::EPSILON * si.abs(), "{text}: {read}");
         }
     }
 
@@ -618,21 +481,9 @@ mod tests {
     fn what_is_no_quantity_is_refused_with_the_reason() {
         let cases = [
             ("0.3", Dimension::Length, "needs a unit"),
-            (
-                "0.3 s",
-                Dimension::Length,
-                "wrong unit `s` (a unit of time)",
-            ),
-            (
-                "0.3 furlong",
-                Dimension::Length,
-                "wrong unit `furlong`; units of length: m, cm, mm",
-            ),
-            (
-                "0.3 mm",
-                Dimension::None,
-                "wrong unit `mm` (a unit of length); a pure number takes no unit",
-            ),
+            ("0.3 s", Dimension::Length, "wrong unit `s` (a unit of time)"),
+            ("0.3 furlong", Dimension::Length, "wrong unit `furlong`; units of length: m, cm, mm"),
+            ("0.3 mm", Dimension::None, "wrong unit `mm` (a unit of length); a pure number takes no unit"),
             ("inf", Dimension::None, "finite"),
             ("nan m", Dimension::Length, "finite"),
             ("-inf mm", Dimension::Length, "finite"),
@@ -660,10 +511,7 @@ mod tests {
             (1e-11, "", "1e-11"),
         ] {
             assert_eq!(format_quantity(si, unit), shown);
-            assert_eq!(
-                from_display(to_display(si, unit), unit).to_bits(),
-                f64::to_bits(si)
-            );
+            assert_eq!(from_display(to_display(si, unit), unit).to_bits(), f64::to_bits(si));
         }
         assert_eq!(to_display(PI, "deg"), 180.0);
     }
@@ -673,11 +521,7 @@ mod tests {
         let mut x = 1.234_567_890_123_456_7e-4_f64;
         for _ in 0..200 {
             let text = exact_quantity(x, "mm", Dimension::Length);
-            assert_eq!(
-                parse_quantity(&text, Dimension::Length).unwrap().to_bits(),
-                x.to_bits(),
-                "{text}"
-            );
+            assert_eq!(parse_quantity(&text, Dimension::Length).unwrap().to_bits(), x.to_bits(), "{text}");
             x *= 1.017_3;
         }
         assert_eq!(exact_quantity(3e-4, "mm", Dimension::Length), "0.3 mm");

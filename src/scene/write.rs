@@ -1,8 +1,6 @@
 //! A scene back to TOML: its source text with the changed values in place; comments and order are kept.
 
-use toml_edit::{
-    Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value,
-};
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value};
 
 use std::collections::BTreeMap;
 
@@ -19,11 +17,8 @@ impl Scene {
     /// # Errors
     /// A change that the format cannot express.
     pub fn to_toml(&self) -> Result<String, SceneError> {
-        let lost = |key: &str, message: String| SceneError {
-            key: Some(key.to_owned()),
-            message,
-            ..SceneError::default()
-        };
+        let lost =
+            |key: &str, message: String| SceneError { key: Some(key.to_owned()), message, ..SceneError::default() };
         let mut document: DocumentMut = self
             .numbers_in_place()?
             .parse()
@@ -90,16 +85,12 @@ impl Scene {
     fn write_change(&self, document: &mut DocumentMut, key: &str) -> Result<(), SceneError> {
         let parameter = self.parameter(key)?;
         let item = self.item(key)?;
-        if let Some((name, part)) = key
-            .strip_prefix("joint.")
-            .and_then(|rest| rest.rsplit_once('.'))
-        {
+        if let Some((name, part)) = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
             let placed = put_joint(document.get_mut("ball_joint"), name, part, &item)
                 || put_chain_joint(document.get_mut("chain"), name, part, item);
             return placed.then_some(()).ok_or_else(|| SceneError {
                 key: Some(key.to_owned()),
-                message: "cannot be written to a scene file: every copy of a pattern has it"
-                    .to_owned(),
+                message: "cannot be written to a scene file: every copy of a pattern has it".to_owned(),
                 ..SceneError::default()
             });
         }
@@ -107,9 +98,7 @@ impl Scene {
             None => put(document.as_table_mut(), parameter.key, item),
             Some((section, part)) => {
                 let fresh = !document.contains_key(section);
-                let table = document
-                    .entry(section)
-                    .or_insert_with(|| Item::Table(Table::new()));
+                let table = document.entry(section).or_insert_with(|| Item::Table(Table::new()));
                 // If a section gives one component of gravity, the others are 0.
                 if fresh && section == "gravity" {
                     for part in ["x", "y", "z"] {
@@ -128,8 +117,8 @@ impl Scene {
         let parameter = self.parameter(key)?;
         let now = self.get(key)?;
         let text = parameter.write(&now);
-        let bare = matches!(parameter.kind, Kind::Number { display: "", .. })
-            || matches!(parameter.kind, Kind::Count { .. });
+        let bare =
+            matches!(parameter.kind, Kind::Number { display: "", .. }) || matches!(parameter.kind, Kind::Count { .. });
         Ok(match (&now, text.parse::<Toml>()) {
             (Value::Number(_) | Value::Count(_), Ok(number)) if bare => value(number),
             _ => value(text),
@@ -165,10 +154,7 @@ fn put_chain_joint(chain: Option<&mut Item>, name: &str, part: &str, item: Item)
             let mut own = Table::new();
             own.insert("name", value(name));
             own.insert(part, item);
-            match chain
-                .entry("joint")
-                .or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()))
-            {
+            match chain.entry("joint").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())) {
                 Item::ArrayOfTables(tables) => tables.push(own),
                 Item::Value(Toml::Array(array)) => array.push(own.into_inline_table()),
                 _ => return false,
@@ -266,9 +252,7 @@ mod tests {
             for parameter in plain.parameters() {
                 let other = match parameter.kind {
                     // Inside every range, and not a round number.
-                    Kind::Number { slider, .. } => {
-                        Value::Number(slider.0 + 0.377_123_456_789 * (slider.1 - slider.0))
-                    }
+                    Kind::Number { slider, .. } => Value::Number(slider.0 + 0.377_123_456_789 * (slider.1 - slider.0)),
                     Kind::Count { .. } => Value::Count(3),
                     Kind::Choice(words) => Value::Choice(words[words.len() - 1]),
                 };
@@ -325,10 +309,7 @@ mod tests {
 
     #[test]
     fn gravity_that_the_file_leaves_out_is_written_whole() {
-        let text = scene("pendulum", &[])
-            .source
-            .text
-            .replace("[gravity]\nz = \"-9.81 m/s^2\"\n", "");
+        let text = scene("pendulum", &[]).source.text.replace("[gravity]\nz = \"-9.81 m/s^2\"\n", "");
         let mut bare = Scene::parse(&text, None, &[]).expect("reads");
         assert_eq!(bare.gravity.z, -9.81);
         bare.set("gravity.x", "1 m/s^2").expect("in range");
@@ -355,15 +336,10 @@ mod tests {
 
     #[test]
     fn joints_of_a_chain_have_values_of_their_own_in_every_form_of_the_file() {
-        let changes = [
-            ("joint.J2.clearance", "0.5 mm"),
-            ("joint.J8.friction", "0.4"),
-            ("joint.J2.friction", "0.1"),
-        ];
+        let changes = [("joint.J2.clearance", "0.5 mm"), ("joint.J8.friction", "0.4"), ("joint.J2.friction", "0.1")];
         let plain = scene("chain", &[]).source.text;
         let inline = plain.replacen("[chain]\n", "[chain]\njoint = [{ name = \"J3\" }]\n", 1);
-        let there =
-            format!("{plain}\n[[chain.joint]]\nname = \"J2\" # the second\nrestitution = 0.7\n");
+        let there = format!("{plain}\n[[chain.joint]]\nname = \"J2\" # the second\nrestitution = 0.7\n");
         for text in [plain, inline, there] {
             let mut changed = Scene::parse(&text, None, &[]).expect("reads");
             for (key, value) in changes {
@@ -373,47 +349,28 @@ mod tests {
             let read = Scene::parse(&written, None, &[]).expect("reads");
             assert_eq!(bits(&read), bits(&changed), "{written}");
             assert_eq!(read.ball_joints[1].contact.clearance, 0.5e-3);
-            assert_eq!(
-                written.contains("# the second"),
-                text.contains("# the second")
-            );
+            assert_eq!(written.contains("# the second"), text.contains("# the second"));
             // A second time: the entries exist now.
             let mut again = read;
             again.set("joint.J8.friction", "0.3").expect("in range");
             let written = again.to_toml().expect("has its places");
             assert_eq!(written.matches("\"J8\"").count(), 1, "{written}");
         }
-        let bad = format!(
-            "{}\n[[chain.joint]]\nname = \"J9\"\n",
-            scene("chain", &[]).source.text
-        );
-        let error = Scene::parse(&bad, None, &[])
-            .expect_err("eight links")
-            .to_string();
-        assert!(
-            error.contains("no ball joint `J9`; it has 8 links: J1 to J8"),
-            "{error}"
-        );
+        let bad = format!("{}\n[[chain.joint]]\nname = \"J9\"\n", scene("chain", &[]).source.text);
+        let error = Scene::parse(&bad, None, &[]).expect_err("eight links").to_string();
+        assert!(error.contains("no ball joint `J9`; it has 8 links: J1 to J8"), "{error}");
     }
 
     #[test]
     fn an_inline_chain_keeps_its_form() {
         let text = "chain = { links = 3, link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }\n";
         let mut changed = Scene::parse(text, None, &[]).expect("reads");
-        changed
-            .set("joint.J3.clearance", "0.2 mm")
-            .expect("in range");
+        changed.set("joint.J3.clearance", "0.2 mm").expect("in range");
         changed.set("joint.J3.friction", "0.2").expect("in range");
         changed.set("joint.J1.friction", "0.1").expect("in range");
         let written = changed.to_toml().expect("written");
         let read = Scene::parse(&written, None, &[]).expect("reads");
         assert_eq!(bits(&read), bits(&changed), "{written}");
-        assert_eq!(
-            written
-                .lines()
-                .filter(|line| line.starts_with("chain = {"))
-                .count(),
-            1
-        );
+        assert_eq!(written.lines().filter(|line| line.starts_with("chain = {")).count(), 1);
     }
 }

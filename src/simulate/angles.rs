@@ -22,11 +22,7 @@ pub(super) fn pose_of(body: &BodyMotion) -> Pose {
     let (sa, ca) = libm::sincos(angles.x);
     let (sb, cb) = libm::sincos(angles.y);
     // Axes of the three rotations: x, Rx z, Rx Rz y; omega = alpha' e1 + beta' e2 + gamma' e3.
-    let (e1, e2, e3) = (
-        Vec3::x(),
-        Vec3::new(0.0, -sa, ca),
-        Vec3::new(-sb, ca * cb, sa * cb),
-    );
+    let (e1, e2, e3) = (Vec3::x(), Vec3::new(0.0, -sa, ca), Vec3::new(-sb, ca * cb, sa * cb));
     let solve = |w: &Vec3| {
         // e2 is perpendicular to e1 and e3; e1 . e3 = -sin beta.
         let beta = w.dot(&e2);
@@ -65,11 +61,7 @@ mod tests {
 
     #[test]
     fn angles_come_back() {
-        for a in [
-            Vec3::new(0.1, -0.4, 0.26),
-            Vec3::new(-3.0, 1.5, 3.1),
-            Vec3::new(0.0, 0.0, 0.0),
-        ] {
+        for a in [Vec3::new(0.1, -0.4, 0.26), Vec3::new(-3.0, 1.5, 3.1), Vec3::new(0.0, 0.0, 0.0)] {
             assert!((angles_of(&rotation(&a)) - a).norm() < 1e-13, "{a}");
         }
         let at_end = Vec3::new(0.0, std::f64::consts::FRAC_PI_2, 0.7);
@@ -79,11 +71,7 @@ mod tests {
     #[test]
     fn rates_and_accelerations_are_derivatives_of_the_angles() {
         // A body spinning with omega = w + t w1; angles at t = -h, 0, h from integrating R' = [omega]x R accurately enough.
-        let (a, w, w1) = (
-            Vec3::new(0.3, -0.5, 0.8),
-            Vec3::new(1.0, -2.0, 0.5),
-            Vec3::new(-0.7, 0.2, 1.1),
-        );
+        let (a, w, w1) = (Vec3::new(0.3, -0.5, 0.8), Vec3::new(1.0, -2.0, 0.5), Vec3::new(-0.7, 0.2, 1.1));
         let r = rotation(&a);
         let h = 1e-4;
         let at = |t: f64| {

@@ -85,10 +85,7 @@ impl Channels {
                 reading: found.reading,
             }));
         });
-        Self {
-            list,
-            picked: Vec::new(),
-        }
+        Self { list, picked: Vec::new() }
     }
 
     /// Picks the channels of `scene` that match `patterns`, in place of those picked before; `first` as in [`run_columns`].
@@ -99,8 +96,7 @@ impl Channels {
         }
         self.picked = channels_of(scene, first);
         let matches = |channel: &Listed| patterns.iter().any(|p| channel.is_chosen_by(p));
-        self.picked
-            .retain(|channel| channel.name != TIME && matches(channel));
+        self.picked.retain(|channel| channel.name != TIME && matches(channel));
         self.picked.truncate(MOST_PICKED);
     }
 
@@ -139,9 +135,7 @@ impl Channels {
     /// Makes `frame` one that asks for the picked channels, and for nothing else.
     pub fn ask(&self, frame: &mut Frame) {
         frame.reactions = None;
-        self.picked
-            .iter()
-            .for_each(|channel| channel.reading.ask(frame));
+        self.picked.iter().for_each(|channel| channel.reading.ask(frame));
     }
 
     /// Appends the picked channels to `out`, as [`Self::read`] does the others.
@@ -203,16 +197,9 @@ fn lay_out(
                     add(Found {
                         signal,
                         name: named(signal.name),
-                        member: members
-                            .into_iter()
-                            .find(|m| !m.is_empty())
-                            .unwrap_or_default(),
+                        member: members.into_iter().find(|m| !m.is_empty()).unwrap_or_default(),
                         column: named(signal.column),
-                        reading: Reading {
-                            take,
-                            part,
-                            component,
-                        },
+                        reading: Reading { take, part, component },
                     });
                 }
             }
@@ -231,32 +218,22 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
         Each::Once => vec![("", None)],
         Each::Output => vec![(scene.bodies[scene.output.body].name.as_str(), None)],
         Each::Body => bodies.map(|name| (name, None)).collect(),
-        Each::Coordinate => scene
-            .kinematic_joints()
-            .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
-            .collect(),
+        Each::Coordinate => {
+            scene.kinematic_joints().flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom))).collect()
+        }
         Each::Holding => holding.map(|j| (j.name.as_str(), None)).collect(),
         Each::Closing => {
             let closing = scene.closing_joints.iter();
             closing.map(|joint| (joint.name.as_str(), None)).collect()
         }
         Each::Joint => joints.map(|name| (name, None)).collect(),
-        Each::Drive => scene
-            .driven()
-            .map(|(j, freedom)| (j.name.as_str(), Some(freedom)))
-            .collect(),
+        Each::Drive => scene.driven().map(|(j, freedom)| (j.name.as_str(), Some(freedom))).collect(),
         Each::Element => elements.map(|name| (name, None)).collect(),
     }
 }
 
 /// Whether `scene` has `signal` for part `part`; without a `first` frame, whether it may have it.
-fn has(
-    scene: &Scene,
-    first: Option<&Frame>,
-    signal: &Signal,
-    part: usize,
-    freedom: Option<Freedom>,
-) -> bool {
+fn has(scene: &Scene, first: Option<&Frame>, signal: &Signal, part: usize, freedom: Option<Freedom>) -> bool {
     let take = signal.take;
     let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());
     match take {
@@ -291,17 +268,10 @@ mod tests {
         }
         for in_run in [false, true] {
             let here = |signal: &&Signal| {
-                if in_run {
-                    signal.run.is_some()
-                } else {
-                    signal.plot.is_some()
-                }
+                if in_run { signal.run.is_some() } else { signal.plot.is_some() }
             };
-            let mut columns: Vec<(&str, usize)> = TABLE
-                .iter()
-                .filter(here)
-                .map(|signal| (signal.column, signal.take.each() as usize))
-                .collect();
+            let mut columns: Vec<(&str, usize)> =
+                TABLE.iter().filter(here).map(|signal| (signal.column, signal.take.each() as usize)).collect();
             let all = columns.len();
             columns.sort_unstable();
             columns.dedup();

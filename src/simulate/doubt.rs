@@ -131,34 +131,19 @@ impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Scene(doubt) => doubt.fmt(f),
-            Self::Unresolved {
-                joints,
-                short,
-                contacts,
-                steps,
-            } => write!(
+            Self::Unresolved { joints, short, contacts, steps } => write!(
                 f,
                 "{joints}: {short} of {contacts} contacts lasted fewer than {steps} steps: their forces are not resolved."
             ),
-            Self::Floored {
-                joints,
-                slow,
-                contacts,
-            } => write!(
+            Self::Floored { joints, slow, contacts } => write!(
                 f,
                 "{joints}: {slow} of {contacts} contacts began slower than impact_speed_floor or existed at the start: \
                  they rebound higher than asked."
             ),
-            Self::Patch { joints, radii } => write!(
-                f,
-                "{joints}: the contact patch reached {radii:.2} ball radii: Hertz's theory wants it small."
-            ),
-            Self::Damping {
-                joints,
-                time,
-                ratio,
-                usual,
-            } => write!(
+            Self::Patch { joints, radii } => {
+                write!(f, "{joints}: the contact patch reached {radii:.2} ball radii: Hertz's theory wants it small.")
+            }
+            Self::Damping { joints, time, ratio, usual } => write!(
                 f,
                 "{joints}: hit again while touching, at {time:.6} s, its damping reached {ratio:.2} times the elastic \
                  force, {usual:.2} in an undisturbed impact: that force is an artefact; contact.approach_speed = largest \
@@ -174,21 +159,13 @@ impl fmt::Display for Doubt {
                 100.0 * share,
                 unaccounted(*residual)
             ),
-            Self::Work {
-                work,
-                value,
-                residual,
-            } => write!(
+            Self::Work { work, value, residual } => write!(
                 f,
                 "energy: {residual:.2e} J {}, and the {} is {value:.2e} J; use a smaller step or tolerance.",
                 unaccounted(*residual),
                 work.words()
             ),
-            Self::Held {
-                share,
-                tolerance,
-                loosest,
-            } => write!(
+            Self::Held { share, tolerance, loosest } => write!(
                 f,
                 "solver.method dopri5: stability held its steps for {:.0} % of the time, and at solver.tolerance \
                  {tolerance:e} these lose or gain energy in settled contacts; use {loosest:e} or less, or \
@@ -200,9 +177,5 @@ impl fmt::Display for Doubt {
 }
 
 fn unaccounted(residual: f64) -> &'static str {
-    if residual > 0.0 {
-        "came from nowhere"
-    } else {
-        "went nowhere"
-    }
+    if residual > 0.0 { "came from nowhere" } else { "went nowhere" }
 }

@@ -56,11 +56,7 @@ impl Mark {
 
     /// The same position in a record that was rearranged, as by [`History::rearranged`], from one of `channels`.
     pub fn rearranged(&self, channels: usize, from: &[Option<usize>]) -> Self {
-        Self {
-            newest: self.newest,
-            ranges: rearranged(&self.ranges, channels, from),
-            span: self.span,
-        }
+        Self { newest: self.newest, ranges: rearranged(&self.ranges, channels, from), span: self.span }
     }
 }
 
@@ -79,11 +75,7 @@ impl History {
     pub fn new(channels: usize, finest: f64) -> Self {
         Self {
             channels,
-            finest: if finest > 0.0 && finest.is_finite() {
-                finest
-            } else {
-                1e-6
-            },
+            finest: if finest > 0.0 && finest.is_finite() { finest } else { 1e-6 },
             indices: vec![EMPTY; LEVELS * BINS],
             newest: [EMPTY; LEVELS],
             reached: [EMPTY; LEVELS],
@@ -133,11 +125,7 @@ impl History {
                 ranges.extend_from_slice(&self.ranges[self.at(level, index)]);
             }
         }
-        Mark {
-            newest: self.newest,
-            ranges,
-            span: self.span(),
-        }
+        Mark { newest: self.newest, ranges, span: self.span() }
     }
 
     /// Drops everything recorded after `mark`, which must come from this record since it was last cleared.
@@ -190,11 +178,7 @@ impl History {
                 *base = value;
             }
             let base = *base;
-            let kept = if value.is_nan() {
-                NOTHING
-            } else {
-                ((value - base) as f32, (value - base) as f32)
-            };
+            let kept = if value.is_nan() { NOTHING } else { ((value - base) as f32, (value - base) as f32) };
             *range = if fresh { kept } else { join(*range, kept) };
         }
     }
@@ -230,8 +214,7 @@ impl History {
         // If the first bin is empty, go back to the last one before it that is not.
         let (mut first, oldest) = (self.index(level, from), self.index(level, start));
         let gone = self.reached[level].saturating_sub(BINS as i64);
-        while first > oldest.max(gone + 1) && self.range(level, first, complete, channel).is_none()
-        {
+        while first > oldest.max(gone + 1) && self.range(level, first, complete, channel).is_none() {
             first -= 1;
         }
         for index in first..=self.index(level, to) {
@@ -258,9 +241,8 @@ impl History {
         let (width, complete) = (self.width(level), self.complete(level));
         (self.index(level, start)..=self.index(level, end))
             .filter_map(|index| {
-                let values: Option<Vec<(f64, f64)>> = (0..self.channels)
-                    .map(|channel| self.range(level, index, complete, channel))
-                    .collect();
+                let values: Option<Vec<(f64, f64)>> =
+                    (0..self.channels).map(|channel| self.range(level, index, complete, channel)).collect();
                 let time = ((index as f64 + 0.5) * width).clamp(start, end);
                 values.map(|values| (time, values))
             })
@@ -311,11 +293,7 @@ impl History {
     fn range(&self, level: usize, index: i64, complete: i64, channel: usize) -> Option<(f64, f64)> {
         let mut found: Option<(f32, f32)> = None;
         for below in if index < complete { level } else { 0 }..=level {
-            let at = if below == level {
-                index
-            } else {
-                self.newest[below]
-            };
+            let at = if below == level { index } else { self.newest[below] };
             if at == EMPTY || at >> (level - below) != index {
                 continue;
             }
@@ -329,11 +307,7 @@ impl History {
         let whole = |kept: f32| {
             let value = base + f64::from(kept);
             // The base cancels this value to within f32 precision: report an exact zero.
-            if value.abs() <= f64::from(f32::EPSILON) * base.abs() {
-                0.0
-            } else {
-                value
-            }
+            if value.abs() <= f64::from(f32::EPSILON) * base.abs() { 0.0 } else { value }
         };
         found.map(|(least, greatest)| (whole(least), whole(greatest)))
     }
@@ -530,11 +504,7 @@ mod tests {
         for most in [40, 900] {
             let found = bins(&history, 1, 0.0, 0.3, most);
             assert!(found[0].to > 0.1 && found[0].from <= 0.1 + 1e-9);
-            assert!(
-                found
-                    .iter()
-                    .all(|b| b.least.is_finite() && b.greatest <= 1.0)
-            );
+            assert!(found.iter().all(|b| b.least.is_finite() && b.greatest <= 1.0));
             assert_eq!(bins(&history, 0, 0.0, 0.3, most)[0].from, 0.0);
         }
         let rows = history.rows(40);

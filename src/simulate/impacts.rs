@@ -107,10 +107,7 @@ impl Impacts {
         }
         let law = &mut self.laws[joint];
         if law.0 != coefficients.damping {
-            *law = (
-                coefficients.damping,
-                undisturbed_restitution(coefficients.damping),
-            );
+            *law = (coefficients.damping, undisturbed_restitution(coefficients.damping));
         }
         self.under_way[joint] = (speed > 0.0).then_some(Impact {
             joint,
@@ -126,13 +123,7 @@ impl Impacts {
 
     /// Follows the contact of `joint` over a step in which it was, or became, active: the course of its penetration, its
     /// largest normal force (N) and its largest ratio of damping to elastic force.
-    pub(super) fn follow(
-        &mut self,
-        joint: usize,
-        course: &PenetrationCubic,
-        force: f64,
-        damping: f64,
-    ) {
+    pub(super) fn follow(&mut self, joint: usize, course: &PenetrationCubic, force: f64, damping: f64) {
         if let Some(impact) = &mut self.under_way[joint] {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);

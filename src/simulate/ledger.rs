@@ -37,22 +37,14 @@ pub struct Ledger {
 impl Ledger {
     /// Unaccounted energy, J: positive where it came from nowhere.
     pub fn residual(&self) -> f64 {
-        let given = self.drive_work
-            + self.gravity_work
-            + self.clearance_work
-            + self.change_work
-            + self.external_work;
+        let given = self.drive_work + self.gravity_work + self.clearance_work + self.change_work + self.external_work;
         let taken = self.restitution_loss + self.friction_loss + self.damping_loss;
         self.kinetic_change + self.elastic_change - (given - taken)
     }
 
     /// Residual over the energy exchanged; 0 where none was.
     pub fn relative_residual(&self) -> f64 {
-        if self.exchanged > 0.0 {
-            self.residual() / self.exchanged
-        } else {
-            0.0
-        }
+        if self.exchanged > 0.0 { self.residual() / self.exchanged } else { 0.0 }
     }
 }
 
@@ -68,14 +60,8 @@ pub(super) struct Energies {
 const NODES: usize = 6;
 /// Weights of six equidistant instants for the interval between the last two: Adams-Moulton (Hairer, Nørsett & Wanner,
 /// *Solving Ordinary Differential Equations I*, III.1).
-const EVEN: [f64; NODES] = [
-    27.0 / 1440.0,
-    -173.0 / 1440.0,
-    482.0 / 1440.0,
-    -798.0 / 1440.0,
-    1427.0 / 1440.0,
-    475.0 / 1440.0,
-];
+const EVEN: [f64; NODES] =
+    [27.0 / 1440.0, -173.0 / 1440.0, 482.0 / 1440.0, -798.0 / 1440.0, 1427.0 / 1440.0, 475.0 / 1440.0];
 /// Relative tolerance for treating instants as equidistant: the weights are then accurate to the same order.
 const EVENLY: f64 = 1e-9;
 
@@ -189,12 +175,7 @@ impl Account {
     /// An account that starts with these energies.
     pub(super) fn start(on: bool, energies: Energies) -> Self {
         let entry = (Ledger::default(), energies);
-        Self {
-            on,
-            before: entry,
-            now: entry,
-            ..Self::default()
-        }
+        Self { on, before: entry, now: entry, ..Self::default() }
     }
 
     /// Whether it holds no more than it can.
@@ -224,11 +205,7 @@ impl Account {
 
     /// Sum of the magnitudes of the energies at the end of the latest step, J.
     pub(super) fn energy(&self) -> f64 {
-        let Energies {
-            kinetic,
-            gravitational,
-            elastic,
-        } = self.now.1;
+        let Energies { kinetic, gravitational, elastic } = self.now.1;
         kinetic + gravitational.abs() + elastic.abs()
     }
 
@@ -280,18 +257,14 @@ mod tests {
     use super::*;
 
     fn drive(power: f64) -> Powers {
-        Powers {
-            drive: power,
-            ..Powers::default()
-        }
+        Powers { drive: power, ..Powers::default() }
     }
 
     #[test]
     fn a_course_integrates_the_polynomial_through_its_instants() {
         // Of degree 5 through six non-equidistant instants, four of them before the interval.
         let p = |t: f64| 1.0 + t * (2.0 - t * (3.0 - t * (0.5 + t * (0.25 - t))));
-        let integral =
-            |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
+        let integral = |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
         let mut course = PowerInterpolant::default();
         for t in [-9.0, -0.9, -0.5, -0.2, 0.0, 0.299] {
             course.push_apart(t, drive(p(t)), 1e-2);
@@ -350,11 +323,7 @@ mod tests {
 
     #[test]
     fn what_is_not_booked_is_the_residual() {
-        let at = |kinetic: f64, gravitational: f64| Energies {
-            kinetic,
-            gravitational,
-            elastic: 0.0,
-        };
+        let at = |kinetic: f64, gravitational: f64| Energies { kinetic, gravitational, elastic: 0.0 };
         let mut account = Account::start(true, at(0.0, 1.0));
         account.course.push(0.0, drive(2.0));
         // 2 J by the drive and 1 J by gravity, of which 2.75 J arrive.
@@ -365,11 +334,7 @@ mod tests {
         let half = account.within(0.5, 1.0, at(1.5, 0.5));
         assert_eq!((half.residual(), half.drive_work), (0.0, 1.0));
         // 4 J of elastic energy from a stiffer contact.
-        account.book_change(Energies {
-            kinetic: 2.75,
-            gravitational: 7.0,
-            elastic: 4.0,
-        });
+        account.book_change(Energies { kinetic: 2.75, gravitational: 7.0, elastic: 4.0 });
         assert_eq!(account.ledger().change_work, 4.0);
         assert_eq!(account.ledger().residual(), -0.25);
     }

@@ -50,9 +50,7 @@ impl StartError {
     /// The same error, with the line of `scene`'s file and the change that it concerns.
     pub fn located(&self, scene: &Scene) -> SceneError {
         let one = |joint: &str, parts: &[&str]| {
-            let mut keys = ["spcmm.", "parameter.", "formulation", "start"]
-                .map(str::to_owned)
-                .to_vec();
+            let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
             for part in parts {
                 keys.push(format!("contact.{part}"));
                 keys.push(format!("joint.{joint}.{part}"));
@@ -60,30 +58,20 @@ impl StartError {
             (format!("joint.{joint}"), keys)
         };
         let (title, keys) = match &self.0 {
-            MechanismError::Unreachable(_)
-            | MechanismError::OtherBranch
-            | MechanismError::Singular => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
+            MechanismError::Unreachable(_) | MechanismError::OtherBranch | MechanismError::Singular => {
+                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
+            }
             MechanismError::Open { given: gap }
             | MechanismError::NoClosure { given: gap, .. }
             | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
-            MechanismError::OutsideSocket { joint, .. } => {
-                one(joint, &["clearance", "ball_radius"])
-            }
+            MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
             MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
                 let keys = ["solver.method", "chain.links", "formulation"];
-                let of_form = matches!(
-                    self.0,
-                    MechanismError::TooCostly {
-                        of: CostOf::Formulation(_),
-                        ..
-                    }
-                );
+                let of_form = matches!(self.0, MechanismError::TooCostly { of: CostOf::Formulation(_), .. });
                 let title = if of_form { keys[2] } else { keys[0] };
                 (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
-            MechanismError::Branching { joints } => {
-                one(joints.first().map_or("", String::as_str), &["clearance"])
-            }
+            MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
         };
         scene.start_error(&title, &keys, self.to_string())
     }

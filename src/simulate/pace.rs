@@ -142,11 +142,7 @@ impl Pacer {
     pub fn limit(&self, capacity: Option<f64>) -> Option<Limit> {
         let reached = self.reached_scale()?;
         let slow = capacity.is_some_and(|capacity| capacity * capacity < self.scale * reached);
-        let limit = if slow {
-            Limit::Computing
-        } else {
-            Limit::Drawing
-        };
+        let limit = if slow { Limit::Computing } else { Limit::Drawing };
         (reached < KEPT_UP * self.scale).then_some(limit)
     }
 
@@ -170,10 +166,7 @@ mod tests {
                 time += step;
                 spent += step / speed;
             }
-            assert!(
-                spent < USUAL_BUDGET + step / speed,
-                "a frame never steps longer than its budget"
-            );
+            assert!(spent < USUAL_BUDGET + step / speed, "a frame never steps longer than its budget");
             pacer.end(dt, target, time, spent);
         }
         time
@@ -208,10 +201,7 @@ mod tests {
         run(&mut pacer, 1, 30.0, 1000.0, 1e-5);
         assert!(pacer.shown() - before <= LONGEST_FRAME + 1e-12);
         let reached = pacer.reached_scale().expect("measured");
-        assert!(
-            (reached - 1.0).abs() < 0.02,
-            "the pause is no frame: {reached}"
-        );
+        assert!((reached - 1.0).abs() < 0.02, "the pause is no frame: {reached}");
     }
 
     #[test]
@@ -228,16 +218,10 @@ mod tests {
             }
             pacer.end(1.0 / 60.0, target, time, 0.0);
             let moved = pacer.shown() - last;
-            assert!(
-                (moved - 1e-4 / 60.0).abs() < 1e-12,
-                "every frame moves by the same amount: {moved}"
-            );
+            assert!((moved - 1e-4 / 60.0).abs() < 1e-12, "every frame moves by the same amount: {moved}");
             last = pacer.shown();
         }
-        assert!(
-            time - last <= step,
-            "the shown time lies within the latest step"
-        );
+        assert!(time - last <= step, "the shown time lies within the latest step");
     }
 
     #[test]
@@ -273,10 +257,7 @@ mod tests {
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
         let longest = drawn(&mut pacer, 100, drawing, speed, step);
-        assert!(
-            longest < drawing + LARGEST_BUDGET + step / speed,
-            "{longest}"
-        );
+        assert!(longest < drawing + LARGEST_BUDGET + step / speed, "{longest}");
         let reached = pacer.reached_scale().expect("measured");
         let share = LARGEST_BUDGET / (LARGEST_BUDGET + drawing);
         assert!((reached / speed - share).abs() < 0.01, "{reached}");
@@ -299,10 +280,7 @@ mod tests {
         drawn(&mut pacer, 11, 0.6, 1000.0, 1e-4);
         // The first frame of the second call is a short one, and the next slow one again the first.
         let passed = pacer.shown() - before;
-        assert!(
-            (passed - (1.0 / 60.0 + 0.25 + 9.0 * 0.6)).abs() < 0.02,
-            "{passed}"
-        );
+        assert!((passed - (1.0 / 60.0 + 0.25 + 9.0 * 0.6)).abs() < 0.02, "{passed}");
     }
 
     #[test]

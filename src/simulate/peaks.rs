@@ -109,16 +109,8 @@ impl PenetrationCubic {
 
     /// Largest penetration rate from `from` to the end of the step, and where: (m/s, theta).
     pub(super) fn fastest(&self, from: f64) -> (f64, f64) {
-        let start = if from > 0.0 {
-            self.at(from).1
-        } else {
-            self.start.rate
-        };
-        let ends = if self.end.rate > start {
-            (self.end.rate, 1.0)
-        } else {
-            (start, from)
-        };
+        let start = if from > 0.0 { self.at(from).1 } else { self.start.rate };
+        let ends = if self.end.rate > start { (self.end.rate, 1.0) } else { (start, from) };
         let d = self.end.penetration - self.start.penetration;
         let (m0, m1) = (self.h * self.start.rate, self.h * self.end.rate);
         let (a, b) = (3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d);
@@ -140,8 +132,7 @@ impl PenetrationCubic {
 
     /// The larger of the normal forces at both ends, and where: (N, theta).
     pub(super) fn stronger_end(&self, c: &Coefficients, memory: &Memory) -> (f64, f64) {
-        let force =
-            |at: &Approach| c.normal_force(at.penetration, at.rate, memory.approach(c, at.rate));
+        let force = |at: &Approach| c.normal_force(at.penetration, at.rate, memory.approach(c, at.rate));
         let (f0, f1) = (force(&self.start), force(&self.end));
         if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
     }
@@ -177,11 +168,7 @@ impl PenetrationCubic {
         }
         let theta = 0.5 * (low + high);
         let inside = force(theta);
-        if inside > ends.0 {
-            (inside, theta)
-        } else {
-            ends
-        }
+        if inside > ends.0 { (inside, theta) } else { ends }
     }
 }
 
@@ -201,22 +188,15 @@ mod tests {
     #[test]
     fn finds_the_peak_of_an_impact_between_coarse_samples() {
         // penetration = a sin(pi t / T): undamped peak at T / 2.
-        let c = Coefficients {
-            damping: 0.0,
-            ..Coefficients::new(&Parameters::default(), 3e-4)
-        };
+        let c = Coefficients { damping: 0.0, ..Coefficients::new(&Parameters::default(), 3e-4) };
         let (a, t_end) = (4e-6, 1e-4);
         let at = |t: f64| {
             let (s, k) = libm::sincos(std::f64::consts::PI * t / t_end);
-            Approach {
-                penetration: a * s,
-                rate: a * std::f64::consts::PI / t_end * k,
-                speed: 0.0,
-            }
+            Approach { penetration: a * s, rate: a * std::f64::consts::PI / t_end * k, speed: 0.0 }
         };
         let (start, end) = (0.43e-4, 0.53e-4);
-        let (force, theta) = PenetrationCubic::new(at(start), at(end), end - start)
-            .strongest(&c, &Memory::begun(&c, 0.1));
+        let (force, theta) =
+            PenetrationCubic::new(at(start), at(end), end - start).strongest(&c, &Memory::begun(&c, 0.1));
         let exact = c.normal_force(a, 0.0, 0.1);
         // The Hermite interpolation error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force to the power
         // 1.5.

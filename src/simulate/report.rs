@@ -31,8 +31,7 @@ pub(super) fn fill(
     out.pose = pose_of(&out.bodies[scene.output.body]);
     out.joints.clear();
     for (j, joint) in scene.ball_joints.iter().enumerate() {
-        out.joints
-            .push(joint_report(mechanism, joint, &memory[j], j));
+        out.joints.push(joint_report(mechanism, joint, &memory[j], j));
     }
     out.closing.clear();
     out.closing.extend(mechanism.closing_loads());
@@ -53,12 +52,7 @@ pub(super) fn fill(
     }
 }
 
-fn joint_report(
-    mechanism: &Mechanism,
-    joint: &crate::scene::BallJoint,
-    memory: &Memory,
-    j: usize,
-) -> JointReport {
+fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, memory: &Memory, j: usize) -> JointReport {
     let motion = mechanism.motion();
     let centre = |a: &crate::scene::Attachment| match a.body {
         None => a.point,

@@ -215,9 +215,7 @@ impl State {
             before: now.clone(),
             now,
             ramps: vec![None; joints],
-            clearances: (0..joints)
-                .map(|j| mechanism.contacts.clearance(j))
-                .collect(),
+            clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
             pull: None,
             flights: vec![None; mechanism.flyers().len()],
             control: Control::new(scene),
@@ -257,8 +255,7 @@ impl Simulation {
         let mut simulation = Self::assembled(&scene, mechanism, state, reference);
         simulation.begin_contacts_at_start();
         simulation.refresh();
-        simulation.state.record.determinant_positive =
-            simulation.mechanism.is_determinant_positive();
+        simulation.state.record.determinant_positive = simulation.mechanism.is_determinant_positive();
         if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
             return Err(MechanismError::OtherBranch.into());
         }
@@ -269,12 +266,7 @@ impl Simulation {
     }
 
     /// Takes `state` as it is.
-    fn assembled(
-        scene: &Arc<Scene>,
-        mechanism: Mechanism,
-        state: State,
-        reference: Reference,
-    ) -> Self {
+    fn assembled(scene: &Arc<Scene>, mechanism: Mechanism, state: State, reference: Reference) -> Self {
         let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
             scene: scene.clone(),
@@ -310,9 +302,7 @@ impl Simulation {
     fn begin_contacts_at_start(&mut self) {
         self.mechanism.measure(self.state.now.t, &self.state.now.y);
         for j in 0..self.state.now.memory.len() {
-            if self.mechanism.contacts.has_clearance(j)
-                && self.mechanism.contacts.gap(j).separation.penetration > 0.0
-            {
+            if self.mechanism.contacts.has_clearance(j) && self.mechanism.contacts.gap(j).separation.penetration > 0.0 {
                 let coefficients = self.mechanism.contacts.coefficients(j);
                 self.state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
                 self.state.record.statistics.impacts[j] += 1;
@@ -326,9 +316,7 @@ impl Simulation {
         self.end_flights();
         self.hold_pieces(true);
         let located = self.locates();
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
         let touching = Touching::by(located, &now.memory);
         let mut evaluator = mechanism.evaluator(touching);
@@ -463,31 +451,13 @@ impl Simulation {
     /// Tries a step of size `h` from the current state; returns the scaled error estimate.
     fn try_step(&mut self, h: f64) -> f64 {
         let located = self.locates();
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            attempt,
-            running,
-            ..
-        } = self;
-        let StepEnd {
-            t, y, k, memory, ..
-        } = &state.now;
+        let Self { mechanism, stepper, state, attempt, running, .. } = self;
+        let StepEnd { t, y, k, memory, .. } = &state.now;
         mechanism.contacts.forget_left_pieces();
         let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
         let end = &mut attempt.end;
         let tolerance = running.solver.tolerance;
-        let error = stepper.attempt(
-            &mut evaluator,
-            *t,
-            h,
-            y,
-            k,
-            &mut end.y,
-            &mut end.k,
-            tolerance,
-        );
+        let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance);
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
         attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
@@ -497,12 +467,7 @@ impl Simulation {
     /// Derivative and gaps at the end `t_end` of the step being taken.
     fn evaluate_end(&mut self, t_end: f64) {
         let located = self.locates();
-        let Self {
-            mechanism,
-            state,
-            attempt,
-            ..
-        } = self;
+        let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
         let mut evaluator = mechanism.evaluator(Touching::by(located, &state.now.memory));
         evaluator.derivative(t_end, &end.y, &mut end.k);
@@ -526,14 +491,9 @@ impl Simulation {
         let t = self.state.now.t;
         let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
         loop {
-            let t_end = if t + step >= limit - NEARLY * step {
-                limit
-            } else {
-                t + step
-            };
+            let t_end = if t + step >= limit - NEARLY * step { limit } else { t + step };
             let (now, end) = (&self.state.now, &mut self.attempt.end);
-            self.mechanism
-                .predict(t_end - t, &now.y, &now.k, &mut self.scratch_k, &mut end.y);
+            self.mechanism.predict(t_end - t, &now.y, &now.k, &mut self.scratch_k, &mut end.y);
             self.attempt.counts = Counts::default();
             match self.accept(t_end, t_end - t) {
                 Err(_) if step > SHORTEST_KINEMATIC_STEP => {
@@ -565,33 +525,21 @@ impl Simulation {
         }
         self.state.record.statistics.count(self.attempt.counts);
         // Beyond the pose the loops may close again on another branch.
-        let passed = self.mechanism.is_determinant_positive()
-            != self.state.record.determinant_positive
+        let passed = self.mechanism.is_determinant_positive() != self.state.record.determinant_positive
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
-        let fault = if passed {
-            Some(StopFault::SingularLoops)
-        } else {
-            self.objection(open, h)
-        };
+        let fault = if passed { Some(StopFault::SingularLoops) } else { self.objection(open, h) };
         if let Some(fault) = fault {
             let solver = &self.running.solver;
             let advice = if passed || open.is_nan() || open > OPEN_LOOP {
                 StopAdvice::Dependent
             } else if solver.method.is_adaptive() {
-                StopAdvice::GentlerMotion {
-                    tolerance: solver.tolerance,
-                }
+                StopAdvice::GentlerMotion { tolerance: solver.tolerance }
             } else {
                 StopAdvice::ShorterStep { step: solver.step }
             };
             return Err(self.stopped(fault, advice));
         }
-        let State {
-            now,
-            before,
-            record,
-            ..
-        } = &mut self.state;
+        let State { now, before, record, .. } = &mut self.state;
         std::mem::swap(before, now);
         std::mem::swap(now, &mut self.attempt.end);
         now.t = t_end;
@@ -607,8 +555,7 @@ impl Simulation {
         self.find_strongest(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        let again =
-            (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
+        let again = (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
         if !again && !located {
             self.track_reactions();
         }
@@ -617,15 +564,8 @@ impl Simulation {
         // The force now depends on the approach speed just found. Where no step needs the derivative at its end, the
         // reactions of ideal joints still do.
         if again {
-            let Self {
-                mechanism,
-                state,
-                scratch_k,
-                ..
-            } = self;
-            let StepEnd {
-                t, y, k, memory, ..
-            } = &mut state.now;
+            let Self { mechanism, state, scratch_k, .. } = self;
+            let StepEnd { t, y, k, memory, .. } = &mut state.now;
             let rate = if mean_rates { scratch_k } else { k };
             let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
             evaluator.derivative(*t, y, rate);
@@ -642,15 +582,7 @@ impl Simulation {
 
     fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {
         let dependent = self.mechanism.has_dependent_rows();
-        Stopped {
-            time: self.state.now.t,
-            fault,
-            advice: if dependent {
-                StopAdvice::Dependent
-            } else {
-                advice
-            },
-        }
+        Stopped { time: self.state.now.t, fault, advice: if dependent { StopAdvice::Dependent } else { advice } }
     }
 
     /// Why there is no ideal motion, or no longer one, to compare the probe with: the ideal mechanism does not start, or
@@ -664,12 +596,8 @@ impl Simulation {
         self.sample(self.state.now.t, &mut Frame::default());
         let mechanism = &mut self.mechanism;
         NotUnique {
-            reactions: (0..mechanism.cut_joints())
-                .filter(|&j| !mechanism.is_reaction_unique(j))
-                .collect(),
-            actuators: (0..mechanism.drives())
-                .filter(|&i| !mechanism.is_actuator_unique(i))
-                .collect(),
+            reactions: (0..mechanism.cut_joints()).filter(|&j| !mechanism.is_reaction_unique(j)).collect(),
+            actuators: (0..mechanism.drives()).filter(|&i| !mechanism.is_actuator_unique(i)).collect(),
         }
     }
 

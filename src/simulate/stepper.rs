@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::integrate::{
-    ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock,
-    RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, System, hermite,
+    ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock, RungeKutta4,
+    SemiImplicitEuler, Stepper, StiffSystem, System, hermite,
 };
 use std::ops::Range;
 
@@ -66,9 +66,7 @@ impl AnyStepper {
         match self {
             Self::Rosenbrock(stiff) => stiff.invalidate(),
             Self::Radau(stiff) => stiff.invalidate(),
-            Self::Automatic {
-                friction, stiff, ..
-            } => {
+            Self::Automatic { friction, stiff, .. } => {
                 friction.invalidate();
                 stiff.invalidate();
             }
@@ -94,12 +92,7 @@ impl AnyStepper {
     /// Largest factor for the step after the latest attempt, besides what its error allows.
     pub(super) fn growth(&self) -> f64 {
         match self {
-            Self::Radau(s)
-            | Self::Automatic {
-                stiff: s,
-                member: Member::Implicit,
-                ..
-            } => s.growth(),
+            Self::Radau(s) | Self::Automatic { stiff: s, member: Member::Implicit, .. } => s.growth(),
             _ => f64::INFINITY,
         }
     }
@@ -107,30 +100,17 @@ impl AnyStepper {
     /// How often the latest attempt factored the matrices of all coordinates, if it did so to step with the automatic choice.
     pub(super) fn factorisations(&self) -> u32 {
         match self {
-            Self::Automatic {
-                stiff,
-                member: Member::Implicit,
-                ..
-            } => stiff.factorisations(),
+            Self::Automatic { stiff, member: Member::Implicit, .. } => stiff.factorisations(),
             _ => 0,
         }
     }
 
     /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
-    pub(super) fn stiffness<S: System>(
-        &self,
-        system: &S,
-        h: f64,
-        y_end: &[f64],
-        k_end: &[f64],
-    ) -> f64 {
+    pub(super) fn stiffness<S: System>(&self, system: &S, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
-            Self::DormandPrince(explicit)
-            | Self::Automatic {
-                explicit,
-                member: Member::Explicit,
-                ..
-            } => explicit.stiffness(system.moving(), h, y_end, k_end),
+            Self::DormandPrince(explicit) | Self::Automatic { explicit, member: Member::Explicit, .. } => {
+                explicit.stiffness(system.moving(), h, y_end, k_end)
+            }
             _ => 0.0,
         }
     }
@@ -150,21 +130,14 @@ impl AnyStepper {
             Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::ImexEuler(s) => s.attempt(system, t, h, y, y_end),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::DormandPrince(s)
-            | Self::Automatic {
-                explicit: s,
-                member: Member::Explicit,
-                ..
-            } => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::Rosenbrock(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::Automatic {
-                friction: s,
-                member: Member::Friction,
-                ..
-            } => s.attempt(&mut system.friction_alone(), t, h, y, k, y_end, k_end),
-            Self::Radau(s) | Self::Automatic { stiff: s, .. } => {
-                s.attempt(system, t, h, y, k, y_end, k_end, tolerance)
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: Member::Explicit, .. } => {
+                s.attempt(system, t, h, y, k, y_end, k_end)
             }
+            Self::Rosenbrock(s) => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::Automatic { friction: s, member: Member::Friction, .. } => {
+                s.attempt(&mut system.friction_alone(), t, h, y, k, y_end, k_end)
+            }
+            Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.attempt(system, t, h, y, k, y_end, k_end, tolerance),
         }
     }
 
@@ -172,11 +145,7 @@ impl AnyStepper {
     /// own nodes, between which its polynomial departs from stiff contacts.
     pub(super) fn interior(&self) -> &'static [f64] {
         match self {
-            Self::Radau(_)
-            | Self::Automatic {
-                member: Member::Implicit,
-                ..
-            } => &Radau::INTERIOR,
+            Self::Radau(_) | Self::Automatic { member: Member::Implicit, .. } => &Radau::INTERIOR,
             _ => &[0.5],
         }
     }
@@ -185,11 +154,7 @@ impl AnyStepper {
     pub(super) fn quadrature(&self) -> &'static [f64] {
         const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
         match self {
-            Self::Radau(_)
-            | Self::Automatic {
-                member: Member::Implicit,
-                ..
-            } => &RADAU,
+            Self::Radau(_) | Self::Automatic { member: Member::Implicit, .. } => &RADAU,
             _ => &[0.0, 0.5, 1.0],
         }
     }
@@ -197,40 +162,20 @@ impl AnyStepper {
     /// Ends the latest attempt at fraction `theta` of it, on its interpolant.
     pub(super) fn truncate(&mut self, theta: f64) {
         match self {
-            Self::DormandPrince(s)
-            | Self::Automatic {
-                explicit: s,
-                member: Member::Explicit,
-                ..
-            } => s.truncate(theta),
-            Self::Radau(s)
-            | Self::Automatic {
-                stiff: s,
-                member: Member::Implicit,
-                ..
-            } => s.truncate(theta),
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: Member::Explicit, .. } => s.truncate(theta),
+            Self::Radau(s) | Self::Automatic { stiff: s, member: Member::Implicit, .. } => s.truncate(theta),
             _ => {}
         }
     }
 
     /// Whether the interpolant is about as accurate as the step's error estimate.
     pub(super) fn ends_on_interpolant(&self) -> bool {
-        matches!(
-            self,
-            Self::DormandPrince(_)
-                | Self::Automatic {
-                    member: Member::Explicit,
-                    ..
-                }
-        )
+        matches!(self, Self::DormandPrince(_) | Self::Automatic { member: Member::Explicit, .. })
     }
 
     /// Whether `attempt` provides the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
-        !matches!(
-            self,
-            Self::SemiImplicitEuler(_) | Self::ImexEuler(_) | Self::RungeKutta4(_)
-        )
+        !matches!(self, Self::SemiImplicitEuler(_) | Self::ImexEuler(_) | Self::RungeKutta4(_))
     }
 
     /// Whether rates are difference quotients over the step: no step needs a derivative at its end.
@@ -255,19 +200,13 @@ impl AnyStepper {
             | Self::ImexEuler(_)
             | Self::RungeKutta4(_)
             | Self::Rosenbrock(_)
-            | Self::Automatic {
-                member: Member::Friction,
-                ..
-            } => {
+            | Self::Automatic { member: Member::Friction, .. } => {
                 let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
                 hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
             }
-            Self::DormandPrince(s)
-            | Self::Automatic {
-                explicit: s,
-                member: Member::Explicit,
-                ..
-            } => s.interpolate(part, theta, h, y, k, out),
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: Member::Explicit, .. } => {
+                s.interpolate(part, theta, h, y, k, out)
+            }
             Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.interpolate(part, theta, y, out),
         }
     }

@@ -83,22 +83,16 @@ pub enum StopFault {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum StopAdvice {
     /// Closed loops cannot stay closed here.
-    #[error(
-        "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance"
-    )]
+    #[error("the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance")]
     Dependent,
     /// Adaptive steps are already as short as needed: the motion itself is beyond the model.
-    #[error(
-        "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {tolerance:e})"
-    )]
+    #[error("try slower drives, a stiffer contact, or a tighter solver.tolerance (now {tolerance:e})")]
     GentlerMotion {
         /// In force.
         tolerance: f64,
     },
     /// The fixed step is too long.
-    #[error(
-        "try a smaller solver.step (now {step:e} s) or solver.method = automatic, or else a stiffer contact"
-    )]
+    #[error("try a smaller solver.step (now {step:e} s) or solver.method = automatic, or else a stiffer contact")]
     ShorterStep {
         /// In force, s.
         step: f64,

@@ -86,10 +86,7 @@ impl Grid {
             2.0 * libm::asin(share.sqrt())
         };
         let azimuth = |sector: usize| TAU * sector as f64 / (to - from) as f64;
-        Edges {
-            polar: [polar(from), polar(to)],
-            azimuth: [azimuth(cell - from), azimuth(cell - from + 1)],
-        }
+        Edges { polar: [polar(from), polar(to)], azimuth: [azimuth(cell - from), azimuth(cell - from + 1)] }
     }
 
     /// Cell that a unit vector points into.
@@ -206,32 +203,19 @@ impl Wear {
         };
         let sockets: Vec<Socket> = scene.ball_joints.iter().map(socket).collect();
         let most = MOST_ENTRIES * sockets.len();
-        Self {
-            presses: Vec::with_capacity(most),
-            latest: Vec::with_capacity(most),
-            sockets,
-            grid,
-        }
+        Self { presses: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
     }
 
     /// Whether it is one of `scene`: nothing in it points elsewhere.
     pub(super) fn fits(&self, scene: &Scene) -> bool {
         let own = Self::new(scene);
-        let cells = |wear: &Self| {
-            wear.sockets
-                .iter()
-                .map(|s| s.cells.len())
-                .collect::<Vec<_>>()
-        };
+        let cells = |wear: &Self| wear.sockets.iter().map(|s| s.cells.len()).collect::<Vec<_>>();
         let has = |joint: usize, cell: usize| {
             let socket = self.sockets.get(joint);
             socket.is_some_and(|socket| cell < socket.cells.len())
         };
         cells(self) == cells(&own)
-            && self
-                .presses
-                .iter()
-                .all(|p| p.instant == 0 && has(p.joint, p.cell))
+            && self.presses.iter().all(|p| p.instant == 0 && has(p.joint, p.cell))
             && self.latest.iter().all(|&(joint, cell, _)| has(joint, cell))
     }
 
@@ -293,12 +277,8 @@ impl Wear {
 
     /// A contact of `joint` begins in direction `direction`, in the axes of the socket's body.
     pub(super) fn begin_contact(&mut self, joint: usize, direction: &Vec3) {
-        let share = Cell {
-            contacts: 1,
-            ..Cell::default()
-        };
-        self.latest
-            .push((joint, self.cell(joint, direction), share));
+        let share = Cell { contacts: 1, ..Cell::default() };
+        self.latest.push((joint, self.cell(joint, direction), share));
     }
 
     /// Books a step of size `h` with the quadrature weights `weights`.
@@ -325,11 +305,7 @@ impl Wear {
 
 fn axes(opening: &Vec3) -> Mat3 {
     let z = opening.normalize();
-    let near = if z.x.abs() > FRAC_1_SQRT_2 {
-        Vec3::y()
-    } else {
-        Vec3::x()
-    };
+    let near = if z.x.abs() > FRAC_1_SQRT_2 { Vec3::y() } else { Vec3::x() };
     let x = (near - z * z.dot(&near)).normalize();
     let y = z.cross(&x);
     Mat3::from_rows(&[x.transpose(), y.transpose(), z.transpose()])
@@ -354,10 +330,7 @@ mod tests {
             for cell in 0..n {
                 let Edges { polar, azimuth } = grid.edges(cell);
                 let area = (azimuth[1] - azimuth[0]) * (libm::cos(polar[0]) - libm::cos(polar[1]));
-                assert!(
-                    (area * n as f64 / (4.0 * PI) - 1.0).abs() < 1e-11,
-                    "{n}: {cell}"
-                );
+                assert!((area * n as f64 / (4.0 * PI) - 1.0).abs() < 1e-11, "{n}: {cell}");
                 whole += area;
                 // Its middle is in it, and in no other.
                 let middle = |[a, b]: [f64; 2]| 0.5 * (a + b);
@@ -379,10 +352,7 @@ mod tests {
             let Edges { polar, azimuth } = grid.edges(zone.start);
             let height = polar[1] - polar[0];
             let width = (azimuth[1] - azimuth[0]) * libm::sin(0.5 * (polar[0] + polar[1]));
-            assert!(
-                (0.7..1.4).contains(&(width / height)),
-                "{zone:?}: {width} by {height}"
-            );
+            assert!((0.7..1.4).contains(&(width / height)), "{zone:?}: {width} by {height}");
         }
     }
 
@@ -401,11 +371,7 @@ mod tests {
                 let cell = grid.cell(&towards(libm::acos(z), azimuth));
                 hit[cell] += 1;
                 let edges = grid.edges(cell);
-                let azimuth = if azimuth < 0.0 {
-                    azimuth + TAU
-                } else {
-                    azimuth
-                };
+                let azimuth = if azimuth < 0.0 { azimuth + TAU } else { azimuth };
                 assert!(edges.azimuth[0] <= azimuth && azimuth <= edges.azimuth[1]);
             }
         }

@@ -6,8 +6,7 @@ use super::drawn::DrawnJoint;
 use super::instances::{bar, push_label};
 use super::theme::Material;
 use super::{
-    Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot,
-    Tick, to_f32,
+    Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot, Tick, to_f32,
 };
 use crate::scene::{ElementLook, format_quantity_digits};
 
@@ -40,12 +39,7 @@ pub(super) struct Arrow {
 impl Arrow {
     /// With a radius of at most `radius`.
     pub fn new(tail: Vec3, along: Vec3, radius: f32) -> Self {
-        Self {
-            tail,
-            along,
-            radius: radius.min(along.length() / STOUTEST),
-            broken: false,
-        }
+        Self { tail, along, radius: radius.min(along.length() / STOUTEST), broken: false }
     }
 
     fn neck(&self) -> Vec3 {
@@ -57,32 +51,14 @@ impl Arrow {
         if !(self.radius > 0.0 && self.radius.is_finite()) {
             return;
         }
-        let material = Material {
-            colour,
-            roughness: 0.55,
-            metal: 0.0,
-        };
+        let material = Material { colour, roughness: 0.55, metal: 0.0 };
         let (neck, radius) = (self.neck(), self.radius);
-        let pieces = if self.broken {
-            &BREAK[..]
-        } else {
-            &[[0.0, 1.0]][..]
-        };
+        let pieces = if self.broken { &BREAK[..] } else { &[[0.0, 1.0]][..] };
         for [from, to] in pieces {
-            let piece = bar(
-                self.tail + neck * *from,
-                neck * (to - from),
-                radius,
-                material,
-            );
+            let piece = bar(self.tail + neck * *from, neck * (to - from), radius, material);
             layer.push(Mesh::Cylinder, piece);
         }
-        let head = bar(
-            self.tail + neck,
-            self.along - neck,
-            HEAD[1] * radius,
-            material,
-        );
+        let head = bar(self.tail + neck, self.along - neck, HEAD[1] * radius, material);
         layer.push(Mesh::Cone, head);
     }
 
@@ -155,12 +131,7 @@ fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
 }
 
 /// Arrows of the current forces, marks of past peaks, and their legend.
-pub(super) fn push_forces(
-    shot: &Shot<'_>,
-    joints: &[DrawnJoint],
-    palette: &Palette,
-    out: &mut DrawList,
-) {
+pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Palette, out: &mut DrawList) {
     let options = &shot.options.arrows;
     let at_joints = (options.normal || options.friction) && !joints.is_empty();
     let elements = shot.scene.elements.iter().zip(&shot.frame.elements);
@@ -181,10 +152,7 @@ pub(super) fn push_forces(
         let (length, broken) = arrow_length(force.length(), reference, options.scaling);
         let (length, pixel) = ruler.measure(tail, along, length * ARROW_LENGTH * height)?;
         clipped |= broken;
-        Some(Arrow {
-            broken,
-            ..Arrow::new(tail, along * length, thickest * height * pixel)
-        })
+        Some(Arrow { broken, ..Arrow::new(tail, along * length, thickest * height * pixel) })
     };
     let reports = joints.iter().zip(&shot.frame.joints);
     for (joint, report) in reports.filter(|_| at_joints) {
@@ -192,10 +160,9 @@ pub(super) fn push_forces(
         // The wall pushes the ball away from the contact point, which therefore lies opposite to the normal force.
         let contact = joint.ball_centre - normal.normalize_or_zero() * joint.ball_radius;
         let friction = to_f32(&report.friction_force);
-        for (shown, force, colour) in [
-            (options.normal, normal, palette.normal),
-            (options.friction, friction, palette.friction),
-        ] {
+        for (shown, force, colour) in
+            [(options.normal, normal, palette.normal), (options.friction, friction, palette.friction)]
+        {
             if let Some(arrow) = shown.then(|| arrow(force, contact)).flatten() {
                 arrow.push(&mut out.arrows, colour);
             }
@@ -231,13 +198,7 @@ pub(super) fn push_forces(
             let width = OUTLINE * shot.options.arrows.thickness * shot.pixels_per_point;
             arrow.outline(ruler.eye, colour, width, &mut out.marks);
             let kind = LabelKind::Peak(mark.joint);
-            push_label(
-                out,
-                &words(&mark).into(),
-                kind,
-                arrow.tail + arrow.along,
-                colour,
-            );
+            push_label(out, &words(&mark).into(), kind, arrow.tail + arrow.along, colour);
         }
     }
     let marks: &[f32] = match options.scaling {
@@ -288,10 +249,7 @@ fn words(mark: &Mark) -> String {
         age => (age, "s"),
     };
     let force = format_quantity_digits(f64::from(mark.force.length()), "N", 3);
-    format!(
-        "peak {force}, {} {unit} ago",
-        format_quantity_digits(ago, "", 2)
-    )
+    format!("peak {force}, {} {unit} ago", format_quantity_digits(ago, "", 2))
 }
 
 /// An arrow of the triad.
@@ -309,10 +267,7 @@ mod tests {
     fn a_line_across_the_sight_has_its_length_in_pixels_everywhere() {
         const SIZE: [u32; 2] = [1600, 700];
         const PIXELS: f32 = 154.0;
-        let bounds = Bounds {
-            centre: Vec3::new(0.1, -0.2, 0.3),
-            radius: 0.4,
-        };
+        let bounds = Bounds { centre: Vec3::new(0.1, -0.2, 0.3), radius: 0.4 };
         let mut checked = 0;
         for (field_of_view, zoom) in [(0.6, 1.0), (0.6, 12.0), (1.2, 1.0), (0.2, 0.3)] {
             let mut camera = Camera::new(SignedAxis::PlusX, bounds);
@@ -355,10 +310,7 @@ mod tests {
 
     #[test]
     fn an_arrow_that_would_be_too_long_is_broken() {
-        let arrow = Arrow {
-            broken: true,
-            ..Arrow::new(Vec3::ZERO, Vec3::X, 0.01)
-        };
+        let arrow = Arrow { broken: true, ..Arrow::new(Vec3::ZERO, Vec3::X, 0.01) };
         let mut layer = Layer::default();
         layer.clear(Mesh::SHARED);
         arrow.push(&mut layer, Colour::hex(0));
@@ -369,12 +321,7 @@ mod tests {
 
     #[test]
     fn a_peak_is_told_with_three_digits_and_its_age_in_a_fitting_unit() {
-        let mark = |age: f64| Mark {
-            joint: 0,
-            force: Vec3::new(0.0, 870.6, 0.0),
-            age,
-            strength: 1.0,
-        };
+        let mark = |age: f64| Mark { joint: 0, force: Vec3::new(0.0, 870.6, 0.0), age, strength: 1.0 };
         assert_eq!(words(&mark(2.14e-3)), "peak 871 N, 2.1 ms ago");
         assert_eq!(words(&mark(38.4e-6)), "peak 871 N, 38 µs ago");
         assert_eq!(words(&mark(0.312)), "peak 871 N, 310 ms ago");

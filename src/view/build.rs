@@ -15,8 +15,8 @@ use super::near::Near;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
-    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
-    MeshData, Palette, Shot, ViewOptions, WearMap, to_f32,
+    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette,
+    Shot, ViewOptions, WearMap, to_f32,
 };
 use crate::scene::{ElementLook, Role, Scene, SignedAxis};
 use crate::simulate::{ContactState, Frame, JointReport};
@@ -68,10 +68,7 @@ impl SceneView {
         let symbols = symbols(scene, &parts, frame, &joints, without.radius);
         let extents = extents(&parts, &symbols, frame, &joints);
         let bounds = bounds(&extents);
-        let lowest = extents
-            .iter()
-            .map(|(p, r)| p.dot(down) + r)
-            .fold(f32::NEG_INFINITY, f32::max);
+        let lowest = extents.iter().map(|(p, r)| p.dot(down) + r).fold(f32::NEG_INFINITY, f32::max);
         let floor = match scene.view.floor {
             Some(floor) => floor as f32,
             // Leave room for motion.
@@ -83,8 +80,7 @@ impl SceneView {
         let mut watched = Vec::new();
         for part in moving {
             let mut ends = Vec::new();
-            part.place(frame, &joints)
-                .extent(|point, _| ends.push(point));
+            part.place(frame, &joints).extent(|point, _| ends.push(point));
             let middle = ends.iter().sum::<Vec3>() / ends.len().max(1) as f32;
             watched.push(middle);
             // A bar is long: include its ends.
@@ -100,11 +96,7 @@ impl SceneView {
             at_start: joints,
             parts,
             plates: plates.into(),
-            joint_names: scene
-                .ball_joints
-                .iter()
-                .map(|joint| joint.name.as_str().into())
-                .collect(),
+            joint_names: scene.ball_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
             axis_names: ["X", "Y", "Z", "g"].map(Arc::from),
             bounds,
             down: scene.view.down,
@@ -128,14 +120,7 @@ impl SceneView {
     }
 
     /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction is kept.
-    pub fn fit(
-        &self,
-        camera: &mut Camera,
-        scene: &Scene,
-        frame: &Frame,
-        options: &ViewOptions,
-        size: [u32; 2],
-    ) {
+    pub fn fit(&self, camera: &mut Camera, scene: &Scene, frame: &Frame, options: &ViewOptions, size: [u32; 2]) {
         camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 3]);
     }
 
@@ -196,14 +181,7 @@ impl SceneView {
     }
 
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
-    pub fn close_up(
-        &self,
-        camera: &mut Camera,
-        joint: usize,
-        scene: &Scene,
-        frame: &Frame,
-        options: &ViewOptions,
-    ) {
+    pub fn close_up(&self, camera: &mut Camera, joint: usize, scene: &Scene, frame: &Frame, options: &ViewOptions) {
         let m = self.magnification(scene, frame, options);
         if let Some(drawn) = drawn::joints(scene, frame, m).get(joint) {
             camera.close_up(drawn.socket_centre, drawn.opening, 2.2 * drawn.outer);
@@ -214,13 +192,7 @@ impl SceneView {
     pub fn build(&self, shot: &Shot<'_>, out: &mut DrawList) {
         let near = Near::of(shot);
         let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
-        let Shot {
-            scene,
-            frame,
-            options,
-            camera,
-            ..
-        } = *shot;
+        let Shot { scene, frame, options, camera, .. } = *shot;
         let palette = Palette::of(options.theme);
         self.start(shot, &palette, out);
 
@@ -231,21 +203,14 @@ impl SceneView {
         let eye = camera.eye();
         for (i, part) in self.parts.iter().enumerate() {
             let opacity = self.opacity(i, eye + to_f32(&frame.origin));
-            let layer = if opacity < 1.0 {
-                &mut out.faded
-            } else {
-                &mut out.solid
-            };
+            let layer = if opacity < 1.0 { &mut out.faded } else { &mut out.solid };
             let material = part.material(&palette).with_opacity(opacity);
             push_solid(layer, &part.place(frame, &joints), material);
         }
         for symbol in self.symbols.iter().filter(|_| options.hinges) {
             let [from, to] = symbol.ends(frame);
             let material = palette.material(symbol.role);
-            out.solid.push(
-                Mesh::Cylinder,
-                bar(from, to - from, symbol.radius, material),
-            );
+            out.solid.push(Mesh::Cylinder, bar(from, to - from, symbol.radius, material));
         }
         for (i, joint) in joints.iter().enumerate() {
             let wall = if options.sockets { joint.inner } else { 0.0 };
@@ -263,10 +228,7 @@ impl SceneView {
             }
             let flash = shot.marks.flash(i);
             if options.flash && flash > 0.02 {
-                let light = Material {
-                    colour: palette.flash.with_opacity(flash),
-                    ..palette.ball
-                };
+                let light = Material { colour: palette.flash.with_opacity(flash), ..palette.ball };
                 let halo = instances::ball(joint.socket_centre, HALO * joint.outer, light);
                 out.halos.push(halo);
             }
@@ -330,10 +292,7 @@ impl SceneView {
         (out.legend, out.wear_scale) = (None, None);
         out.size = shot.size;
         out.eye = shot.camera.view(shot.size);
-        out.background = Background {
-            top: palette.sky,
-            bottom: palette.ground,
-        };
+        out.background = Background { top: palette.sky, bottom: palette.ground };
         out.exposure = palette.exposure;
         out.quality = shot.options.quality;
         (out.outline, out.rim) = (palette.outline, palette.rim);
@@ -383,9 +342,7 @@ impl SceneView {
         let scale = shot.pixels_per_point * camera.metres_per_pixel(shot.size);
         let (right, up, _) = camera.axes();
         let corner = {
-            let [width, height] = shot
-                .size
-                .map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
+            let [width, height] = shot.size.map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
             camera.target - right * (width - 62.0 * scale) - up * (height - 62.0 * scale)
         };
         // Perspective would distort it there: sheared so that it looks as it would in the centre.
@@ -394,71 +351,34 @@ impl SceneView {
         let sheared = |point: Vec3| point - lean * (point - corner).dot(back);
         for (i, axis) in Vec3::AXES.into_iter().enumerate() {
             let colour = palette.axes[i];
-            push_arrow(
-                &mut out.overlay,
-                corner,
-                axis * (38.0 * scale),
-                1.9 * scale,
-                colour,
-            );
-            push_label(
-                out,
-                &self.axis_names[i],
-                LabelKind::Axis,
-                sheared(corner + axis * (47.0 * scale)),
-                colour,
-            );
+            push_arrow(&mut out.overlay, corner, axis * (38.0 * scale), 1.9 * scale, colour);
+            push_label(out, &self.axis_names[i], LabelKind::Axis, sheared(corner + axis * (47.0 * scale)), colour);
         }
         let gravity = to_f32(&shot.scene.gravity).try_normalize();
         if let Some(gravity) = gravity.filter(|_| points[0] >= SMALLEST_WITH_GRAVITY) {
             let length = gravity * (34.0 * scale);
             let start = corner + right * (74.0 * scale) - length * 0.5;
-            push_arrow(
-                &mut out.overlay,
-                start,
-                length,
-                1.9 * scale,
-                palette.gravity,
-            );
+            push_arrow(&mut out.overlay, start, length, 1.9 * scale, palette.gravity);
             let anchor = start + length * 0.5 + right * (13.0 * scale);
-            push_label(
-                out,
-                &self.axis_names[3],
-                LabelKind::Gravity,
-                sheared(anchor),
-                palette.gravity,
-            );
+            push_label(out, &self.axis_names[3], LabelKind::Gravity, sheared(anchor), palette.gravity);
         }
         for instance in out.overlay.by_mesh.iter_mut().flatten() {
             let rows = instance.world_from_mesh.map(Vec4::from);
             // Depth relative to the corner, of the mesh's axes and origin.
-            let depth =
-                rows[0] * back.x + rows[1] * back.y + rows[2] * back.z - Vec4::W * corner.dot(back);
+            let depth = rows[0] * back.x + rows[1] * back.y + rows[2] * back.z - Vec4::W * corner.dot(back);
             instance.world_from_mesh = [0, 1, 2].map(|i| (rows[i] - lean[i] * depth).to_array());
         }
     }
 }
 
 /// Spheres (centre, radius) whose convex hull contains everything drawn.
-fn extents(
-    parts: &[DrawnShape],
-    symbols: &[Symbol],
-    frame: &Frame,
-    joints: &[DrawnJoint],
-) -> Vec<(Vec3, f32)> {
-    let ends = symbols
-        .iter()
-        .flat_map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)));
+fn extents(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
+    let ends = symbols.iter().flat_map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)));
     let mut extents: Vec<(Vec3, f32)> = ends.collect();
     for part in parts {
-        part.place(frame, joints)
-            .extent(|centre, radius| extents.push((centre, radius)));
+        part.place(frame, joints).extent(|centre, radius| extents.push((centre, radius)));
     }
-    extents.extend(
-        joints
-            .iter()
-            .map(|joint| (joint.socket_centre, joint.outer)),
-    );
+    extents.extend(joints.iter().map(|joint| (joint.socket_centre, joint.outer)));
     let springs = frame.elements.iter().map(|element| element.points);
     let springs = springs.filter(|[from, to]| from != to);
     extents.extend(springs.flatten().map(|end| (to_f32(&end), 0.0)));
@@ -470,29 +390,16 @@ fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
     let low = extents.iter().map(|&(p, r)| p - r).reduce(Vec3::min);
     let high = extents.iter().map(|&(p, r)| p + r).reduce(Vec3::max);
     let (Some(low), Some(high)) = (low, high) else {
-        return Bounds {
-            centre: Vec3::ZERO,
-            radius: 0.1,
-        };
+        return Bounds { centre: Vec3::ZERO, radius: 0.1 };
     };
     let centre = (low + high) / 2.0;
-    let radius = extents
-        .iter()
-        .map(|&(p, r)| p.distance(centre) + r)
-        .fold(0.0, f32::max);
-    Bounds {
-        centre,
-        radius: radius.max(1e-4),
-    }
+    let radius = extents.iter().map(|&(p, r)| p.distance(centre) + r).fold(0.0, f32::max);
+    Bounds { centre, radius: radius.max(1e-4) }
 }
 
 /// A magnification in words, without the multiplication sign.
 pub(super) fn times(x: f32) -> String {
-    if (x - x.round()).abs() < 0.05 {
-        format!("{x:.0}")
-    } else {
-        format!("{x:.1}")
-    }
+    if (x - x.round()).abs() < 0.05 { format!("{x:.0}") } else { format!("{x:.1}") }
 }
 
 fn magnification_text(drawn: f32, asked: f32) -> String {
@@ -505,48 +412,23 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
 
 pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
     match *solid {
-        Solid::Bar {
-            from,
-            to,
-            radius,
-            kind,
-            capped,
-        } => {
+        Solid::Bar { from, to, radius, kind, capped } => {
             if from == to {
                 return;
             }
-            let mesh = if kind == BarKind::Cone {
-                Mesh::Cone
-            } else {
-                Mesh::Cylinder
-            };
+            let mesh = if kind == BarKind::Cone { Mesh::Cone } else { Mesh::Cylinder };
             layer.push(mesh, bar(from, to - from, radius, material));
             if kind == BarKind::Capsule {
-                for (end, _) in [from, to]
-                    .into_iter()
-                    .zip(capped)
-                    .filter(|(_, capped)| *capped)
-                {
+                for (end, _) in [from, to].into_iter().zip(capped).filter(|(_, capped)| *capped) {
                     layer.push(Mesh::Sphere, instances::ball(end, radius, material));
                 }
             }
         }
-        Solid::Box {
-            centre,
-            size,
-            rotation,
-        } => {
-            layer.push(
-                Mesh::Cube,
-                placed(rotation * Mat3::from_diagonal(size), centre, material),
-            );
+        Solid::Box { centre, size, rotation } => {
+            layer.push(Mesh::Cube, placed(rotation * Mat3::from_diagonal(size), centre, material));
         }
-        Solid::Ball { centre, radius } => {
-            layer.push(Mesh::Sphere, instances::ball(centre, radius, material))
-        }
-        Solid::Own { mesh, pose, .. } => {
-            layer.push(mesh, placed(pose.rotation, pose.position, material))
-        }
+        Solid::Ball { centre, radius } => layer.push(Mesh::Sphere, instances::ball(centre, radius, material)),
+        Solid::Own { mesh, pose, .. } => layer.push(mesh, placed(pose.rotation, pose.position, material)),
     }
 }
 
@@ -558,19 +440,12 @@ fn touch(report: &JointReport) -> [f32; 4] {
 }
 
 /// The halves of all sockets, from far to near as `eye` sees them.
-fn push_sockets(
-    frame: &Frame,
-    joints: &[DrawnJoint],
-    eye: Vec3,
-    glass: Material,
-    out: &mut Vec<Instance>,
-) {
+fn push_sockets(frame: &Frame, joints: &[DrawnJoint], eye: Vec3, glass: Material, out: &mut Vec<Instance>) {
     // The half that is cut away stays faintly visible: a ball in contact there is still in its socket.
     let cut_away = glass.with_opacity(0.15 * glass.colour.0[3]);
     // Of two spheres that do not meet, the one with the shorter tangent from the eye is in front: the eye is on its side of
     // the plane between them.
-    let tangent =
-        |joint: &DrawnJoint| joint.socket_centre.distance_squared(eye) - joint.outer * joint.outer;
+    let tangent = |joint: &DrawnJoint| joint.socket_centre.distance_squared(eye) - joint.outer * joint.outer;
     let mut far_first: Vec<_> = joints.iter().zip(&frame.joints).collect();
     far_first.sort_by(|(a, _), (b, _)| tangent(b).total_cmp(&tangent(a)));
     for (joint, report) in far_first {
@@ -578,9 +453,7 @@ fn push_sockets(
             let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
             Instance {
                 inner_radius: joint.inner / joint.outer,
-                other: (-joint.ball_to_socket())
-                    .extend(joint.ball_radius)
-                    .to_array(),
+                other: (-joint.ball_to_socket()).extend(joint.ball_radius).to_array(),
                 touch: touch(report),
                 ..placed(turn * joint.outer, joint.socket_centre, material)
             }

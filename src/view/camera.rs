@@ -105,12 +105,7 @@ impl Camera {
 
     /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction is
     /// kept. `reserved` pixels at the left, the top and the bottom are kept free.
-    pub(super) fn fit_balls(
-        &mut self,
-        balls: &[(Vec3, f32)],
-        size: [u32; 2],
-        [left, top, bottom]: [f32; 3],
-    ) {
+    pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2], [left, top, bottom]: [f32; 3]) {
         const MARGIN: f32 = 1.16;
         let axes = self.axes();
         let [width, height] = size.map(|n| n.max(1) as f32);
@@ -118,10 +113,7 @@ impl Camera {
         let pixel = 2.0 * (self.field_of_view / 2.0).tan() / height;
         let free_of = |edge: f32, low: f32, high: f32| {
             let keep = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
-            let (middle, half) = (
-                keep * (low - high) / 2.0,
-                (edge - keep * (low + high)) / 2.0 / MARGIN,
-            );
+            let (middle, half) = (keep * (low - high) / 2.0, (edge - keep * (low + high)) / 2.0 / MARGIN);
             (pixel * (half - middle), pixel * (half + middle))
         };
         // Along one screen axis, up to slopes `low` and `high`: a sphere at (x, depth z towards the eye) is inside both
@@ -142,9 +134,7 @@ impl Camera {
         let (y, from_y) = span(axes.1, free_of(height, bottom, top));
         let eye_depth = from_x.max(from_y);
         let depths = || balls.iter().map(|(p, _)| p.dot(axes.2));
-        let middle = (depths().fold(f32::INFINITY, f32::min)
-            + depths().fold(f32::NEG_INFINITY, f32::max))
-            / 2.0;
+        let middle = (depths().fold(f32::INFINITY, f32::min) + depths().fold(f32::NEG_INFINITY, f32::max)) / 2.0;
         let (x, y) = (x(eye_depth), y(eye_depth));
         if eye_depth - middle > 0.0 && x.is_finite() && y.is_finite() {
             self.target = axes.0 * x + axes.1 * y + axes.2 * middle;
@@ -263,13 +253,9 @@ impl Camera {
         let position = self.eye();
         let aspect = size[0].max(1) as f32 / size[1].max(1) as f32;
         let (near, far) = (self.distance * 0.02, self.distance * 50.0);
-        let clip_from_view =
-            glam::camera::rh::proj::directx::perspective(self.field_of_view, aspect, near, far);
+        let clip_from_view = glam::camera::rh::proj::directx::perspective(self.field_of_view, aspect, near, far);
         let view_from_world: Mat4 = glam::camera::rh::view::look_to_mat4(position, -back, up);
-        Eye {
-            clip_from_world: clip_from_view * view_from_world,
-            position,
-        }
+        Eye { clip_from_world: clip_from_view * view_from_world, position }
     }
 
     /// Pixel of a world point; `None` behind the eye.
@@ -280,8 +266,7 @@ impl Camera {
     /// Ray through a pixel: origin and unit direction.
     pub fn ray(&self, pixel: Vec2, size: [u32; 2]) -> (Vec3, Vec3) {
         let (right, up, back) = self.axes();
-        let off_centre =
-            (pixel - Vec2::new(size[0] as f32, size[1] as f32) / 2.0) * self.metres_per_pixel(size);
+        let off_centre = (pixel - Vec2::new(size[0] as f32, size[1] as f32) / 2.0) * self.metres_per_pixel(size);
         let through = right * off_centre.x - up * off_centre.y - back * self.distance;
         (self.eye(), through.normalize())
     }
@@ -312,13 +297,7 @@ mod tests {
     const SIZE: [u32; 2] = [1280, 720];
 
     fn camera(down: SignedAxis) -> Camera {
-        Camera::new(
-            down,
-            Bounds {
-                centre: Vec3::new(0.2, -0.1, 0.05),
-                radius: 0.3,
-            },
-        )
+        Camera::new(down, Bounds { centre: Vec3::new(0.2, -0.1, 0.05), radius: 0.3 })
     }
 
     #[test]
@@ -330,13 +309,8 @@ mod tests {
                 camera.preset(preset);
                 let down = crate::view::to_f32(&axis.unit());
                 let here = camera.project(camera.target, SIZE).expect("before the eye");
-                let below = camera
-                    .project(camera.target + 0.02 * down, SIZE)
-                    .expect("before the eye");
-                assert!(
-                    below.y > here.y + 5.0,
-                    "{axis:?} {preset:?}: {here} {below}"
-                );
+                let below = camera.project(camera.target + 0.02 * down, SIZE).expect("before the eye");
+                assert!(below.y > here.y + 5.0, "{axis:?} {preset:?}: {here} {below}");
                 assert!((below.x - here.x).abs() < 1e-2, "{axis:?} {preset:?}");
             }
         }
@@ -345,11 +319,7 @@ mod tests {
     #[test]
     fn a_ray_through_a_pixel_meets_the_point_that_projects_there() {
         let camera = camera(SignedAxis::PlusX);
-        for point in [
-            Vec3::new(0.1, 0.0, 0.2),
-            Vec3::new(0.3, -0.2, -0.1),
-            camera.target,
-        ] {
+        for point in [Vec3::new(0.1, 0.0, 0.2), Vec3::new(0.3, -0.2, -0.1), camera.target] {
             let pixel = camera.project(point, SIZE).expect("before the eye");
             let (origin, direction) = camera.ray(pixel, SIZE);
             let miss = (point - origin).cross(direction).length();
@@ -411,11 +381,8 @@ mod tests {
 
     #[test]
     fn fitting_touches_an_edge_and_crosses_none() {
-        let balls = [
-            (Vec3::new(0.5, 0.0, 0.0), 0.05),
-            (Vec3::new(-0.3, 0.2, 0.1), 0.1),
-            (Vec3::new(0.0, -0.4, 0.2), 0.0),
-        ];
+        let balls =
+            [(Vec3::new(0.5, 0.0, 0.0), 0.05), (Vec3::new(-0.3, 0.2, 0.1), 0.1), (Vec3::new(0.0, -0.4, 0.2), 0.0)];
         for (size, reserved) in [
             ([1280, 720], [0.0; 3]),
             ([300, 900], [0.0; 3]),
@@ -431,8 +398,7 @@ mod tests {
                 // Points of each ball, seen from all sides.
                 for k in 0..200 {
                     let (a, b) = (k as f32 * 0.7, k as f32 * 0.31);
-                    let on =
-                        centre + radius * Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
+                    let on = centre + radius * Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
                     let p = camera.project(on, size).expect("before the eye");
                     least = least
                         .min((p.x - reserved[0]) / free_w)
@@ -442,10 +408,7 @@ mod tests {
                 }
             }
             // The margin of 16 % leaves 0.5 (1 - 1/1.16) = 6.9 % at the tightest edge.
-            assert!(
-                (0.06..0.08).contains(&least),
-                "{size:?} {reserved:?}: {least}"
-            );
+            assert!((0.06..0.08).contains(&least), "{size:?} {reserved:?}: {least}");
         }
     }
 }

@@ -11,16 +11,12 @@ use crate::simulate::Frame;
 
 /// Distance along `ray` to the solid.
 pub(super) fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
-    with_shape(solid, |shape, pose| {
-        shape.cast_ray(pose, ray, f32::MAX, true)
-    })?
+    with_shape(solid, |shape, pose| shape.cast_ray(pose, ray, f32::MAX, true))?
 }
 
 /// Distance from `point` to the solid, 0 inside it.
 pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
-    with_shape(solid, |shape, pose| {
-        shape.distance_to_point(pose, point, true)
-    })
+    with_shape(solid, |shape, pose| shape.distance_to_point(pose, point, true))
 }
 
 /// Queries the solid's placed shape; `None` if it has none.
@@ -32,13 +28,7 @@ fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> 
         return None;
     }
     Some(match *solid {
-        Solid::Bar {
-            from,
-            to,
-            radius,
-            kind,
-            ..
-        } => {
+        Solid::Bar { from, to, radius, kind, .. } => {
             let half = from.distance(to) / 2.0;
             if half == 0.0 {
                 return None;
@@ -52,22 +42,12 @@ fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> 
                 BarKind::Cone => ask(&Cone::new(half, radius), &pose),
             }
         }
-        Solid::Box {
-            centre,
-            size,
-            rotation,
-        } => {
+        Solid::Box { centre, size, rotation } => {
             let pose = ParryPose::from_parts(centre, Quat::from_mat3(&rotation));
             ask(&Cuboid::new(size / 2.0), &pose)
         }
-        Solid::Ball { centre, radius } => {
-            ask(&Ball::new(radius), &ParryPose::from_translation(centre))
-        }
-        Solid::Own {
-            shape,
-            pose: Pose { position, rotation },
-            ..
-        } => {
+        Solid::Ball { centre, radius } => ask(&Ball::new(radius), &ParryPose::from_translation(centre)),
+        Solid::Own { shape, pose: Pose { position, rotation }, .. } => {
             let pose = ParryPose::from_parts(position, Quat::from_mat3(&rotation));
             ask(&**shape?, &pose)
         }
@@ -80,12 +60,7 @@ pub(super) fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
 
 /// Outer radius, m, to which the socket of each ball joint may grow before it intersects the part that carries it, with
 /// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
-pub(super) fn room(
-    scene: &Scene,
-    parts: &[DrawnShape],
-    frame: &Frame,
-    joints: &[DrawnJoint],
-) -> Vec<f32> {
+pub(super) fn room(scene: &Scene, parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<f32> {
     let room_of = |(i, joint): (usize, &DrawnJoint)| {
         let body = scene.ball_joints[i].socket.body;
         parts

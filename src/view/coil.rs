@@ -12,14 +12,7 @@ const TURNS: f32 = 9.0;
 const SEGMENTS: u16 = 96;
 
 /// Adds a coil of `radius` (m) from `from` to `to` in lines of `width` pixels.
-pub(super) fn push_coil(
-    from: Vec3,
-    to: Vec3,
-    radius: f32,
-    width: f32,
-    colour: Colour,
-    lines: &mut Vec<Line>,
-) {
+pub(super) fn push_coil(from: Vec3, to: Vec3, radius: f32, width: f32, colour: Colour, lines: &mut Vec<Line>) {
     let Some(along) = (to - from).try_normalize() else {
         return;
     };
@@ -57,10 +50,6 @@ mod tests {
         }
         assert!(widest > 0.0199);
         push_coil(from, from, 0.02, 2.0, Colour([1.0; 4]), &mut lines);
-        assert_eq!(
-            lines.len(),
-            usize::from(SEGMENTS),
-            "no coil between equal points"
-        );
+        assert_eq!(lines.len(), usize::from(SEGMENTS), "no coil between equal points");
     }
 }

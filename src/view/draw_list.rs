@@ -59,11 +59,7 @@ pub struct MeshData {
 impl MeshData {
     /// Middle and half size of the smallest box about it.
     pub fn bounds(&self) -> [Vec3; 2] {
-        let points = || {
-            self.vertices
-                .iter()
-                .map(|(p, _)| Vec3::new(p[0], p[1], p[2]))
-        };
+        let points = || self.vertices.iter().map(|(p, _)| Vec3::new(p[0], p[1], p[2]));
         let low = points().reduce(Vec3::min).unwrap_or_default();
         let high = points().reduce(Vec3::max).unwrap_or_default();
         [(low + high) / 2.0, (high - low) / 2.0]
@@ -141,14 +137,7 @@ pub struct Line {
 
 impl Line {
     pub(super) fn new(from: Vec3, to: Vec3, width: f32, [start, end]: [Colour; 2]) -> Self {
-        Self {
-            from: from.to_array(),
-            width,
-            to: to.to_array(),
-            pad: 0.0,
-            from_colour: start.0,
-            to_colour: end.0,
-        }
+        Self { from: from.to_array(), width, to: to.to_array(), pad: 0.0, from_colour: start.0, to_colour: end.0 }
     }
 }
 
@@ -341,21 +330,9 @@ impl Default for DrawList {
         let ground = Colour::hex(0xFFFFFF);
         Self {
             size: [0, 0],
-            eye: Eye {
-                clip_from_world: Mat4::IDENTITY,
-                position: Vec3::ZERO,
-            },
-            light: Light {
-                direction: Vec3::Z,
-                strip: Vec3::Z,
-                up: Vec3::Z,
-                radius: 1.0,
-                studio: [1.0; 4],
-            },
-            background: Background {
-                top: ground,
-                bottom: ground,
-            },
+            eye: Eye { clip_from_world: Mat4::IDENTITY, position: Vec3::ZERO },
+            light: Light { direction: Vec3::Z, strip: Vec3::Z, up: Vec3::Z, radius: 1.0, studio: [1.0; 4] },
+            background: Background { top: ground, bottom: ground },
             exposure: 1.0,
             outline: Colour::hex(0),
             outline_width: 1.0,

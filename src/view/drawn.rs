@@ -37,23 +37,10 @@ pub(super) struct DrawnShape {
 }
 
 enum Form {
-    Bar {
-        ends: [End; 2],
-        radius: f32,
-        kind: BarKind,
-    },
-    Box {
-        centre: Vec3,
-        size: Vec3,
-    },
-    Ball {
-        centre: Vec3,
-        radius: f32,
-    },
-    Own {
-        triangles: OwnMesh,
-        place: Pose,
-    },
+    Bar { ends: [End; 2], radius: f32, kind: BarKind },
+    Box { centre: Vec3, size: Vec3 },
+    Ball { centre: Vec3, radius: f32 },
+    Own { triangles: OwnMesh, place: Pose },
 }
 
 /// A mesh of the scene's own.
@@ -143,17 +130,11 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    pub const WORLD: Self = Self {
-        position: Vec3::ZERO,
-        rotation: Mat3::IDENTITY,
-    };
+    pub const WORLD: Self = Self { position: Vec3::ZERO, rotation: Mat3::IDENTITY };
 
     fn new(position: &scene::Vec3, rotation: &scene::Mat3) -> Self {
         let column = |i: usize| to_f32(&rotation.column(i).into_owned());
-        Self {
-            position: to_f32(position),
-            rotation: Mat3::from_cols(column(0), column(1), column(2)),
-        }
+        Self { position: to_f32(position), rotation: Mat3::from_cols(column(0), column(1), column(2)) }
     }
 
     fn of_body(motion: &BodyMotion) -> Self {
@@ -162,19 +143,12 @@ impl Pose {
 
     /// The pose in the world of what has the pose `inner` in this frame.
     fn of(&self, inner: &Self) -> Self {
-        Self {
-            position: self.apply(inner.position),
-            rotation: self.rotation * inner.rotation,
-        }
+        Self { position: self.apply(inner.position), rotation: self.rotation * inner.rotation }
     }
 
     pub fn in_frame(frame: &Frame, body: Option<usize>) -> Self {
-        let world = Self {
-            position: -to_f32(&frame.origin),
-            ..Self::WORLD
-        };
-        body.and_then(|b| frame.bodies.get(b))
-            .map_or(world, Self::of_body)
+        let world = Self { position: -to_f32(&frame.origin), ..Self::WORLD };
+        body.and_then(|b| frame.bodies.get(b)).map_or(world, Self::of_body)
     }
 
     pub fn apply(&self, point: Vec3) -> Vec3 {
@@ -185,57 +159,31 @@ impl Pose {
 /// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates and the
 /// meshes of its files.
 pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
-    let mut meshes = Meshes {
-        data: zones::meshes(),
-        of_files: Vec::new(),
-    };
+    let mut meshes = Meshes { data: zones::meshes(), of_files: Vec::new() };
     let mut parts = Vec::new();
     let roles = scene.body_roles();
-    let fixed = scene
-        .fixed_shapes
-        .iter()
-        .enumerate()
-        .map(|(i, shape)| (None, i, shape));
+    let fixed = scene.fixed_shapes.iter().enumerate().map(|(i, shape)| (None, i, shape));
     let sticks = sticks(scene);
     let moving = scene.bodies.iter().enumerate().flat_map(|(b, body)| {
         let shapes = sticks.get(&b).unwrap_or(&body.shapes);
-        shapes
-            .iter()
-            .enumerate()
-            .map(move |(i, shape)| (Some(b), i, shape))
+        shapes.iter().enumerate().map(move |(i, shape)| (Some(b), i, shape))
     });
     for (body, index, shape) in fixed.chain(moving) {
         if let Some(form) = form(scene, body, shape, &mut meshes) {
             parts.push(DrawnShape {
                 body,
                 index,
-                role: shape
-                    .role
-                    .unwrap_or_else(|| body.map_or(Role::Frame, |body| roles[body])),
-                colour: shape.colour.map(|[red, green, blue]| {
-                    Colour::hex(u32::from_be_bytes([0, red, green, blue]))
-                }),
+                role: shape.role.unwrap_or_else(|| body.map_or(Role::Frame, |body| roles[body])),
+                colour: shape.colour.map(|[red, green, blue]| Colour::hex(u32::from_be_bytes([0, red, green, blue]))),
                 form,
             });
         }
     }
     let probe_drawn = parts.iter().any(|part| part.role == Role::Probe);
     if let (Some(tip), false) = (&scene.output.probe, probe_drawn) {
-        let size = scene
-            .ball_joints
-            .first()
-            .map_or(0.01, |joint| joint.contact.ball_radius) as f32;
-        let form = Form::Ball {
-            centre: to_f32(tip),
-            radius: 0.4 * size,
-        };
-        parts.push(DrawnShape {
-            body: Some(scene.output.body),
-            index: 0,
-            role: Role::Probe,
-            colour: None,
-            form,
-        });
+        let size = scene.ball_joints.first().map_or(0.01, |joint| joint.contact.ball_radius) as f32;
+        let form = Form::Ball { centre: to_f32(tip), radius: 0.4 * size };
+        parts.push(DrawnShape { body: Some(scene.output.body), index: 0, role: Role::Probe, colour: None, form });
     }
     (parts, meshes.data)
 }
@@ -244,57 +192,33 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
     let bar = |from, to, radius: f64, kind| {
         let ends = [from, to].map(|point| {
             let point = to_f32(point);
-            End {
-                point,
-                at: reach(scene, body, point),
-            }
+            End { point, at: reach(scene, body, point) }
         });
-        Some(Form::Bar {
-            ends,
-            radius: radius as f32,
-            kind,
-        })
+        Some(Form::Bar { ends, radius: radius as f32, kind })
     };
     match &shape.geometry {
         Geometry::Capsule { from, to, radius } => bar(from, to, *radius, BarKind::Capsule),
         Geometry::Cylinder { from, to, radius } => bar(from, to, *radius, BarKind::Cylinder),
         Geometry::Cone { from, to, radius } => bar(from, to, *radius, BarKind::Cone),
-        Geometry::Box { centre, size } => Some(Form::Box {
-            centre: to_f32(centre),
-            size: to_f32(size),
-        }),
+        Geometry::Box { centre, size } => Some(Form::Box { centre: to_f32(centre), size: to_f32(size) }),
         Geometry::Sphere { centre, radius } => {
             // The joint draws its own ball.
-            let is_joint_ball = scene.ball_joints.iter().any(|j| {
-                j.ball.body == body && (j.ball.point - centre).norm() < 0.1 * j.contact.ball_radius
-            });
-            (!is_joint_ball).then(|| Form::Ball {
-                centre: to_f32(centre),
-                radius: *radius as f32,
-            })
+            let is_joint_ball = scene
+                .ball_joints
+                .iter()
+                .any(|j| j.ball.body == body && (j.ball.point - centre).norm() < 0.1 * j.contact.ball_radius);
+            (!is_joint_ball).then(|| Form::Ball { centre: to_f32(centre), radius: *radius as f32 })
         }
         Geometry::Plate { corners, thickness } => {
             let corners: Vec<Vec3> = corners.iter().map(to_f32).collect();
             let mesh = plate(&corners, *thickness as f32)?;
-            let points: Vec<Vec3> = mesh
-                .vertices
-                .iter()
-                .map(|(p, _)| Vec3::new(p[0], p[1], p[2]))
-                .collect();
-            let triangles = OwnMesh {
-                shape: SharedShape::convex_hull(&points),
-                points: points.into(),
-                mesh: meshes.add(mesh)?,
-            };
+            let points: Vec<Vec3> = mesh.vertices.iter().map(|(p, _)| Vec3::new(p[0], p[1], p[2])).collect();
+            let triangles =
+                OwnMesh { shape: SharedShape::convex_hull(&points), points: points.into(), mesh: meshes.add(mesh)? };
             let place = Pose::WORLD;
             Some(Form::Own { triangles, place })
         }
-        Geometry::Mesh {
-            mesh,
-            unit,
-            position,
-            rotation,
-        } => Some(Form::Own {
+        Geometry::Mesh { mesh, unit, position, rotation } => Some(Form::Own {
             triangles: meshes.of_file(mesh, *unit)?,
             place: Pose::new(position, &rotation.to_rotation_matrix().into_inner()),
         }),
@@ -317,9 +241,7 @@ impl Meshes {
 
     /// The mesh of a file: one for all shapes that name it.
     fn of_file(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<OwnMesh> {
-        let same = |(other, length, _): &&(Arc<mesh::Mesh>, f64, OwnMesh)| {
-            Arc::ptr_eq(other, file) && *length == unit
-        };
+        let same = |(other, length, _): &&(Arc<mesh::Mesh>, f64, OwnMesh)| Arc::ptr_eq(other, file) && *length == unit;
         if let Some((_, _, known)) = self.of_files.iter().find(same) {
             return Some(known.clone());
         }
@@ -333,11 +255,7 @@ impl Meshes {
         } else {
             SharedShape::trimesh(vertices, file.triangles().to_vec()).ok()
         };
-        let own = OwnMesh {
-            shape,
-            points: (0..8).map(corner).collect(),
-            mesh: self.add(surface(file, unit))?,
-        };
+        let own = OwnMesh { shape, points: (0..8).map(corner).collect(), mesh: self.add(surface(file, unit))? };
         self.of_files.push((file.clone(), unit, own.clone()));
         Some(own)
     }
@@ -350,9 +268,7 @@ fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
         if joint.ball.body == body && to_f32(&joint.ball.point).distance(end) < 1.3 * radius {
             return Some(Reach::Ball(i));
         }
-        if joint.socket.body == body
-            && to_f32(&joint.socket.point).distance(end) < (LARGEST_SOCKET + WALL) * radius
-        {
+        if joint.socket.body == body && to_f32(&joint.socket.point).distance(end) < (LARGEST_SOCKET + WALL) * radius {
             return Some(Reach::Socket(i));
         }
     }
@@ -369,11 +285,7 @@ fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
     let mut mesh = MeshData::default();
     let mut face = |points: &[Vec3], normal: Vec3| {
         let first = mesh.vertices.len() as u32;
-        mesh.vertices.extend(
-            points
-                .iter()
-                .map(|p| ([p.x, p.y, p.z, 0.0], normal.to_array())),
-        );
+        mesh.vertices.extend(points.iter().map(|p| ([p.x, p.y, p.z, 0.0], normal.to_array())));
         for i in 1..points.len() as u32 - 1 {
             mesh.indices.extend([first, first + i, first + i + 1]);
         }
@@ -393,57 +305,34 @@ fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
 
 /// Magnification drawn when `asked` is requested: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its [`room`].
 pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f32) -> f32 {
-    let asked = if asked.is_finite() {
-        asked.clamp(1.0, 100.0)
-    } else {
-        1.0
-    };
-    let drawable =
-        scene
-            .ball_joints
-            .iter()
-            .zip(&frame.joints)
-            .enumerate()
-            .map(|(i, (joint, now))| {
-                let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
-                let radius = joint.contact.ball_radius as f32;
-                let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
-                if gap > 0.0 {
-                    (room.min(LARGEST_SOCKET * radius) - radius) / gap
-                } else {
-                    f32::INFINITY
-                }
-            });
+    let asked = if asked.is_finite() { asked.clamp(1.0, 100.0) } else { 1.0 };
+    let drawable = scene.ball_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
+        let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
+        let radius = joint.contact.ball_radius as f32;
+        let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
+        if gap > 0.0 { (room.min(LARGEST_SOCKET * radius) - radius) / gap } else { f32::INFINITY }
+    });
     drawable.fold(asked, f32::min).max(1.0)
 }
 
 /// Every ball joint as drawn at magnification `m`.
 pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
-    let drawn = scene
-        .ball_joints
-        .iter()
-        .zip(&frame.joints)
-        .map(|(joint, now)| {
-            let socket_centre = to_f32(&now.socket_centre);
-            let ball_radius = joint.contact.ball_radius as f32;
-            let eccentricity = to_f32(&now.eccentricity);
-            let gap = if now.clearance > 0.0 {
-                m * now.clearance as f32
-            } else {
-                IDEAL_GAP * ball_radius
-            };
-            let opening =
-                Pose::in_frame(frame, joint.socket.body).rotation * to_f32(&joint.opening);
-            DrawnJoint {
-                socket_centre,
-                ball_centre: socket_centre + m * eccentricity,
-                shift: (m - 1.0) * eccentricity,
-                ball_radius,
-                inner: ball_radius + gap,
-                outer: ball_radius + gap + WALL * ball_radius,
-                opening: opening.normalize_or(Vec3::Z),
-            }
-        });
+    let drawn = scene.ball_joints.iter().zip(&frame.joints).map(|(joint, now)| {
+        let socket_centre = to_f32(&now.socket_centre);
+        let ball_radius = joint.contact.ball_radius as f32;
+        let eccentricity = to_f32(&now.eccentricity);
+        let gap = if now.clearance > 0.0 { m * now.clearance as f32 } else { IDEAL_GAP * ball_radius };
+        let opening = Pose::in_frame(frame, joint.socket.body).rotation * to_f32(&joint.opening);
+        DrawnJoint {
+            socket_centre,
+            ball_centre: socket_centre + m * eccentricity,
+            shift: (m - 1.0) * eccentricity,
+            ball_radius,
+            inner: ball_radius + gap,
+            outer: ball_radius + gap + WALL * ball_radius,
+            opening: opening.normalize_or(Vec3::Z),
+        }
+    });
     drawn.collect()
 }
 
@@ -451,10 +340,7 @@ impl DrawnShape {
     /// Its colour and finish.
     pub fn material(&self, palette: &Palette) -> Material {
         let of_role = palette.material(self.role);
-        Material {
-            colour: self.colour.unwrap_or(of_role.colour),
-            ..of_role
-        }
+        Material { colour: self.colour.unwrap_or(of_role.colour), ..of_role }
     }
 
     /// Whether it is long and thin.
@@ -465,9 +351,7 @@ impl DrawnShape {
     /// Whether it ends at the outer face of the socket of ball joint `joint`.
     pub fn reaches_socket(&self, joint: usize) -> bool {
         match &self.form {
-            Form::Bar { ends, .. } => ends
-                .iter()
-                .any(|end| matches!(end.at, Some(Reach::Socket(j)) if j == joint)),
+            Form::Bar { ends, .. } => ends.iter().any(|end| matches!(end.at, Some(Reach::Socket(j)) if j == joint)),
             _ => false,
         }
     }
@@ -481,13 +365,9 @@ impl DrawnShape {
                 let mut capped = [true; 2];
                 for i in 0..2 {
                     match ends[i].at {
-                        Some(Reach::Ball(j)) => {
-                            points[i] += joints.get(j).map_or(Vec3::ZERO, |joint| joint.shift)
-                        }
+                        Some(Reach::Ball(j)) => points[i] += joints.get(j).map_or(Vec3::ZERO, |joint| joint.shift),
                         Some(Reach::Socket(j)) => {
-                            let cut = joints
-                                .get(j)
-                                .and_then(|joint| leave_socket(points[1 - i], points[i], joint));
+                            let cut = joints.get(j).and_then(|joint| leave_socket(points[1 - i], points[i], joint));
                             if let Some(point) = cut {
                                 (points[i], capped[i]) = (point, false);
                             }
@@ -495,23 +375,12 @@ impl DrawnShape {
                         None => {}
                     }
                 }
-                Solid::Bar {
-                    from: points[0],
-                    to: points[1],
-                    radius: *radius,
-                    kind: *kind,
-                    capped,
-                }
+                Solid::Bar { from: points[0], to: points[1], radius: *radius, kind: *kind, capped }
             }
-            Form::Box { centre, size } => Solid::Box {
-                centre: pose.apply(*centre),
-                size: *size,
-                rotation: pose.rotation,
-            },
-            Form::Ball { centre, radius } => Solid::Ball {
-                centre: pose.apply(*centre),
-                radius: *radius,
-            },
+            Form::Box { centre, size } => {
+                Solid::Box { centre: pose.apply(*centre), size: *size, rotation: pose.rotation }
+            }
+            Form::Ball { centre, radius } => Solid::Ball { centre: pose.apply(*centre), radius: *radius },
             Form::Own { triangles, place } => Solid::Own {
                 mesh: triangles.mesh,
                 shape: triangles.shape.as_ref(),
@@ -544,26 +413,15 @@ impl Solid<'_> {
     /// Calls `visit` with spheres (centre, radius) whose convex hull contains the solid: for bounds.
     pub fn extent(&self, mut visit: impl FnMut(Vec3, f32)) {
         match self {
-            Solid::Bar {
-                from, to, radius, ..
-            } => [from, to].into_iter().for_each(|&p| visit(p, *radius)),
-            Solid::Box {
-                centre,
-                size,
-                rotation,
-            } => {
+            Solid::Bar { from, to, radius, .. } => [from, to].into_iter().for_each(|&p| visit(p, *radius)),
+            Solid::Box { centre, size, rotation } => {
                 for i in 0..8 {
                     let sign = |bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
-                    visit(
-                        *centre + *rotation * (*size * Vec3::new(sign(0), sign(1), sign(2))),
-                        0.0,
-                    );
+                    visit(*centre + *rotation * (*size * Vec3::new(sign(0), sign(1), sign(2))), 0.0);
                 }
             }
             Solid::Ball { centre, radius } => visit(*centre, *radius),
-            Solid::Own { points, pose, .. } => {
-                points.iter().for_each(|&p| visit(pose.apply(p), 0.0))
-            }
+            Solid::Own { points, pose, .. } => points.iter().for_each(|&p| visit(pose.apply(p), 0.0)),
         }
     }
 }

@@ -27,22 +27,14 @@ impl GhostLook {
 /// The output point of a scene in `frame`, m: its probe tip, or its output body's origin.
 pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::scene::Vec3> {
     let body = frame.bodies.get(output.body)?;
-    let arm = output
-        .probe
-        .map_or_else(crate::scene::Vec3::zeros, |probe| body.rotation * probe);
+    let arm = output.probe.map_or_else(crate::scene::Vec3::zeros, |probe| body.rotation * probe);
     Some(body.position + arm)
 }
 
 impl SceneView {
     /// Adds the moving parts in the state `ghost` of the scene of `shot` to the list built from that shot, each the more
     /// visible the farther it is from its place there; returns whether any differs by a pixel or more.
-    pub fn add_ghost(
-        &self,
-        shot: &Shot<'_>,
-        ghost: &Frame,
-        which: Ghost,
-        out: &mut DrawList,
-    ) -> bool {
+    pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, which: Ghost, out: &mut DrawList) -> bool {
         let near = Near::of(shot);
         let moved = near.as_ref().map(|near| near.frame(ghost));
         let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
@@ -96,10 +88,7 @@ impl SceneView {
         let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
         let ideal = moved.as_ref().unwrap_or(ideal);
         let output = &shot.scene.output;
-        let (Some(from), Some(to)) = (
-            output_point(output, ideal),
-            output_point(output, shot.frame),
-        ) else {
+        let (Some(from), Some(to)) = (output_point(output, ideal), output_point(output, shot.frame)) else {
             return;
         };
         let error = to - from;

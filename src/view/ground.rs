@@ -9,14 +9,7 @@ use super::{Colour, Line};
 const SEGMENTS: u16 = 48;
 
 /// Adds a ring of `radius` (m) about `centre`, across `up`, with two diameters, in lines of `width` pixels.
-pub(super) fn push_ground(
-    centre: Vec3,
-    up: Vec3,
-    radius: f32,
-    width: f32,
-    colour: Colour,
-    lines: &mut Vec<Line>,
-) {
+pub(super) fn push_ground(centre: Vec3, up: Vec3, radius: f32, width: f32, colour: Colour, lines: &mut Vec<Line>) {
     let side = up.any_orthonormal_vector();
     let other = up.cross(side);
     let at = |k: u16| {

@@ -29,36 +29,17 @@ pub(super) fn ball(at: Vec3, radius: f32, material: Material) -> Instance {
 
 /// A bar mesh (axis z from 0 to 1) from `from` along `along`.
 pub(super) fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> Instance {
-    let turn = Mat3::from_quat(Quat::from_rotation_arc(
-        Vec3::Z,
-        along.normalize_or(Vec3::Z),
-    ));
-    placed(
-        turn * Mat3::from_diagonal(Vec3::new(radius, radius, along.length())),
-        from,
-        material,
-    )
+    let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, along.normalize_or(Vec3::Z)));
+    placed(turn * Mat3::from_diagonal(Vec3::new(radius, radius, along.length())), from, material)
 }
 
 /// A label at `anchor` if that is inside the picture.
-pub(super) fn push_label(
-    out: &mut DrawList,
-    text: &Arc<str>,
-    kind: LabelKind,
-    anchor: Vec3,
-    colour: Colour,
-) {
+pub(super) fn push_label(out: &mut DrawList, text: &Arc<str>, kind: LabelKind, anchor: Vec3, colour: Colour) {
     let Some(pixel) = out.eye.project(anchor, out.size) else {
         return;
     };
     let size = Vec2::new(out.size[0] as f32, out.size[1] as f32);
     if pixel.cmpge(Vec2::ZERO).all() && pixel.cmple(size).all() {
-        out.labels.push(Label {
-            text: text.clone(),
-            kind,
-            anchor,
-            pixel,
-            colour,
-        });
+        out.labels.push(Label { text: text.clone(), kind, anchor, pixel, colour });
     }
 }

@@ -38,8 +38,8 @@ mod zones;
 pub use build::SceneView;
 pub use camera::{Camera, Preset};
 pub use draw_list::{
-    Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
-    MeshData, Tick, WearScale,
+    Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh, MeshData, Tick,
+    WearScale,
 };
 pub use ghost::output_point;
 pub use options::{ArrowOptions, Quality, Scaling, ViewOptions, WearMap};

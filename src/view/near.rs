@@ -34,12 +34,7 @@ impl Near {
 
     /// `shot` measured from there.
     pub fn shot<'a>(&'a self, shot: &Shot<'a>) -> Shot<'a> {
-        Shot {
-            frame: &self.frame,
-            camera: &self.camera,
-            trail: &self.trail,
-            ..*shot
-        }
+        Shot { frame: &self.frame, camera: &self.camera, trail: &self.trail, ..*shot }
     }
 
     /// Another frame of the same scene, measured from there.

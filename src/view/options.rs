@@ -79,12 +79,7 @@ impl Quality {
     ];
 
     const fn row(occlusion: bool, samples: u32, fine_shadows: bool, sharpness: f32) -> Self {
-        Self {
-            occlusion,
-            samples,
-            fine_shadows,
-            sharpness,
-        }
+        Self { occlusion, samples, fine_shadows, sharpness }
     }
 }
 
@@ -119,14 +114,7 @@ pub struct ArrowOptions {
 
 impl Default for ArrowOptions {
     fn default() -> Self {
-        Self {
-            normal: true,
-            friction: true,
-            scaling: Scaling::Linear,
-            reference: None,
-            peaks: true,
-            thickness: 1.0,
-        }
+        Self { normal: true, friction: true, scaling: Scaling::Linear, reference: None, peaks: true, thickness: 1.0 }
     }
 }
 

@@ -63,13 +63,7 @@ const FAINTEST: f32 = 0.15;
 
 impl Default for PeakMarks {
     fn default() -> Self {
-        Self {
-            joints: Vec::new(),
-            now: f64::NEG_INFINITY,
-            seen: f64::NEG_INFINITY,
-            fade: f64::INFINITY,
-            largest: 0.0,
-        }
+        Self { joints: Vec::new(), now: f64::NEG_INFINITY, seen: f64::NEG_INFINITY, fade: f64::INFINITY, largest: 0.0 }
     }
 }
 
@@ -81,11 +75,7 @@ impl PeakMarks {
 
     /// Forgets everything up to `time`, s, as after a reset.
     pub fn clear(&mut self, time: f64) {
-        *self = Self {
-            now: time,
-            seen: time,
-            ..Self::default()
-        };
+        *self = Self { now: time, seen: time, ..Self::default() };
     }
 
     /// Takes the displayed instant and the peaks since the previous one, `peaks` (one per ball joint, or empty). A blow is
@@ -97,11 +87,7 @@ impl PeakMarks {
             self.clear(frame.time);
             self.largest = largest;
         }
-        let passed = if self.now.is_finite() {
-            frame.time - self.now
-        } else {
-            0.0
-        };
+        let passed = if self.now.is_finite() { frame.time - self.now } else { 0.0 };
         (self.now, self.fade) = (frame.time, fade.max(f64::MIN_POSITIVE));
         self.joints.resize(frame.joints.len(), Joint::default());
         let hardest = peaks
@@ -133,9 +119,7 @@ impl PeakMarks {
             let blow = |force: Vec3, time: f64| Blow {
                 force,
                 time,
-                flash: (force.length() / hardest.max(f32::MIN_POSITIVE))
-                    .sqrt()
-                    .clamp(FAINTEST, 1.0),
+                flash: (force.length() / hardest.max(f32::MIN_POSITIVE)).sqrt().clamp(FAINTEST, 1.0),
             };
             if peak.time <= now {
                 joint.take(blow(force, peak.time), self.fade);
@@ -153,11 +137,8 @@ impl PeakMarks {
             joint.blow = joint.blow.filter(|blow| now - blow.time < self.fade);
         }
         let half_lives = passed / (SCALE_HALF_LIFE * self.fade);
-        let present = frame
-            .joints
-            .iter()
-            .map(|joint| joint.normal_force.norm() as f32)
-            .filter(|force| force.is_finite());
+        let present =
+            frame.joints.iter().map(|joint| joint.normal_force.norm() as f32).filter(|force| force.is_finite());
         let marked = self.joints.iter().filter_map(|joint| joint.blow);
         self.largest = present
             .chain(marked.map(|blow| blow.force.length()))
@@ -171,18 +152,9 @@ impl PeakMarks {
             let report: &crate::simulate::JointReport = report;
             let age = self.now - blow.time;
             let over = (report.normal_force.norm() as f32) < PRESENT * blow.force.length();
-            over.then_some(Mark {
-                joint,
-                force: blow.force,
-                age,
-                strength: (1.0 - age / self.fade) as f32,
-            })
+            over.then_some(Mark { joint, force: blow.force, age, strength: (1.0 - age / self.fade) as f32 })
         };
-        self.joints
-            .iter()
-            .zip(&frame.joints)
-            .enumerate()
-            .filter_map(mark)
+        self.joints.iter().zip(&frame.joints).enumerate().filter_map(mark)
     }
 
     /// Brightness of the flash of ball joint `joint`, 0..=1.
@@ -223,11 +195,7 @@ fn round_up_125(x: f32) -> f32 {
         return 1.0;
     }
     let decade = 10_f32.powi(x.log10().floor() as i32);
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|k| k * decade)
-        .find(|&step| step >= x * 0.9999)
-        .unwrap_or(10.0 * decade)
+    [1.0, 2.0, 5.0].into_iter().map(|k| k * decade).find(|&step| step >= x * 0.9999).unwrap_or(10.0 * decade)
 }
 
 #[cfg(test)]
@@ -237,25 +205,12 @@ mod tests {
     use crate::simulate::JointReport;
 
     fn frame(time: f64, normal: f64) -> Frame {
-        let report = JointReport {
-            normal_force: scene::Vec3::new(0.0, 0.0, normal),
-            ..Default::default()
-        };
-        Frame {
-            time,
-            joints: vec![report],
-            ..Default::default()
-        }
+        let report = JointReport { normal_force: scene::Vec3::new(0.0, 0.0, normal), ..Default::default() };
+        Frame { time, joints: vec![report], ..Default::default() }
     }
 
     fn peak(time: f64, normal: f64, impacts: u32) -> [Peak; 1] {
-        [Peak {
-            normal,
-            time,
-            normal_force: scene::Vec3::new(normal, 0.0, 0.0),
-            impacts,
-            ..Default::default()
-        }]
+        [Peak { normal, time, normal_force: scene::Vec3::new(normal, 0.0, 0.0), impacts, ..Default::default() }]
     }
 
     fn mark(marks: &PeakMarks, frame: &Frame) -> Option<Mark> {
@@ -322,17 +277,13 @@ mod tests {
             let time = f64::from(k) * 1e-6;
             let force = 600.0 * (std::f64::consts::PI * f64::from(k) / 60.0).sin();
             let shown = frame(time, force);
-            let strongest =
-                force.max(600.0 * (std::f64::consts::PI * f64::from(k - 1) / 60.0).sin());
+            let strongest = force.max(600.0 * (std::f64::consts::PI * f64::from(k - 1) / 60.0).sin());
             let at = if k <= 30 { time } else { time - 1e-6 };
             marks.update(&shown, &peak(at, strongest, 0), 80e-6);
             let mark = mark(&marks, &shown);
             assert_eq!(mark.is_some(), k > 36, "{k}: {mark:?}");
             if let Some(mark) = mark {
-                assert!(
-                    (mark.force.x - 600.0).abs() < 1e-3
-                        && (mark.age - (time - 30e-6)).abs() < 1e-12
-                );
+                assert!((mark.force.x - 600.0).abs() < 1e-3 && (mark.age - (time - 30e-6)).abs() < 1e-12);
             }
         }
     }
@@ -375,25 +326,12 @@ mod tests {
 
     #[test]
     fn the_scale_is_a_round_number_that_covers_the_largest_force() {
-        for (x, expect) in [
-            (0.0, 1.0),
-            (0.9, 1.0),
-            (1.0, 1.0),
-            (1.1, 2.0),
-            (3.0, 5.0),
-            (621.0, 1000.0),
-            (771.0, 1000.0),
-        ] {
-            assert!(
-                (round_up_125(x) / expect - 1.0).abs() < 1e-5,
-                "{x}: {}",
-                round_up_125(x)
-            );
+        for (x, expect) in
+            [(0.0, 1.0), (0.9, 1.0), (1.0, 1.0), (1.1, 2.0), (3.0, 5.0), (621.0, 1000.0), (771.0, 1000.0)]
+        {
+            assert!((round_up_125(x) / expect - 1.0).abs() < 1e-5, "{x}: {}", round_up_125(x));
         }
-        let fixed = ArrowOptions {
-            reference: Some(30.0),
-            ..Default::default()
-        };
+        let fixed = ArrowOptions { reference: Some(30.0), ..Default::default() };
         assert_eq!(PeakMarks::new().reference(&fixed), 30.0);
     }
 }

@@ -43,38 +43,21 @@ impl SceneView {
         });
         let balls = joints.iter().enumerate().filter_map(|(i, joint)| {
             let ball = cast_ball(joint.ball_centre, joint.ball_radius, &ray);
-            let socket = shot
-                .options
-                .sockets
-                .then(|| cast_ball(joint.socket_centre, joint.outer, &ray))
-                .flatten();
+            let socket = shot.options.sockets.then(|| cast_ball(joint.socket_centre, joint.outer, &ray)).flatten();
             // A ray through the cut-away half of the socket continues to what is inside.
-            let socket = socket
-                .filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
-            let distance = [ball, socket]
-                .into_iter()
-                .flatten()
-                .min_by(f32::total_cmp)?;
+            let socket = socket.filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
+            let distance = [ball, socket].into_iter().flatten().min_by(f32::total_cmp)?;
             Some((distance, Picked::Joint(i)))
         });
         let (distance, what) = parts.chain(balls).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Hit {
-            what,
-            point: ray.point_at(distance),
-        })
+        Some(Hit { what, point: ray.point_at(distance) })
     }
 
     /// Point to follow: a body's origin or a joint's socket centre, m; `None` for fixed shapes.
     pub fn anchor(&self, frame: &Frame, picked: Picked) -> Option<Vec3> {
         match picked {
-            Picked::Body(i) => frame
-                .bodies
-                .get(i)
-                .map(|body| super::to_f32(&body.position)),
-            Picked::Joint(i) => frame
-                .joints
-                .get(i)
-                .map(|joint| super::to_f32(&joint.socket_centre)),
+            Picked::Body(i) => frame.bodies.get(i).map(|body| super::to_f32(&body.position)),
+            Picked::Joint(i) => frame.joints.get(i).map(|joint| super::to_f32(&joint.socket_centre)),
             Picked::Fixed(_) => None,
         }
     }

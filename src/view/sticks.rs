@@ -13,10 +13,7 @@ pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
     let bare = scene.bodies.iter().enumerate();
     let bare = bare.filter(|(_, body)| body.shapes.is_empty());
     let mut points: BTreeMap<usize, Vec<Vec3>> = bare.map(|(i, _)| (i, Vec::new())).collect();
-    let bound = scene
-        .joints
-        .iter()
-        .filter(|joint| joint.kind != JointKind::Free);
+    let bound = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     let tree = bound.flat_map(|joint| joint.points());
     let balls = scene.ball_joints.iter();
     let balls = balls.flat_map(|joint| [joint.socket, joint.ball]);
@@ -29,20 +26,9 @@ pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
         let centre = scene.bodies[body].centre;
         let lengths = points.iter().map(|point| (point - centre).norm());
         let longest = lengths.fold(0.0, f64::max);
-        let bars = points.iter().map(|point| Geometry::Capsule {
-            from: centre,
-            to: *point,
-            radius: BAR * longest,
-        });
-        let ball = Geometry::Sphere {
-            centre,
-            radius: BALL * longest,
-        };
-        let shape = |geometry| Shape {
-            geometry,
-            role: None,
-            colour: None,
-        };
+        let bars = points.iter().map(|point| Geometry::Capsule { from: centre, to: *point, radius: BAR * longest });
+        let ball = Geometry::Sphere { centre, radius: BALL * longest };
+        let shape = |geometry| Shape { geometry, role: None, colour: None };
         let shapes = bars.chain([ball]).filter(|_| longest > 0.0);
         (body, shapes.map(shape).collect())
     });

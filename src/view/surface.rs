@@ -54,13 +54,8 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
             let normal = if around.len() > MOST_ABOUT {
                 normals[t]
             } else {
-                let smooth = around
-                    .iter()
-                    .filter(|&&other| normals[other].dot(normals[t]) > CREASE);
-                smooth
-                    .map(|&other| areas[other])
-                    .sum::<Vec3>()
-                    .normalize_or(normals[t])
+                let smooth = around.iter().filter(|&&other| normals[other].dot(normals[t]) > CREASE);
+                smooth.map(|&other| areas[other]).sum::<Vec3>().normalize_or(normals[t])
             };
             let near = |(of, _): &&(Vec3, u32)| of.distance_squared(normal) < 1e-8;
             let known = made[i].iter().take(MOST_ABOUT).find(near);
@@ -122,11 +117,7 @@ mod tests {
         for (place, normal) in &round.vertices {
             let across = Vec3::new(place[0], place[1], 0.0) / 0.01;
             let normal = Vec3::from(*normal);
-            let wanted = if normal.z.abs() > 0.5 {
-                Vec3::Z * normal.z.signum()
-            } else {
-                across
-            };
+            let wanted = if normal.z.abs() > 0.5 { Vec3::Z * normal.z.signum() } else { across };
             assert!(normal.distance(wanted) < 0.07, "{place:?} {normal}");
         }
         // Of a hexagon, every corner belongs to two sides and an end.
@@ -138,9 +129,7 @@ mod tests {
         let open = surface(&prism(24, false), 1e-3);
         assert_eq!((open.vertices.len(), open.indices.len()), (96, 2 * 24 * 6));
         for half in open.vertices.chunks(48) {
-            let out = |(place, normal): &([f32; 4], [f32; 3])| {
-                place[0] * normal[0] + place[1] * normal[1]
-            };
+            let out = |(place, normal): &([f32; 4], [f32; 3])| place[0] * normal[0] + place[1] * normal[1];
             let side = out(&half[0]).signum();
             assert!(half.iter().all(|vertex| out(vertex) * side > 0.0));
         }

@@ -77,10 +77,7 @@ pub(super) fn symbols(
     let mut symbols = Vec::new();
     let joined = scene.joints.iter().chain(&scene.closing_joints);
     for joint in joined.filter(|joint| joint.drawn) {
-        let (parent, child) = (
-            Pose::in_frame(frame, joint.parent),
-            Pose::in_frame(frame, Some(joint.child)),
-        );
+        let (parent, child) = (Pose::in_frame(frame, joint.parent), Pose::in_frame(frame, Some(joint.child)));
         let own: &[_] = match joint.parent {
             Some(parent) => &shapes[parent],
             None => &[],
@@ -98,13 +95,7 @@ pub(super) fn symbols(
             let pose = Pose::in_frame(frame, body);
             let local = |point: Vec3| pose.rotation.transpose() * (point - pose.position);
             let [from, to] = ends.map(local);
-            symbols.push(Symbol {
-                body,
-                from,
-                to,
-                radius,
-                role,
-            });
+            symbols.push(Symbol { body, from, to, radius, role });
         };
         match joint.kind {
             JointKind::Revolute if !place.has_pin() => {
@@ -185,14 +176,11 @@ impl Place<'_> {
     /// Radius of a bar among `shapes`, not a disc, that lies on the joint's axis, m.
     fn bar_on_axis(&self, shapes: &[(Role, Solid<'_>)]) -> Option<f32> {
         let along = |(_, solid): &(Role, Solid<'_>)| match *solid {
-            Solid::Bar {
-                from, to, radius, ..
-            } => {
+            Solid::Bar { from, to, radius, .. } => {
                 let bar = (to - from).normalize_or_zero();
                 let off = (from - self.point).reject_from_normalized(self.axis);
                 let is_long = from.distance(to) > radius;
-                let lies =
-                    is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius;
+                let lies = is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius;
                 lies.then_some(radius)
             }
             _ => None,

@@ -19,16 +19,7 @@ fn shot<'a>(
     options: &'a ViewOptions,
     camera: &'a Camera,
 ) -> Shot<'a> {
-    Shot {
-        scene,
-        frame,
-        marks,
-        options,
-        camera,
-        trail: &[],
-        size: SIZE,
-        pixels_per_point: 1.0,
-    }
+    Shot { scene, frame, marks, options, camera, trail: &[], size: SIZE, pixels_per_point: 1.0 }
 }
 
 /// Draw list of a scene with the current forces held.
@@ -37,10 +28,7 @@ fn list(scene: &Scene, frame: &Frame, options: &ViewOptions) -> DrawList {
     let mut marks = PeakMarks::new();
     marks.update(frame, &[], f64::INFINITY);
     let mut out = DrawList::default();
-    view.build(
-        &shot(scene, frame, &marks, options, &view.camera()),
-        &mut out,
-    );
+    view.build(&shot(scene, frame, &marks, options, &view.camera()), &mut out);
     out
 }
 
@@ -57,33 +45,21 @@ fn size(instance: &Instance) -> f32 {
 /// The drawn ball of joint 0: the sphere of the ball's radius nearest to its socket.
 fn ball(list: &DrawList, radius: f32) -> &Instance {
     let spheres = &list.solid.by_mesh[Mesh::Sphere.index()];
-    spheres
-        .iter()
-        .find(|s| (size(s) / radius - 1.0).abs() < 1e-4)
-        .expect("a ball")
+    spheres.iter().find(|s| (size(s) / radius - 1.0).abs() < 1e-4).expect("a ball")
 }
 
 #[test]
 fn the_ball_stays_in_its_drawn_socket_at_every_magnification() {
     let (scene, frame) = fixture::pendulum();
     for magnification in [1.0, 2.0, 7.5, 20.0, 50.0, 100.0] {
-        let options = ViewOptions {
-            magnification,
-            ..Default::default()
-        };
+        let options = ViewOptions { magnification, ..Default::default() };
         let list = list(&scene, &frame, &options);
-        assert_eq!(
-            list.magnification, magnification,
-            "0.3 mm around 10 mm is drawable up to 100"
-        );
+        assert_eq!(list.magnification, magnification, "0.3 mm around 10 mm is drawable up to 100");
         let (ball, socket) = (ball(&list, 0.010), list.sockets[0]);
         let inner = size(&socket) * socket.inner_radius;
         let outermost = place(ball).distance(place(&socket)) + size(ball);
         // The fixture's ball is pressed 1 um into its wall.
-        assert!(
-            (outermost - inner - 1e-6 * magnification).abs() < 1e-6,
-            "×{magnification}: {outermost} in {inner}"
-        );
+        assert!((outermost - inner - 1e-6 * magnification).abs() < 1e-6, "×{magnification}: {outermost} in {inner}");
         assert!((inner - 0.010 - 0.3e-3 * magnification).abs() < 1e-6);
     }
 }
@@ -93,83 +69,45 @@ fn a_magnification_that_cannot_be_drawn_is_held_back_and_says_so() {
     let (scene, mut frame) = fixture::pendulum();
     frame.joints[0].clearance = 2e-3;
     frame.joints[0].eccentricity *= 2e-3 / 0.3e-3;
-    let options = ViewOptions {
-        magnification: 100.0,
-        ..Default::default()
-    };
+    let options = ViewOptions { magnification: 100.0, ..Default::default() };
     let drawn = list(&scene, &frame, &options);
-    assert!(
-        (10.0..20.0).contains(&drawn.magnification),
-        "{}",
-        drawn.magnification
-    );
-    assert!(
-        drawn.magnification_text.contains("×100 does not fit"),
-        "{}",
-        drawn.magnification_text
-    );
-    let options = ViewOptions {
-        magnification: 5.0,
-        ..Default::default()
-    };
+    assert!((10.0..20.0).contains(&drawn.magnification), "{}", drawn.magnification);
+    assert!(drawn.magnification_text.contains("×100 does not fit"), "{}", drawn.magnification_text);
+    let options = ViewOptions { magnification: 5.0, ..Default::default() };
     assert_eq!(list(&scene, &frame, &options).magnification_text, "play ×5");
 }
 
 #[test]
 fn the_rod_goes_along_with_its_magnified_ball() {
     let (scene, frame) = fixture::pendulum();
-    let options = ViewOptions {
-        magnification: 80.0,
-        ..Default::default()
-    };
+    let options = ViewOptions { magnification: 80.0, ..Default::default() };
     let list = list(&scene, &frame, &options);
-    let rod = list.solid.by_mesh[Mesh::Cylinder.index()]
-        .iter()
-        .find(|c| (size(c) - 0.004).abs() < 1e-6)
-        .expect("the rod");
-    assert!(
-        place(rod).distance(place(ball(&list, 0.010))) < 1e-6,
-        "its end is the ball's centre"
-    );
+    let rod =
+        list.solid.by_mesh[Mesh::Cylinder.index()].iter().find(|c| (size(c) - 0.004).abs() < 1e-6).expect("the rod");
+    assert!(place(rod).distance(place(ball(&list, 0.010))) < 1e-6, "its end is the ball's centre");
 }
 
 #[test]
 fn the_carrier_of_a_socket_ends_at_the_socket() {
     let (scene, frame) = fixture::pendulum();
     let carrier = |magnification| {
-        let list = list(
-            &scene,
-            &frame,
-            &ViewOptions {
-                magnification,
-                ..Default::default()
-            },
-        );
+        let list = list(&scene, &frame, &ViewOptions { magnification, ..Default::default() });
         let bars = &list.solid.by_mesh[Mesh::Cylinder.index()];
         // It hangs from z = 35 mm.
-        let z = bars
-            .iter()
-            .find(|c| (size(c) - 0.006).abs() < 1e-6)
-            .map(|c| c.world_from_mesh[2]);
+        let z = bars.iter().find(|c| (size(c) - 0.006).abs() < 1e-6).map(|c| c.world_from_mesh[2]);
         (z.map(|z| z[3] + z[2]), size(&list.sockets[0]))
     };
     for magnification in [1.0, 50.0] {
         let (end, outer) = carrier(magnification);
         let end = end.expect("the carrier");
-        assert!(
-            (0.98..=1.0).contains(&(end / outer)),
-            "×{magnification}: {end} at a socket of {outer}"
-        );
+        assert!((0.98..=1.0).contains(&(end / outer)), "×{magnification}: {end} at a socket of {outer}");
     }
     assert_eq!(carrier(100.0).0, None, "swallowed by a socket of 43 mm");
 }
 
 #[test]
 fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
-    let options = ViewOptions {
-        magnification: 100.0,
-        ..Default::default()
-    };
+    let options = ViewOptions { magnification: 100.0, ..Default::default() };
     let mut checked = 0;
     for name in crate::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
@@ -226,41 +164,24 @@ fn a_ghost_is_drawn_where_it_differs_and_only_there() {
     assert!(!view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list) && list.ghost.is_empty());
     let pixel = f64::from(camera.metres_per_pixel(SIZE));
     ghost.bodies[3].position.y += 0.2 * pixel;
-    assert!(
-        !view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list),
-        "a fifth of a pixel"
-    );
+    assert!(!view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list), "a fifth of a pixel");
     ghost.bodies[3].position.y += 10.0 * pixel;
     assert!(view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list));
     let moved = list.ghost.by_mesh[Mesh::Cylinder.index()].len();
-    assert_eq!(
-        (list.ghost.len(), moved),
-        (3, 1),
-        "one rod with its two ends"
-    );
+    assert_eq!((list.ghost.len(), moved), (3, 1), "one rod with its two ends");
 }
 
 #[test]
 fn arrows_start_at_the_contact_and_have_the_legends_length() {
     let (scene, frame) = fixture::pendulum();
-    let mut options = ViewOptions {
-        magnification: 20.0,
-        triad: false,
-        ..Default::default()
-    };
+    let mut options = ViewOptions { magnification: 20.0, triad: false, ..Default::default() };
     options.arrows.reference = Some(4.0);
     options.arrows.friction = false;
     let list = list(&scene, &frame, &options);
     let legend = list.legend.as_ref().expect("a legend");
     let shaft = list.arrows.by_mesh[Mesh::Cylinder.index()][0];
     let head = list.arrows.by_mesh[Mesh::Cone.index()][0];
-    let along = |i: &Instance| {
-        Vec3::new(
-            i.world_from_mesh[0][2],
-            i.world_from_mesh[1][2],
-            i.world_from_mesh[2][2],
-        )
-    };
+    let along = |i: &Instance| Vec3::new(i.world_from_mesh[0][2], i.world_from_mesh[1][2], i.world_from_mesh[2][2]);
     // Force on the ball: up and to +X, against the wall's direction.
     let force = to_f32(&frame.joints[0].normal_force);
     let tip = place(&head) + along(&head);
@@ -270,10 +191,7 @@ fn arrows_start_at_the_contact_and_have_the_legends_length() {
     assert!((0.7..=1.0).contains(&seen), "4 N at 4 N reference: {seen}");
     assert!((tip - place(&shaft)).normalize().dot(force.normalize()) > 0.9999);
     let contact = place(ball(&list, 0.010)) - force.normalize() * 0.010;
-    assert!(
-        place(&shaft).distance(contact) < 1e-6,
-        "on the ball, where it touches"
-    );
+    assert!(place(&shaft).distance(contact) < 1e-6, "on the ball, where it touches");
     assert_eq!((legend.reference, legend.friction), (4.0, None));
 }
 
@@ -285,14 +203,7 @@ fn a_logarithmic_scale_shortens_three_decades_to_one_length() {
     options.arrows.reference = Some(1000.0);
     let legend = list(&scene, &frame, &options).legend.expect("a legend");
     let fractions: Vec<f32> = legend.ticks.iter().map(|tick| tick.fraction).collect();
-    assert_eq!(
-        legend
-            .ticks
-            .iter()
-            .map(|tick| tick.force.round())
-            .collect::<Vec<_>>(),
-        [1.0, 10.0, 100.0, 1000.0]
-    );
+    assert_eq!(legend.ticks.iter().map(|tick| tick.force.round()).collect::<Vec<_>>(), [1.0, 10.0, 100.0, 1000.0]);
     for (fraction, expect) in fractions.iter().zip([0.1, 0.347, 0.668, 1.0]) {
         assert!((fraction - expect).abs() < 2e-3, "{fractions:?}");
     }
@@ -302,13 +213,7 @@ fn a_logarithmic_scale_shortens_three_decades_to_one_length() {
 fn what_is_under_the_cursor_is_what_is_drawn_there() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
-    let (marks, options) = (
-        PeakMarks::new(),
-        ViewOptions {
-            magnification: 30.0,
-            ..Default::default()
-        },
-    );
+    let (marks, options) = (PeakMarks::new(), ViewOptions { magnification: 30.0, ..Default::default() });
     let mut camera = view.camera();
     view.fit(&mut camera, &scene, &frame, &options, SIZE);
     let shot = shot(&scene, &frame, &marks, &options, &camera);
@@ -317,33 +222,15 @@ fn what_is_under_the_cursor_is_what_is_drawn_there() {
         view.pick(&shot, pixel).map(|hit| hit.what)
     };
     let middle_of_rod = Pose::in_frame(&frame, Some(3)).apply(Vec3::new(0.0, 0.0, 0.1));
-    assert_eq!(
-        under(to_f32(&frame.joints[0].socket_centre)),
-        Some(Picked::Joint(0))
-    );
+    assert_eq!(under(to_f32(&frame.joints[0].socket_centre)), Some(Picked::Joint(0)));
     assert_eq!(under(middle_of_rod), Some(Picked::Body(3)));
-    assert_eq!(
-        under(to_f32(&frame.bodies[6].position)),
-        Some(Picked::Body(6))
-    );
-    assert_eq!(
-        under(to_f32(&frame.bodies[0].position)),
-        Some(Picked::Body(0))
-    );
+    assert_eq!(under(to_f32(&frame.bodies[6].position)), Some(Picked::Body(6)));
+    assert_eq!(under(to_f32(&frame.bodies[0].position)), Some(Picked::Body(0)));
     assert_eq!(under(Vec3::new(0.032, 0.0, 0.29)), Some(Picked::Fixed(0)));
-    assert_eq!(
-        view.pick(&shot, Vec2::new(2.0, 2.0)),
-        None,
-        "the background"
-    );
-    let pixel = camera
-        .project(to_f32(&frame.joints[1].socket_centre), SIZE)
-        .expect("before the eye");
+    assert_eq!(view.pick(&shot, Vec2::new(2.0, 2.0)), None, "the background");
+    let pixel = camera.project(to_f32(&frame.joints[1].socket_centre), SIZE).expect("before the eye");
     let hit = view.pick(&shot, pixel).expect("a socket");
-    assert_eq!(
-        view.anchor(&frame, hit.what),
-        Some(to_f32(&frame.joints[1].socket_centre))
-    );
+    assert_eq!(view.anchor(&frame, hit.what), Some(to_f32(&frame.joints[1].socket_centre)));
 }
 
 #[test]
@@ -352,40 +239,21 @@ fn labels_name_the_axes_gravity_and_the_joints_where_they_are() {
     let list = list(&scene, &frame, &ViewOptions::default());
     let texts: Vec<&str> = list.labels.iter().map(|label| &*label.text).collect();
     assert_eq!(texts, ["X", "Y", "Z", "g", "S1", "S2", "S3"]);
-    let label = list
-        .labels
-        .iter()
-        .find(|label| label.kind == LabelKind::Joint(1))
-        .expect("S2");
-    let joint = list
-        .eye
-        .project(to_f32(&frame.joints[1].socket_centre), SIZE)
-        .expect("before the eye");
+    let label = list.labels.iter().find(|label| label.kind == LabelKind::Joint(1)).expect("S2");
+    let joint = list.eye.project(to_f32(&frame.joints[1].socket_centre), SIZE).expect("before the eye");
     assert!(
         (label.pixel.x - joint.x).abs() < 2.0 && (5.0..80.0).contains(&(joint.y - label.pixel.y)),
         "above its socket"
     );
     let x = &list.labels[0];
     let origin = list.overlay.by_mesh[Mesh::Cylinder.index()][0];
-    let corner = list
-        .eye
-        .project(place(&origin), SIZE)
-        .expect("before the eye");
-    assert!(
-        x.pixel.y > corner.y + 10.0,
-        "the X axis of this scene points down"
-    );
-    assert!(
-        (corner - Vec2::new(62.0, 720.0 - 62.0)).length() < 1.0,
-        "in the lower left corner: {corner}"
-    );
+    let corner = list.eye.project(place(&origin), SIZE).expect("before the eye");
+    assert!(x.pixel.y > corner.y + 10.0, "the X axis of this scene points down");
+    assert!((corner - Vec2::new(62.0, 720.0 - 62.0)).length() < 1.0, "in the lower left corner: {corner}");
     let view = SceneView::new(&scene, &frame);
     let marks = PeakMarks::new();
     let (options, camera) = (ViewOptions::default(), view.camera());
-    let narrow = Shot {
-        size: [240, 320],
-        ..shot(&scene, &frame, &marks, &options, &camera)
-    };
+    let narrow = Shot { size: [240, 320], ..shot(&scene, &frame, &marks, &options, &camera) };
     let mut list = DrawList::default();
     view.build(&narrow, &mut list);
     let texts: Vec<&str> = list.labels.iter().map(|label| &*label.text).collect();
@@ -416,35 +284,17 @@ fn a_frame_with_broken_numbers_draws_without_a_panic() {
     frame.bodies[3].position.x = f64::NAN;
     frame.joints[0].eccentricity.y = f64::NAN;
     frame.joints[1].normal_force.z = f64::INFINITY;
-    let drawn = list(
-        &scene,
-        &frame,
-        &ViewOptions {
-            magnification: f32::NAN,
-            ..Default::default()
-        },
-    );
+    let drawn = list(&scene, &frame, &ViewOptions { magnification: f32::NAN, ..Default::default() });
     assert_eq!(drawn.magnification, 1.0);
-    let (view, marks, options) = (
-        SceneView::new(&scene, &frame),
-        PeakMarks::new(),
-        ViewOptions::default(),
-    );
+    let (view, marks, options) = (SceneView::new(&scene, &frame), PeakMarks::new(), ViewOptions::default());
     let mut camera = view.camera();
     view.fit(&mut camera, &scene, &frame, &options, SIZE);
     assert!(camera.eye().is_finite());
     for x in (0..SIZE[0]).step_by(40) {
-        view.pick(
-            &shot(&scene, &frame, &marks, &options, &camera),
-            Vec2::new(x as f32, 360.0),
-        );
+        view.pick(&shot(&scene, &frame, &marks, &options, &camera), Vec2::new(x as f32, 360.0));
     }
     let empty = Frame::default();
-    assert!(
-        list(&scene, &empty, &ViewOptions::default())
-            .sockets
-            .is_empty()
-    );
+    assert!(list(&scene, &empty, &ViewOptions::default()).sockets.is_empty());
 }
 
 #[test]
@@ -463,10 +313,7 @@ fn a_spring_is_in_the_picture_from_end_to_end() {
     let ends = frame.elements[0].points;
     for end in ends {
         let at = camera.project(to_f32(&end), SIZE).unwrap();
-        assert!(
-            at.cmpge(Vec2::ZERO).all() && at.cmple(Vec2::new(1280.0, 720.0)).all(),
-            "{at}"
-        );
+        assert!(at.cmpge(Vec2::ZERO).all() && at.cmple(Vec2::new(1280.0, 720.0)).all(), "{at}");
     }
 }
 
@@ -511,15 +358,9 @@ fn a_hinge_has_a_pin_unless_the_scene_draws_it() {
     // Through the whole arm, and out on both sides.
     let row = pin.world_from_mesh[1];
     let (from, to) = (row[3], row[3] + row[2]);
-    assert!(
-        (from + to).abs() < 1e-6 && (0.0101..0.02).contains(&to.abs()),
-        "{from} {to}"
-    );
+    assert!((from + to).abs() < 1e-6 && (0.0101..0.02).contains(&to.abs()), "{from} {to}");
 
-    let hidden = ViewOptions {
-        hinges: false,
-        ..Default::default()
-    };
+    let hidden = ViewOptions { hinges: false, ..Default::default() };
     assert_eq!(count(&list(&scene, &frame, &hidden), Mesh::Cylinder), 0);
     let (scene, frame) = started(&format!("{ARM}drawn = false\n"), &[]);
     assert_eq!(count(&list(&scene, &frame, &options), Mesh::Cylinder), 0);
@@ -536,9 +377,7 @@ fn a_hinge_has_a_pin_unless_the_scene_draws_it() {
 
 #[test]
 fn a_slide_has_a_rail_beyond_what_slides_on_it() {
-    let text = ARM
-        .replace("revolute", "prismatic")
-        .replace("[0, 1, 0]", "[1, 0, 0]");
+    let text = ARM.replace("revolute", "prismatic").replace("[0, 1, 0]", "[1, 0, 0]");
     let (scene, frame) = started(&text, &[]);
     let drawn = list(&scene, &frame, &ViewOptions::default());
     let [rail, _sleeve] = drawn.solid.by_mesh[Mesh::Cylinder.index()][..] else {
@@ -588,9 +427,7 @@ fn a_universal_joint_is_a_cross_of_two_pins() {
 
 #[test]
 fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_of_a_shaft() {
-    let text = ARM
-        .replace("revolute", "cylindrical")
-        .replace("[0, 1, 0]", "[1, 0, 0]");
+    let text = ARM.replace("revolute", "cylindrical").replace("[0, 1, 0]", "[1, 0, 0]");
     let (scene, frame) = started(&text, &[]);
     let options = ViewOptions::default();
     let [along, across] = bars(&list(&scene, &frame, &options), Vec3::X);
@@ -609,8 +446,7 @@ fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_o
     let cosine = along(across[0]).dot(along(after[0]));
     assert!((cosine - 1_f32.cos()).abs() < 1e-3, "{cosine}");
 
-    let shaft =
-        "{ form = \"cylinder\", from = \"0 0 0 mm\", to = \"100 0 0 mm\", radius = \"8 mm\" }";
+    let shaft = "{ form = \"cylinder\", from = \"0 0 0 mm\", to = \"100 0 0 mm\", radius = \"8 mm\" }";
     let shapes = turned.lines().find(|l| l.starts_with("shapes")).unwrap();
     let turned = turned.replace(shapes, &format!("shapes = [{shaft}]"));
     let (scene, frame) = started(&turned, &[]);
@@ -653,11 +489,7 @@ fn a_body_without_shapes_is_seen() {
     let shapes = ARM.lines().find(|line| line.starts_with("shapes")).unwrap();
     let (scene, frame) = started(&ARM.replace(shapes, ""), &[]);
     let view = SceneView::new(&scene, &frame);
-    assert!(
-        (0.025..0.05).contains(&view.bounds().radius),
-        "{:?}",
-        view.bounds()
-    );
+    assert!((0.025..0.05).contains(&view.bounds().radius), "{:?}", view.bounds());
     let drawn = list(&scene, &frame, &ViewOptions::default());
     assert!(count(&drawn, Mesh::Sphere) >= 1 && count(&drawn, Mesh::Cylinder) >= 2);
 }
@@ -666,8 +498,7 @@ fn a_body_without_shapes_is_seen() {
 fn shapes_of_one_file_share_a_mesh_and_are_picked() {
     let wedge = "v 0 -10 -10\nv 0 10 -10\nv 0 0 10\nv 30 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
     let mesh = "{ form = \"mesh\", file = \"a.obj\", unit = \"mm\"";
-    let two =
-        format!("shapes = [{mesh} }}, {mesh}, position = \"60 0 0 mm\", colour = \"#ff8000\" }}]");
+    let two = format!("shapes = [{mesh} }}, {mesh}, position = \"60 0 0 mm\", colour = \"#ff8000\" }}]");
     let shapes = ARM.lines().find(|line| line.starts_with("shapes")).unwrap();
     let (scene, frame) = started(&ARM.replace(shapes, &two), &[("a.obj", wedge)]);
     let options = ViewOptions::default();
@@ -687,9 +518,6 @@ fn shapes_of_one_file_share_a_mesh_and_are_picked() {
     assert_eq!(hit.what, Picked::Body(0));
     assert!((0.055..0.1).contains(&hit.point.x), "{:?}", hit.point);
     // Past its edge there is nothing.
-    let pixel = drawn
-        .eye
-        .project(Vec3::new(0.045, 0.02, 0.0), SIZE)
-        .unwrap();
+    let pixel = drawn.eye.project(Vec3::new(0.045, 0.02, 0.0), SIZE).unwrap();
     assert_eq!(view.pick(&shot, pixel), None);
 }

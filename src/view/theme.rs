@@ -19,24 +19,13 @@ pub struct Colour(pub [f32; 4]);
 impl Colour {
     /// From `0xRRGGBB`, opaque.
     pub const fn hex(rgb: u32) -> Self {
-        Self([
-            ((rgb >> 16) & 255) as f32 / 255.0,
-            ((rgb >> 8) & 255) as f32 / 255.0,
-            (rgb & 255) as f32 / 255.0,
-            1.0,
-        ])
+        Self([((rgb >> 16) & 255) as f32 / 255.0, ((rgb >> 8) & 255) as f32 / 255.0, (rgb & 255) as f32 / 255.0, 1.0])
     }
 
     /// Red, green and blue as light.
     pub fn linear(self) -> [f32; 3] {
         let [r, g, b, _] = self.0;
-        [r, g, b].map(|c| {
-            if c > 0.04045 {
-                ((c + 0.055) / 1.055).powf(2.4)
-            } else {
-                c / 12.92
-            }
-        })
+        [r, g, b].map(|c| if c > 0.04045 { ((c + 0.055) / 1.055).powf(2.4) } else { c / 12.92 })
     }
 
     /// The same colour with another opacity.
@@ -64,19 +53,12 @@ pub struct Material {
 impl Material {
     /// The same surface with another opacity.
     pub const fn with_opacity(self, opacity: f32) -> Self {
-        Self {
-            colour: self.colour.with_opacity(opacity),
-            ..self
-        }
+        Self { colour: self.colour.with_opacity(opacity), ..self }
     }
 }
 
 const fn material(rgb: u32, roughness: f32, metal: f32) -> Material {
-    Material {
-        colour: Colour::hex(rgb),
-        roughness,
-        metal,
-    }
+    Material { colour: Colour::hex(rgb), roughness, metal }
 }
 
 /// Bare steel.
@@ -122,20 +104,11 @@ pub struct GhostLook {
 }
 
 const fn twin(fill: u32, opacity: f32, edge: u32) -> GhostLook {
-    GhostLook {
-        fill: Colour::hex(fill).with_opacity(opacity),
-        edge: Colour::hex(edge),
-        width: 1.9,
-        slice: 0.0,
-    }
+    GhostLook { fill: Colour::hex(fill).with_opacity(opacity), edge: Colour::hex(edge), width: 1.9, slice: 0.0 }
 }
 
 const fn ideal(fill: u32, opacity: f32, edge: u32) -> GhostLook {
-    GhostLook {
-        width: 2.9,
-        slice: 1.0,
-        ..twin(fill, opacity, edge)
-    }
+    GhostLook { width: 2.9, slice: 1.0, ..twin(fill, opacity, edge) }
 }
 
 /// All colours of one theme.
@@ -196,18 +169,11 @@ impl Palette {
                 outside: Colour::hex(0x00796B),
                 flash: Colour::hex(0xFFC61A),
                 gravity: Colour::hex(0x6B3FA0),
-                axes: [
-                    Colour::hex(0xC92A2A),
-                    Colour::hex(0x2B8A3E),
-                    Colour::hex(0x1864AB),
-                ],
+                axes: [Colour::hex(0xC92A2A), Colour::hex(0x2B8A3E), Colour::hex(0x1864AB)],
                 trail: Colour::hex(0xA61E4D),
                 ball: material(0xD8DCE0, 0.22, 0.75),
                 socket: glass(0x6FA8DC, 0.20),
-                ghosts: [
-                    twin(0x7B2FBE, 0.85, 0x5A189A),
-                    ideal(0xFFFFFF, 0.9, 0x2F4858),
-                ],
+                ghosts: [twin(0x7B2FBE, 0.85, 0x5A189A), ideal(0xFFFFFF, 0.9, 0x2F4858)],
                 exposure: 1.0,
                 studio: [1.0, 0.42, 0.95, 2.2],
                 outline: Colour::hex(0x20262C),
@@ -224,18 +190,11 @@ impl Palette {
                 outside: Colour::hex(0x2FD6BE),
                 flash: Colour::hex(0xFFE27A),
                 gravity: Colour::hex(0xB197FC),
-                axes: [
-                    Colour::hex(0xFF6B6B),
-                    Colour::hex(0x69DB7C),
-                    Colour::hex(0x4DABF7),
-                ],
+                axes: [Colour::hex(0xFF6B6B), Colour::hex(0x69DB7C), Colour::hex(0x4DABF7)],
                 trail: Colour::hex(0xF783AC),
                 ball: material(0xE3E7EB, 0.22, 0.75),
                 socket: glass(0x8CC4F0, 0.17),
-                ghosts: [
-                    twin(0xC9A0FF, 0.85, 0xE0C3FF),
-                    ideal(0xFFFFFF, 0.5, 0xFFFFFF),
-                ],
+                ghosts: [twin(0xC9A0FF, 0.85, 0xE0C3FF), ideal(0xFFFFFF, 0.5, 0xFFFFFF)],
                 exposure: 0.92,
                 studio: [1.0, 0.16, 0.62, 2.6],
                 outline: Colour::hex(0x0B0E11),
@@ -274,19 +233,11 @@ mod tests {
         ("full", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
         (
             "protanopia",
-            [
-                [0.152286, 1.052583, -0.204868],
-                [0.114503, 0.786281, 0.099216],
-                [-0.003882, -0.048116, 1.051998],
-            ],
+            [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
         ),
         (
             "deuteranopia",
-            [
-                [0.367322, 0.860646, -0.227968],
-                [0.280085, 0.672501, 0.047413],
-                [-0.011820, 0.042940, 0.968881],
-            ],
+            [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
         ),
     ];
 
@@ -305,13 +256,8 @@ mod tests {
             [0.019_333_9, 0.119_192, 0.950_304_1],
         ];
         let [x, y, z] = product(XYZ, light.map(|c| c.clamp(0.0, 1.0)));
-        let [x, y, z] = [x / 0.95047, y, z / 1.08883].map(|t| {
-            if t > 216.0 / 24389.0 {
-                t.cbrt()
-            } else {
-                (24389.0 / 27.0 * t + 16.0) / 116.0
-            }
-        });
+        let [x, y, z] = [x / 0.95047, y, z / 1.08883]
+            .map(|t| if t > 216.0 / 24389.0 { t.cbrt() } else { (24389.0 / 27.0 * t + 16.0) / 116.0 });
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     }
 

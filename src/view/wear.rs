@@ -50,10 +50,8 @@ impl WearScale {
     /// Colour at a position on the scale: viridis (S. van der Walt and N. Smith, 2015), whose lightness rises evenly, also
     /// for the colour-blind and in grey.
     pub fn colour(place: f32) -> Colour {
-        const VIRIDIS: [u32; 9] = [
-            0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30,
-            0xFDE725,
-        ];
+        const VIRIDIS: [u32; 9] =
+            [0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30, 0xFDE725];
         let at = place.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
         let lower = (at as usize).min(VIRIDIS.len() - 2);
         let [from, to] = [lower, lower + 1].map(|i| Colour::hex(VIRIDIS[i]).0);
@@ -74,13 +72,8 @@ impl SceneView {
         let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
         let joints = 0..shot.scene.ball_joints.len().min(shot.frame.joints.len());
         let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
-        let values = joints
-            .clone()
-            .flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
-        let scale = WearScale {
-            map,
-            largest: values.fold(0.0, f32::max),
-        };
+        let values = joints.clone().flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
+        let scale = WearScale { map, largest: values.fold(0.0, f32::max) };
         out.wear_scale = Some(scale);
         if scale.largest <= 0.0 {
             return;
@@ -99,11 +92,7 @@ impl SceneView {
                     continue;
                 }
                 let turn = Mat3::from_rotation_z(wear.grid().edges(i).azimuth[0] as f32);
-                let surface = Material {
-                    colour: WearScale::colour(scale.place(value)),
-                    roughness: 1.0,
-                    metal: 0.0,
-                };
+                let surface = Material { colour: WearScale::colour(scale.place(value)), roughness: 1.0, metal: 0.0 };
                 let mesh = Mesh::Plate(wear.grid().zone_of(i) as u16);
                 let cell = placed(socket * turn * size, drawn[j].socket_centre, surface);
                 out.wear.push(mesh, cell);
@@ -118,10 +107,7 @@ mod tests {
 
     #[test]
     fn the_scale_is_logarithmic_and_ends_at_the_largest_value() {
-        let scale = WearScale {
-            map: WearMap::Impulse,
-            largest: 1.2,
-        };
+        let scale = WearScale { map: WearMap::Impulse, largest: 1.2 };
         assert_eq!(scale.place(1.2), 1.0);
         assert!((scale.place(0.12) - 2.0 / 3.0).abs() < 1e-6);
         assert!(scale.place(scale.least()) < 1e-6);
@@ -137,13 +123,9 @@ mod tests {
     fn a_larger_value_is_lighter() {
         // Relative luminance (IEC 61966-2-1) of a colour.
         let luminance = |place: f32| {
-            let [r, g, b, _] = WearScale::colour(place).0.map(|c| {
-                if c > 0.04045 {
-                    ((c + 0.055) / 1.055).powf(2.4)
-                } else {
-                    c / 12.92
-                }
-            });
+            let [r, g, b, _] = WearScale::colour(place)
+                .0
+                .map(|c| if c > 0.04045 { ((c + 0.055) / 1.055).powf(2.4) } else { c / 12.92 });
             0.2126 * r + 0.7152 * g + 0.0722 * b
         };
         for i in 0..40 {

@@ -20,9 +20,8 @@ fn patch(edges: &Edges) -> MeshData {
     let mut mesh = MeshData::default();
     for i in 0..=rows {
         for k in 0..=columns {
-            let at = |[from, to]: [f64; 2], part: u32, parts: u32| {
-                from + (to - from) * f64::from(part) / f64::from(parts)
-            };
+            let at =
+                |[from, to]: [f64; 2], part: u32, parts: u32| from + (to - from) * f64::from(part) / f64::from(parts);
             let (polar, azimuth) = (at(polar, i, rows), at(azimuth, k, columns));
             let ((s, c), (sa, ca)) = (polar.sin_cos(), azimuth.sin_cos());
             let [x, y, z] = [s * ca, s * sa, c].map(|part| part as f32);

@@ -23,15 +23,9 @@ pub fn explain_panics() {
     let previous = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         let what = info.payload_as_str().unwrap_or("unknown cause");
-        let place = info
-            .location()
-            .map(|place| format!("{}:{}", place.file(), place.line()))
-            .unwrap_or_default();
+        let place = info.location().map(|place| format!("{}:{}", place.file(), place.line())).unwrap_or_default();
         let (running, link) = RUNNING.with_borrow(Clone::clone);
-        let report = format!(
-            "jointplay {} failed inside: {what}\nat {place}\n{running}",
-            crate::VERSION
-        );
+        let report = format!("jointplay {} failed inside: {what}\nat {place}\n{running}", crate::VERSION);
         // Without a page, as in a script, there is nothing to show it on.
         let _ = crashed(&report, &link);
         previous(info);
@@ -45,11 +39,7 @@ pub fn note(scene: &Scene, renderer: &str, link: String) {
         let (key, value) = (visible_line(key), visible_line(value));
         text.push_str(&format!("changed: {key} = {value}\n"));
     }
-    let state = if link.starts_with("kept:") {
-        "larger than an address"
-    } else {
-        &link
-    };
+    let state = if link.starts_with("kept:") { "larger than an address" } else { &link };
     text.push_str(&format!("renderer: {renderer}\nstate: #{state}"));
     RUNNING.set((text, link));
 }

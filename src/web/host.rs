@@ -131,8 +131,7 @@ impl Host for WebHost {
 
     fn workers(&self) -> usize {
         // One core draws and steps.
-        let cores =
-            eframe::web_sys::window().map(|window| window.navigator().hardware_concurrency());
+        let cores = eframe::web_sys::window().map(|window| window.navigator().hardware_concurrency());
         (cores.unwrap_or(1.0) as usize).saturating_sub(1).max(1)
     }
 

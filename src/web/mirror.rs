@@ -107,10 +107,7 @@ fn describe(
 }
 
 /// A control's own name, else that of what labels it (sliders, text fields), else its text.
-fn label<'a>(
-    node: &'a accesskit::Node,
-    nodes: &HashMap<accesskit::NodeId, &'a accesskit::Node>,
-) -> Option<&'a str> {
+fn label<'a>(node: &'a accesskit::Node, nodes: &HashMap<accesskit::NodeId, &'a accesskit::Node>) -> Option<&'a str> {
     let labelling = || {
         node.labelled_by().iter().find_map(|id| {
             let label = nodes.get(id)?;

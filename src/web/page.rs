@@ -51,11 +51,7 @@ impl Page {
         crash::explain_panics();
         // A second page of the same code finds the logger installed.
         let _ = eframe::WebLogger::init(log::LevelFilter::Warn);
-        Self {
-            runner: eframe::WebRunner::new(),
-            laboratory: Rc::default(),
-            inbox: Rc::default(),
-        }
+        Self { runner: eframe::WebRunner::new(), laboratory: Rc::default(), inbox: Rc::default() }
     }
 
     /// Draws on `canvas` with `backend` (`webgpu` or `webgl`) from now on; `start` counts the starts. The first one opens
@@ -71,16 +67,9 @@ impl Page {
         link: String,
     ) -> Result<(), JsValue> {
         let mut setup = WgpuSetupCreateNew::without_display_handle();
-        setup.instance_descriptor.backends = if backend == "webgl" {
-            Backends::GL
-        } else {
-            Backends::BROWSER_WEBGPU
-        };
+        setup.instance_descriptor.backends = if backend == "webgl" { Backends::GL } else { Backends::BROWSER_WEBGPU };
         let options = eframe::WebOptions {
-            wgpu_options: WgpuConfiguration {
-                wgpu_setup: setup.into(),
-                ..Default::default()
-            },
+            wgpu_options: WgpuConfiguration { wgpu_setup: setup.into(), ..Default::default() },
             ..Default::default()
         };
         let (laboratory, inbox) = (self.laboratory.clone(), self.inbox.clone());
@@ -207,10 +196,7 @@ impl Page {
     pub fn widgets(&self) -> Option<String> {
         self.with(|laboratory| {
             let ctx = &laboratory.ctx;
-            let widgets = ctx
-                .plugin_or_default::<Mirror>()
-                .lock()
-                .widgets(ctx.zoom_factor());
+            let widgets = ctx.plugin_or_default::<Mirror>().lock().widgets(ctx.zoom_factor());
             if widgets.is_empty() {
                 ctx.request_repaint();
             }
@@ -286,25 +272,15 @@ impl Laboratory {
         inbox: Rc<Inbox>,
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
         let mut app = App::new(cc, AppOptions::from_link_or_default(link))?;
-        app.set_host(Box::new(WebHost {
-            inbox,
-            no_sound: None,
-        }));
+        app.set_host(Box::new(WebHost { inbox, no_sound: None }));
         app.follow_frame_rate();
-        Ok(Self {
-            app,
-            ctx: cc.egui_ctx.clone(),
-            renderer: describe(cc),
-            frames: 0,
-            noted: None,
-        })
+        Ok(Self { app, ctx: cc.egui_ctx.clone(), renderer: describe(cc), frames: 0, noted: None })
     }
 
     /// Continues with new graphics.
     fn attach(&mut self, cc: &eframe::CreationContext<'_>) {
         let theme = self.ctx.options(|options| options.theme_preference);
-        self.app
-            .attach(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), theme);
+        self.app.attach(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), theme);
         self.ctx = cc.egui_ctx.clone();
         self.renderer = describe(cc);
         self.noted = None;
@@ -343,17 +319,10 @@ impl Laboratory {
     fn state(&self) -> String {
         let player = self.app.player();
         let scene = player.scene();
-        let changes: serde_json::Map<_, _> = scene
-            .changes
-            .iter()
-            .map(|(key, value)| (key.clone(), json!(value)))
-            .collect();
+        let changes: serde_json::Map<_, _> =
+            scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
         // A camera that was not moved shows everything.
-        let camera = self
-            .app
-            .link()
-            .camera
-            .filter(|camera| camera.fitted.is_none());
+        let camera = self.app.link().camera.filter(|camera| camera.fitted.is_none());
         let camera = camera.map(|camera| {
             json!({
                 "yaw_rad": camera.yaw,

@@ -44,15 +44,13 @@ impl Run {
         let changes: Vec<(String, String)> = changes
             .iter()
             .map(|change| {
-                let (key, value) = change
-                    .split_once('=')
-                    .ok_or_else(|| JsError::new(&format!("`{change}` is not `key=value`")))?;
+                let (key, value) =
+                    change.split_once('=').ok_or_else(|| JsError::new(&format!("`{change}` is not `key=value`")))?;
                 Ok((key.to_owned(), value.to_owned()))
             })
             .collect::<Result<_, JsError>>()?;
         let scene = Scene::load(scene, &changes)?;
-        let simulation =
-            Simulation::new(&scene).map_err(|e| JsError::new(&e.located(&scene).to_string()))?;
+        let simulation = Simulation::new(&scene).map_err(|e| JsError::new(&e.located(&scene).to_string()))?;
         Ok(Self { simulation })
     }
 

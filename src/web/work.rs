@@ -41,9 +41,7 @@ fn say(message: &Message) {
 #[wasm_bindgen]
 pub async fn perform(job: String) {
     std::panic::set_hook(Box::new(|info| {
-        say(&Message::Failed(format!(
-            "the computation failed inside: {info}"
-        )));
+        say(&Message::Failed(format!("the computation failed inside: {info}")));
     }));
     let start = Instant::now();
     let job = match serde_json::from_str::<Job>(&job) {
@@ -75,10 +73,7 @@ impl Worker {
     /// Starts `job`; `None` where the browser has no workers.
     pub fn start(job: &Job) -> Option<Self> {
         let job = serde_json::to_string(job).ok()?;
-        Some(Self {
-            number: start_work(&job)?,
-            finished: false,
-        })
+        Some(Self { number: start_work(&job)?, finished: false })
     }
 }
 

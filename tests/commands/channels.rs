@@ -24,7 +24,8 @@ fn chosen_columns_are_those_of_the_whole_run() {
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let (whole, chosen) = (read("whole.csv"), read("chosen.csv"));
     let (whole, chosen) = (lines(&whole), lines(&chosen));
-    let header = "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad,S2_force_x_N,S2_force_y_N,S2_force_z_N,energy_residual_J";
+    let header =
+        "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad,S2_force_x_N,S2_force_y_N,S2_force_z_N,energy_residual_J";
     assert_eq!(chosen[0].join(","), header);
     assert_eq!((chosen.len(), whole.len()), (12, 12));
     for (column, name) in chosen[0].iter().enumerate() {
@@ -35,10 +36,7 @@ fn chosen_columns_are_those_of_the_whole_run() {
     }
     let other = read("other.csv");
     let other = lines(&other);
-    assert_eq!(
-        other[0].join(","),
-        "t_s,rod1_x_m,P1_position_m,P1_rate_m_s,R1_angle_rad,S1_gap_m,S2_gap_m,S3_gap_m"
-    );
+    assert_eq!(other[0].join(","), "t_s,rod1_x_m,P1_position_m,P1_rate_m_s,R1_angle_rad,S1_gap_m,S2_gap_m,S3_gap_m");
     let gap = whole[0].iter().position(|name| *name == "S2_penetration_m");
     for (a, b) in other[1..].iter().zip(&whole[1..]) {
         let [a, b]: [f64; 2] = [a[6], b[gap.unwrap()]].map(|value| value.parse().unwrap());
@@ -65,11 +63,7 @@ fn every_kind_of_file_takes_chosen_columns() {
     let mut archive = ndarray_npy::NpzReader::new(archive).unwrap();
     let arrays = archive.names().unwrap();
     for name in columns {
-        assert!(
-            arrays
-                .iter()
-                .any(|array| array.trim_end_matches(".npy") == name)
-        );
+        assert!(arrays.iter().any(|array| array.trim_end_matches(".npy") == name));
     }
     assert_eq!(arrays.len(), json["columns"].as_object().unwrap().len() + 1);
 }
@@ -79,14 +73,7 @@ fn a_channel_that_no_scene_has_is_refused_with_the_nearest() {
     let folder = folder();
     let run = "run pendulum --duration 1ms --every 1ms --out a.csv --channels";
     for (patterns, words) in [
-        (
-            "S1.froce",
-            &[
-                "S1.froce",
-                "did you mean `S1.force`?",
-                "check pendulum --channels",
-            ][..],
-        ),
+        ("S1.froce", &["S1.froce", "did you mean `S1.force`?", "check pendulum --channels"][..]),
         ("S1.force,nothing.*", &["nothing.*"]),
         ("S1.force,,time", &["``"]),
     ] {
@@ -104,22 +91,12 @@ fn a_channel_that_no_scene_has_is_refused_with_the_nearest() {
 #[test]
 fn check_lists_every_channel() {
     let folder = folder();
-    let list = jointplay(folder.path(), "check spcmm --channels")
-        .expect(0)
-        .stdout;
+    let list = jointplay(folder.path(), "check spcmm --channels").expect(0).stdout;
     let (unasked, asked) = list.split_once("Written if asked for:\n").unwrap();
-    let words = |line: &str| {
-        line.split_whitespace()
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
-    };
+    let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let unasked: Vec<_> = unasked.lines().skip(1).map(words).collect();
     assert_eq!(unasked[0][..3], ["time", "s", "t_s"]);
-    assert!(
-        asked
-            .lines()
-            .any(|line| words(line)[..3] == ["rod1.pose.x", "m", "rod1_x_m"])
-    );
+    assert!(asked.lines().any(|line| words(line)[..3] == ["rod1.pose.x", "m", "rod1_x_m"]));
     let run = "run spcmm --duration 0s --every 1s --out a.csv";
     jointplay(folder.path(), run).expect(0);
     let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();

@@ -3,12 +3,7 @@
 use jointplay::chart::{Axis, Chart, Label, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
 
 fn axis(label: &str, unit: &str, scale: Scale) -> Axis {
-    Axis {
-        label: label.to_owned(),
-        unit: unit.to_owned(),
-        scale,
-        range: None,
-    }
+    Axis { label: label.to_owned(), unit: unit.to_owned(), scale, range: None }
 }
 
 fn series(label: &str, points: Vec<(f64, f64)>, n: usize) -> Series {
@@ -42,27 +37,12 @@ fn sheet(size: (u32, u32)) -> Sheet {
         title: "Phase portrait".to_owned(),
         x: axis("Eccentricity", "mm", Scale::Linear),
         y: axis("Speed", "m/s", Scale::Linear),
-        series: (0..10)
-            .map(|n| series(&format!("a < b & {n}"), line(n), n))
-            .collect(),
-        labels: vec![Label {
-            at: (2.0, 0.5),
-            text: "\"here\" & there".to_owned(),
-        }],
-        levels: vec![Level {
-            y: 0.25,
-            text: "level".to_owned(),
-        }],
+        series: (0..10).map(|n| series(&format!("a < b & {n}"), line(n), n)).collect(),
+        labels: vec![Label { at: (2.0, 0.5), text: "\"here\" & there".to_owned() }],
+        levels: vec![Level { y: 0.25, text: "level".to_owned() }],
         map: None,
     };
-    let broken = vec![
-        (1e-3, 1e-9),
-        (1e-2, f64::NAN),
-        (1e-1, 0.0),
-        (f64::INFINITY, 1.0),
-        (1.0, 1e-2),
-        (10.0, 1.0),
-    ];
+    let broken = vec![(1e-3, 1e-9), (1e-2, f64::NAN), (1e-1, 0.0), (f64::INFINITY, 1.0), (1.0, 1e-2), (10.0, 1.0)];
     let log = Chart {
         title: "Error".to_owned(),
         x: axis("Time", "s", Scale::Logarithmic),
@@ -70,13 +50,7 @@ fn sheet(size: (u32, u32)) -> Sheet {
         series: vec![series("broken", broken, 1), series("empty", Vec::new(), 2)],
         ..Chart::default()
     };
-    Sheet {
-        title: "Two charts".to_owned(),
-        charts: vec![linear, log],
-        columns: 2,
-        size,
-        note: "a note".to_owned(),
-    }
+    Sheet { title: "Two charts".to_owned(), charts: vec![linear, log], columns: 2, size, note: "a note".to_owned() }
 }
 
 #[test]
@@ -84,19 +58,9 @@ fn text_and_picture_follow_from_the_description_alone() {
     let sheet = sheet((900, 420));
     let svg = sheet.svg().unwrap();
     assert_eq!(svg, sheet.svg().unwrap());
-    assert!(
-        svg.starts_with("<svg width=\"900\" height=\"420\""),
-        "{}",
-        &svg[..80]
-    );
+    assert!(svg.starts_with("<svg width=\"900\" height=\"420\""), "{}", &svg[..80]);
     // Text stays text, escaped where it must be.
-    for word in [
-        "a &lt; b &amp; 3",
-        "Phase portrait",
-        "Eccentricity (mm)",
-        "broken",
-        "10⁻⁶",
-    ] {
+    for word in ["a &lt; b &amp; 3", "Phase portrait", "Eccentricity (mm)", "broken", "10⁻⁶"] {
         assert!(svg.contains(word), "{word}");
     }
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
@@ -134,9 +98,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
     let sizes = Map {
         xs: vec![0.1, 0.2, 0.3, 0.4],
         ys: vec![1.0, 2.0, 3.0],
-        values: (0..12)
-            .map(|n| if n == 5 { f64::NAN } else { f64::from(n) })
-            .collect(),
+        values: (0..12).map(|n| if n == 5 { f64::NAN } else { f64::from(n) }).collect(),
         scale: axis("Force", "kN", Scale::Linear),
         names: Vec::new(),
     };
@@ -157,13 +119,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
         assert!(svg.contains(word), "{word}");
     }
     // Lowest and highest value have the ends of the scale's colours, what is not known is grey, and every kind its own.
-    for (colour, least) in [
-        ("#440154", 1),
-        ("#FEE825", 1),
-        ("#E1E1E1", 1),
-        ("#0072B2", 6),
-        ("#D55E00", 6),
-    ] {
+    for (colour, least) in [("#440154", 1), ("#FEE825", 1), ("#E1E1E1", 1), ("#0072B2", 6), ("#D55E00", 6)] {
         let found = svg.to_uppercase().matches(&colour.to_uppercase()).count();
         assert!(found >= least, "{colour}: {found}");
     }
@@ -186,10 +142,7 @@ fn a_hundred_thousand_points_make_no_large_file() {
         };
         Sheet {
             title: String::new(),
-            charts: vec![Chart {
-                series: vec![series],
-                ..Chart::default()
-            }],
+            charts: vec![Chart { series: vec![series], ..Chart::default() }],
             columns: 1,
             size: (600, 400),
             note: String::new(),
@@ -207,21 +160,10 @@ fn a_hundred_thousand_points_make_no_large_file() {
 fn a_line_stands_no_higher_than_its_peak() {
     // The highest coloured row of a line through `points`, pixels.
     let top = |points: &[(f64, f64)]| {
-        let axis = Axis {
-            range: Some((0.0, 10.0)),
-            ..Axis::default()
-        };
-        let line = Series {
-            marker: None,
-            ..series("", points.to_vec(), 1)
-        };
+        let axis = Axis { range: Some((0.0, 10.0)), ..Axis::default() };
+        let line = Series { marker: None, ..series("", points.to_vec(), 1) };
         let sheet = Sheet {
-            charts: vec![Chart {
-                x: axis.clone(),
-                y: axis,
-                series: vec![line],
-                ..Chart::default()
-            }],
+            charts: vec![Chart { x: axis.clone(), y: axis, series: vec![line], ..Chart::default() }],
             columns: 1,
             size: (500, 400),
             title: String::new(),
@@ -229,8 +171,7 @@ fn a_line_stands_no_higher_than_its_peak() {
         };
         let png = sheet.png(2.0).unwrap();
         let picture = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
-        let blue =
-            |p: &resvg::tiny_skia::PremultipliedColorU8| p.blue() > p.red().saturating_add(60);
+        let blue = |p: &resvg::tiny_skia::PremultipliedColorU8| p.blue() > p.red().saturating_add(60);
         let at = picture.pixels().iter().position(blue).unwrap();
         at as u32 / picture.width()
     };

@@ -26,10 +26,7 @@ fn example(folder: &Path, line: &str) -> Output {
 fn gnu_parallel_spreads_a_sweep_and_goes_on_after_a_failure() {
     let version = Command::new("parallel").arg("--version").output();
     let there = version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel"));
-    assert!(
-        there,
-        "GNU parallel is missing: ./test installs it (Debian, Ubuntu: parallel)"
-    );
+    assert!(there, "GNU parallel is missing: ./test installs it (Debian, Ubuntu: parallel)");
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     jointplay(folder.path(), &format!("sweep {SWEEP} --out whole.npz")).expect(0);
@@ -43,11 +40,7 @@ fn gnu_parallel_spreads_a_sweep_and_goes_on_after_a_failure() {
     fs::remove_dir(at("spread.npz.shards/2.npz.partial")).unwrap();
 
     let done = example(folder.path(), &format!("2 spread.npz {SWEEP}"));
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     assert!(fs::read(at("spread.npz")).unwrap() == fs::read(at("whole.npz")).unwrap());
     assert!(!at("spread.npz.shards").exists());
 }

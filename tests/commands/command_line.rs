@@ -22,30 +22,16 @@ impl Csv {
     fn read(path: &Path) -> Self {
         let text = fs::read_to_string(path).unwrap();
         let mut lines = text.lines();
-        let header: Vec<String> = lines
-            .next()
-            .unwrap()
-            .split(',')
-            .map(str::to_owned)
-            .collect();
-        let rows: Vec<Vec<f64>> = lines
-            .map(|line| {
-                line.split(',')
-                    .map(|value| value.parse().unwrap())
-                    .collect()
-            })
-            .collect();
+        let header: Vec<String> = lines.next().unwrap().split(',').map(str::to_owned).collect();
+        let rows: Vec<Vec<f64>> =
+            lines.map(|line| line.split(',').map(|value| value.parse().unwrap()).collect()).collect();
         assert!(rows.iter().all(|row: &Vec<f64>| row.len() == header.len()));
         assert!(rows.iter().flatten().all(|value| value.is_finite()));
         Self { header, rows }
     }
 
     fn column(&self, name: &str) -> Vec<f64> {
-        let column = self
-            .header
-            .iter()
-            .position(|h| h == name)
-            .unwrap_or_else(|| panic!("no column {name}"));
+        let column = self.header.iter().position(|h| h == name).unwrap_or_else(|| panic!("no column {name}"));
         self.rows.iter().map(|row| row[column]).collect()
     }
 }
@@ -53,24 +39,14 @@ impl Csv {
 #[test]
 fn rows_of_the_default_scene_have_the_promised_columns_and_times() {
     let folder = folder();
-    let run = jointplay(
-        folder.path(),
-        "run spcmm --duration 20ms --every 0.1ms --out run.csv",
-    )
-    .expect(0);
+    let run = jointplay(folder.path(), "run spcmm --duration 20ms --every 0.1ms --out run.csv").expect(0);
     assert!(run.stdout.contains("impacts"), "{}", run.stdout);
     let csv = Csv::read(&folder.path().join("run.csv"));
     assert_eq!(csv.header[..16].join(","), FIRST_COLUMNS);
-    let mut expected: Vec<String> = [
-        "ax_m_s2",
-        "ay_m_s2",
-        "az_m_s2",
-        "alpha_rate_rad_s",
-        "beta_rate_rad_s",
-        "gamma_rate_rad_s",
-    ]
-    .map(str::to_owned)
-    .into();
+    let mut expected: Vec<String> =
+        ["ax_m_s2", "ay_m_s2", "az_m_s2", "alpha_rate_rad_s", "beta_rate_rad_s", "gamma_rate_rad_s"]
+            .map(str::to_owned)
+            .into();
     for joint in ["S1", "S2", "S3"] {
         for quantity in [
             "ex_m",
@@ -89,16 +65,7 @@ fn rows_of_the_default_scene_have_the_promised_columns_and_times() {
             expected.push(format!("{joint}_{quantity}"));
         }
     }
-    expected.extend(
-        [
-            "P1_actuator_N",
-            "P2_actuator_N",
-            "P3_actuator_N",
-            "kinetic_J",
-            "potential_J",
-        ]
-        .map(str::to_owned),
-    );
+    expected.extend(["P1_actuator_N", "P2_actuator_N", "P3_actuator_N", "kinetic_J", "potential_J"].map(str::to_owned));
     assert_eq!(csv.header[16..16 + expected.len()], expected);
 
     assert_eq!(csv.rows.len(), 201);
@@ -111,26 +78,13 @@ fn rows_of_the_default_scene_have_the_promised_columns_and_times() {
     for joint in ["S1", "S2", "S3"] {
         let column = |quantity: &str| csv.column(&format!("{joint}_{quantity}"));
         let clearance = 0.3e-3;
-        let (e, delta, normal, state) = (
-            column("eccentricity_m"),
-            column("penetration_m"),
-            column("normal_N"),
-            column("state"),
-        );
+        let (e, delta, normal, state) =
+            (column("eccentricity_m"), column("penetration_m"), column("normal_N"), column("state"));
         let components = [column("ex_m"), column("ey_m"), column("ez_m")];
-        let force = [
-            column("force_x_N"),
-            column("force_y_N"),
-            column("force_z_N"),
-        ];
-        let friction = [
-            column("friction_x_N"),
-            column("friction_y_N"),
-            column("friction_z_N"),
-        ];
+        let force = [column("force_x_N"), column("force_y_N"), column("force_z_N")];
+        let friction = [column("friction_x_N"), column("friction_y_N"), column("friction_z_N")];
         for k in 0..csv.rows.len() {
-            let norm =
-                |v: &[Vec<f64>; 3]| (v[0][k].powi(2) + v[1][k].powi(2) + v[2][k].powi(2)).sqrt();
+            let norm = |v: &[Vec<f64>; 3]| (v[0][k].powi(2) + v[1][k].powi(2) + v[2][k].powi(2)).sqrt();
             assert!((norm(&components) - e[k]).abs() < 1e-14);
             assert!((e[k] - clearance - delta[k]).abs() < 1e-13);
             assert_eq!(state[k] > 0.0, delta[k] > 0.0, "{joint} row {k}");
@@ -138,10 +92,7 @@ fn rows_of_the_default_scene_have_the_promised_columns_and_times() {
             let along = along.iter().map(|x| x * x).sum::<f64>().sqrt();
             assert!((along - normal[k]).abs() < 1e-9 * normal[k].max(1.0));
         }
-        assert!(
-            normal.iter().any(|&n| n > 1.0),
-            "{joint} was hit within 20 ms"
-        );
+        assert!(normal.iter().any(|&n| n > 1.0), "{joint} was hit within 20 ms");
     }
 }
 
@@ -152,43 +103,21 @@ fn sampling_never_changes_the_steps_and_the_same_run_gives_the_same_bits() {
         let line = format!("run spcmm --duration 15ms --every {every} --out {out} --summary json");
         jointplay(folder.path(), &line).expect(0).json()
     };
-    let (fine, coarse, again) = (
-        run("0.1ms", "a.csv"),
-        run("1ms", "b.csv"),
-        run("0.1ms", "c.csv"),
-    );
-    for key in [
-        "state_hash",
-        "steps",
-        "evaluations",
-        "rejected",
-        "peak_normal_N",
-    ] {
+    let (fine, coarse, again) = (run("0.1ms", "a.csv"), run("1ms", "b.csv"), run("0.1ms", "c.csv"));
+    for key in ["state_hash", "steps", "evaluations", "rejected", "peak_normal_N"] {
         assert_eq!(fine[key], coarse[key], "{key}");
         assert_eq!(fine[key], again[key], "{key}");
     }
     let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    assert!(
-        bytes("a.csv") == bytes("c.csv"),
-        "the same run writes the same file"
-    );
-    assert!(
-        bytes("a.csv.meta.json") == bytes("c.csv.meta.json"),
-        "and the same account of it"
-    );
+    assert!(bytes("a.csv") == bytes("c.csv"), "the same run writes the same file");
+    assert!(bytes("a.csv.meta.json") == bytes("c.csv.meta.json"), "and the same account of it");
     // Rows at common times are the same rows.
-    let (fine, coarse) = (
-        Csv::read(&folder.path().join("a.csv")),
-        Csv::read(&folder.path().join("b.csv")),
-    );
+    let (fine, coarse) = (Csv::read(&folder.path().join("a.csv")), Csv::read(&folder.path().join("b.csv")));
     assert_eq!(coarse.rows.len(), 16);
     for (k, row) in coarse.rows.iter().enumerate() {
         // The instants k x 1 ms and 10 k x 0.1 ms may differ in their last bit, a stiff force by a little more.
         for (a, b) in row.iter().zip(&fine.rows[10 * k]) {
-            assert!(
-                (a - b).abs() <= 1e-9 * a.abs().max(1e-6),
-                "row {k}: {a} {b}"
-            );
+            assert!((a - b).abs() <= 1e-9 * a.abs().max(1e-6), "row {k}: {a} {b}");
         }
     }
 }
@@ -213,46 +142,28 @@ fn the_summary_has_what_scripts_rely_on() {
     }
     for joint in ["S1", "S2", "S3"] {
         assert!(summary["impacts"][joint].as_u64().unwrap() >= 1, "{joint}");
-        assert!(
-            summary["peak_normal_N"][joint].as_f64().unwrap() > 100.0,
-            "{joint}"
-        );
+        assert!(summary["peak_normal_N"][joint].as_f64().unwrap() > 100.0, "{joint}");
     }
     let hash = summary["state_hash"].as_str().unwrap();
     assert_eq!(hash.len(), 16);
     assert!(u64::from_str_radix(hash, 16).is_ok());
     let changed = summary["changed_parameters"].as_object().unwrap();
     assert_eq!(changed.len(), 1);
-    assert!(
-        changed["contact.clearance"]
-            .as_str()
-            .unwrap()
-            .starts_with("0.5"),
-        "the last one wins"
-    );
-    assert_eq!(
-        names(folder.path()),
-        [""; 0],
-        "without --out nothing is written"
-    );
+    assert!(changed["contact.clearance"].as_str().unwrap().starts_with("0.5"), "the last one wins");
+    assert_eq!(names(folder.path()), [""; 0], "without --out nothing is written");
 }
 
 #[test]
 fn the_three_formats_hold_the_same_values_and_say_what_made_them() {
     let folder = folder();
     for out in ["a.csv", "a.json", "a.npz"] {
-        let line = format!(
-            "run pendulum --duration 30ms --every 1ms --out {out} --set contact.friction=0.25"
-        );
+        let line = format!("run pendulum --duration 30ms --every 1ms --out {out} --set contact.friction=0.25");
         jointplay(folder.path(), &line).expect(0);
     }
     let csv = Csv::read(&folder.path().join("a.csv"));
-    let csv_meta: Json =
-        serde_json::from_slice(&fs::read(folder.path().join("a.csv.meta.json")).unwrap()).unwrap();
-    let json: Json =
-        serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
-    let mut npz =
-        ndarray_npy::NpzReader::new(fs::File::open(folder.path().join("a.npz")).unwrap()).unwrap();
+    let csv_meta: Json = serde_json::from_slice(&fs::read(folder.path().join("a.csv.meta.json")).unwrap()).unwrap();
+    let json: Json = serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let mut npz = ndarray_npy::NpzReader::new(fs::File::open(folder.path().join("a.npz")).unwrap()).unwrap();
     let npz_meta: ndarray::Array1<u8> = npz.by_name("meta").unwrap();
     let npz_meta: Json = serde_json::from_slice(npz_meta.as_slice().unwrap()).unwrap();
     for meta in [&csv_meta, &json["meta"], &npz_meta] {
@@ -265,21 +176,12 @@ fn the_three_formats_hold_the_same_values_and_say_what_made_them() {
         let text = meta["scene_text"].as_str().unwrap();
         fs::write(folder.path().join("again.toml"), text).unwrap();
         let changed = meta["changed_parameters"].as_object().unwrap();
-        let changed = changed
-            .iter()
-            .map(|(key, value)| format!("--set {key}={}", value.as_str().unwrap()));
+        let changed = changed.iter().map(|(key, value)| format!("--set {key}={}", value.as_str().unwrap()));
         let changed: Vec<String> = changed.collect();
-        let line = format!(
-            "run again.toml {} --duration {}s --summary json",
-            changed.join(" "),
-            meta["duration_s"]
-        );
+        let line = format!("run again.toml {} --duration {}s --summary json", changed.join(" "), meta["duration_s"]);
         let again = jointplay(folder.path(), &line).expect(0).json();
         assert_eq!(again["state_hash"], meta["state_hash"]);
-        assert!(
-            again["scene_text"].is_null(),
-            "it stands with rows, not in a summary"
-        );
+        assert!(again["scene_text"].is_null(), "it stands with rows, not in a summary");
     }
     for (i, name) in csv.header.iter().enumerate() {
         let columns: ndarray::Array1<f64> = npz.by_name(name).unwrap();
@@ -288,14 +190,8 @@ fn the_three_formats_hold_the_same_values_and_say_what_made_them() {
         for (k, row) in csv.rows.iter().enumerate() {
             // The file holds every bit; this reader of it may be one off in the last.
             let json = json[k].as_f64().unwrap();
-            assert!(
-                (json - columns[k]).abs() <= f64::EPSILON * json.abs(),
-                "{name} row {k}"
-            );
-            assert!(
-                (row[i] - columns[k]).abs() <= 5.1e-12 * columns[k].abs(),
-                "{name} row {k}"
-            );
+            assert!((json - columns[k]).abs() <= f64::EPSILON * json.abs(), "{name} row {k}");
+            assert!((row[i] - columns[k]).abs() <= 5.1e-12 * columns[k].abs(), "{name} row {k}");
         }
     }
 }
@@ -303,29 +199,12 @@ fn the_three_formats_hold_the_same_values_and_say_what_made_them() {
 #[test]
 fn other_scenes_report_their_own_joints_and_drives() {
     let folder = folder();
-    jointplay(
-        folder.path(),
-        "run slider-crank-driven --duration 1ms --every 1ms --out a.csv",
-    )
-    .expect(0);
+    jointplay(folder.path(), "run slider-crank-driven --duration 1ms --every 1ms --out a.csv").expect(0);
     let csv = Csv::read(&folder.path().join("a.csv"));
-    assert_eq!(
-        csv.header[10..14].join(","),
-        "B_eccentricity_m,C_eccentricity_m,B_normal_N,C_normal_N"
-    );
-    assert!(
-        csv.header.iter().any(|name| name.ends_with("_actuator_Nm")),
-        "{:?}",
-        csv.header
-    );
-    assert!(
-        csv.column("B_state").iter().all(|&state| state == 3.0),
-        "B is ideal"
-    );
-    assert!(
-        csv.column("B_normal_N")[0] > 0.0,
-        "an ideal joint reports its reaction"
-    );
+    assert_eq!(csv.header[10..14].join(","), "B_eccentricity_m,C_eccentricity_m,B_normal_N,C_normal_N");
+    assert!(csv.header.iter().any(|name| name.ends_with("_actuator_Nm")), "{:?}", csv.header);
+    assert!(csv.column("B_state").iter().all(|&state| state == 3.0), "B is ideal");
+    assert!(csv.column("B_normal_N")[0] > 0.0, "an ideal joint reports its reaction");
 }
 
 /// The slider-crank with its slider 30 mm too far out, for an assembled start.
@@ -333,56 +212,32 @@ fn misplaced(folder: &Path) {
     let text = jointplay::scene::built_in_text("slider-crank").unwrap();
     let moved = text.replace("position = \"200 mm\"", "position = \"230 mm\"");
     assert_ne!(moved, text);
-    fs::write(
-        folder.join("moved.toml"),
-        format!("start = \"ideal\"\n{moved}"),
-    )
-    .unwrap();
+    fs::write(folder.join("moved.toml"), format!("start = \"ideal\"\n{moved}")).unwrap();
 }
 
 #[test]
 fn what_the_assembly_moved_is_printed_and_warned_of() {
     let folder = folder();
     misplaced(folder.path());
-    let check = jointplay(folder.path(), "check moved.toml")
-        .expect(0)
-        .stdout;
+    let check = jointplay(folder.path(), "check moved.toml").expect(0).stdout;
     println!("{check}");
-    for words in [
-        "largest gap as given 30 mm at C",
-        "  slider",
-        "Warning               assembling the start took",
-    ] {
+    for words in ["largest gap as given 30 mm at C", "  slider", "Warning               assembling the start took"] {
         assert!(check.contains(words), "{words}: {check}");
     }
-    let run = jointplay(
-        folder.path(),
-        "run moved.toml --duration 1ms --summary json",
-    )
-    .expect(0);
-    assert!(
-        run.stderr
-            .contains("warning: assembling the start took bodies far"),
-        "{}",
-        run.stderr
-    );
+    let run = jointplay(folder.path(), "run moved.toml --duration 1ms --summary json").expect(0);
+    assert!(run.stderr.contains("warning: assembling the start took bodies far"), "{}", run.stderr);
     let assembly = &run.json()["assembly"];
     assert_eq!(assembly["largest_gap_joint"], "C");
     assert!((assembly["largest_gap_m"].as_f64().unwrap() - 0.03).abs() < 1e-6);
     let moved = |body: &str| assembly["bodies"][body]["moved_m"].as_f64().unwrap();
     // Slider, rod and crank share the way.
-    assert!(
-        moved("slider") > 5e-3 && moved("slider") < 0.03,
-        "{assembly}"
-    );
+    assert!(moved("slider") > 5e-3 && moved("slider") < 0.03, "{assembly}");
     for (scene, words) in [
         ("spcmm", "no gap in the drives' closed form"),
         ("pendulum", "none: no joint starts closed"),
         ("slider-crank", "no gap as given"),
     ] {
-        let check = jointplay(folder.path(), &format!("check {scene}"))
-            .expect(0)
-            .stdout;
+        let check = jointplay(folder.path(), &format!("check {scene}")).expect(0).stdout;
         assert!(check.contains(words), "{words}: {check}");
         assert!(!check.contains("assembling the start took"), "{check}");
     }
@@ -392,30 +247,19 @@ fn what_the_assembly_moved_is_printed_and_warned_of() {
 fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
     let folder = folder();
     let text = jointplay::scene::built_in_text("pendulum").unwrap();
-    let probed = text.replace(
-        "body = \"rod\"\n\n",
-        "body = \"rod\"\nprobe = \"0 0 -100 mm\"\n\n",
-    );
+    let probed = text.replace("body = \"rod\"\n\n", "body = \"rod\"\nprobe = \"0 0 -100 mm\"\n\n");
     assert_ne!(probed, text);
     fs::write(folder.path().join("probed.toml"), probed).unwrap();
     let run = |set: &str, every: &str, out: &str| {
-        let line = format!(
-            "run probed.toml {set} --duration 60ms --every {every} --out {out} --summary json"
-        );
+        let line = format!("run probed.toml {set} --duration 60ms --every {every} --out {out} --summary json");
         let summary = jointplay(folder.path(), &line).expect(0).json();
-        (
-            summary["state_hash"].clone(),
-            Csv::read(&folder.path().join(out)),
-        )
+        (summary["state_hash"].clone(), Csv::read(&folder.path().join(out)))
     };
     let (hash, rows) = run("", "1ms", "play.csv");
     // Whoever looks more often changes nothing.
     assert_eq!(run("", "0.1ms", "often.csv").0, hash);
     let line = "run pendulum --duration 60ms --summary json";
-    assert_eq!(
-        jointplay(folder.path(), line).expect(0).json()["state_hash"],
-        hash
-    );
+    assert_eq!(jointplay(folder.path(), line).expect(0).json()["state_hash"], hash);
     let tight = "--set contact.clearance=0 --set solver.tolerance=1e-10";
     let (_, ideal) = run(tight, "1ms", "ideal.csv");
     // Tip from the pose of the rod: R = Rx(alpha) Rz(beta) Ry(gamma).
@@ -424,8 +268,7 @@ fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
         let p = ["x_m", "y_m", "z_m"].map(column);
         let a = ["alpha_rad", "beta_rad", "gamma_rad"].map(column);
         let tip = |k: usize| {
-            let ((sa, ca), (sb, cb), (sg, cg)) =
-                (a[0][k].sin_cos(), a[1][k].sin_cos(), a[2][k].sin_cos());
+            let ((sa, ca), (sb, cb), (sg, cg)) = (a[0][k].sin_cos(), a[1][k].sin_cos(), a[2][k].sin_cos());
             let w = [cb * sg, ca * sb * sg - sa * cg, sa * sb * sg + ca * cg];
             [0, 1, 2].map(|i| p[i][k] - 0.1 * w[i])
         };
@@ -436,23 +279,12 @@ fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
         let errors = rows.column(&format!("probe_error_{name}_m"));
         for (k, error) in errors.iter().enumerate() {
             let expected = play[k][axis] - ideal_tips[k][axis];
-            assert!(
-                (error - expected).abs() < 1e-9,
-                "{name} row {k}: {error} {expected}"
-            );
+            assert!((error - expected).abs() < 1e-9, "{name} row {k}: {error} {expected}");
         }
         // A joint without play is its own reference.
-        assert!(
-            ideal
-                .column(&format!("probe_error_{name}_m"))
-                .iter()
-                .all(|e| *e == 0.0)
-        );
+        assert!(ideal.column(&format!("probe_error_{name}_m")).iter().all(|e| *e == 0.0));
     }
-    let largest = rows
-        .column("probe_error_z_m")
-        .into_iter()
-        .fold(0.0, |m: f64, e| m.max(e.abs()));
+    let largest = rows.column("probe_error_z_m").into_iter().fold(0.0, |m: f64, e| m.max(e.abs()));
     assert!(largest > 1e-4, "{largest}");
 }
 
@@ -474,10 +306,7 @@ fn existing_files_are_replaced_only_by_force_and_nothing_runs_in_vain() {
         assert!(run.stderr.contains(word), "{out}: {}", run.stderr);
     }
     assert_eq!(names(folder.path()), ["mine.csv"]);
-    assert_eq!(
-        fs::read_to_string(folder.path().join("mine.csv")).unwrap(),
-        "mine"
-    );
+    assert_eq!(fs::read_to_string(folder.path().join("mine.csv")).unwrap(), "mine");
 
     let short = "run pendulum --duration 1ms --every 1ms --out mine.csv";
     jointplay(folder.path(), short).expect(1);
@@ -489,11 +318,7 @@ fn existing_files_are_replaced_only_by_force_and_nothing_runs_in_vain() {
 #[test]
 fn a_failed_start_leaves_no_file() {
     let folder = folder();
-    jointplay(
-        folder.path(),
-        "run spcmm --duration 1ms --every 1ms --out a.csv --set contact.clearance=20mm",
-    )
-    .expect(2);
+    jointplay(folder.path(), "run spcmm --duration 1ms --every 1ms --out a.csv --set contact.clearance=20mm").expect(2);
     assert_eq!(names(folder.path()), [""; 0]);
 }
 
@@ -508,46 +333,18 @@ fn each_kind_of_failure_has_its_exit_code_and_a_clear_line() {
         ("run spcmm --duration 1", 2, &["--duration", "unit", "ms"]),
         ("run spcmm --duration 1mm", 2, &["--duration", "mm", "ms"]),
         ("run spcmm --duration -1ms", 2, &["--duration", "-1ms"]),
-        (
-            "run spcmm --duration 1ms --every 0 --out a.csv",
-            2,
-            &["--every"],
-        ),
+        ("run spcmm --duration 1ms --every 0 --out a.csv", 2, &["--every"]),
         ("run spcmm --duration 1ms --every 1ms", 2, &["--out"]),
-        (
-            "run spcmm --duration 1s --every 1ns --out a.csv",
-            2,
-            &["rows", "--every"],
-        ),
+        ("run spcmm --duration 1s --every 1ns --out a.csv", 2, &["rows", "--every"]),
         ("run spcmn --duration 1ms", 2, &["spcmn", "spcmm"]),
         ("run broken.toml --duration 1ms", 2, &["broken.toml", ":1:"]),
         ("run missing.toml --duration 1ms", 1, &["missing.toml"]),
         ("run ./missing --duration 1ms", 1, &["missing"]),
-        (
-            "check spcmm --set contact.clearence=1mm",
-            2,
-            &["contact.clearence", "contact.clearance"],
-        ),
-        (
-            "check spcmm --set contact.clearance=1",
-            2,
-            &["contact.clearance", "mm", "unit"],
-        ),
-        (
-            "check spcmm --set contact.clearance=1s",
-            2,
-            &["contact.clearance", "1s", "mm"],
-        ),
-        (
-            "check spcmm --set contact.friction=-1",
-            2,
-            &["contact.friction", "-1", "0"],
-        ),
-        (
-            "check spcmm --set contact.friction=nan",
-            2,
-            &["contact.friction", "nan"],
-        ),
+        ("check spcmm --set contact.clearence=1mm", 2, &["contact.clearence", "contact.clearance"]),
+        ("check spcmm --set contact.clearance=1", 2, &["contact.clearance", "mm", "unit"]),
+        ("check spcmm --set contact.clearance=1s", 2, &["contact.clearance", "1s", "mm"]),
+        ("check spcmm --set contact.friction=-1", 2, &["contact.friction", "-1", "0"]),
+        ("check spcmm --set contact.friction=nan", 2, &["contact.friction", "nan"]),
         ("check spcmm --set chain.links=3", 2, &["chain.links"]),
         ("check spcmm --set contact.friction", 2, &["KEY=VALUE"]),
         ("check spcmm --set joint.S9.clearance=1mm", 2, &["S9"]),
@@ -557,11 +354,7 @@ fn each_kind_of_failure_has_its_exit_code_and_a_clear_line() {
         let run = jointplay(folder.path(), line).expect(code);
         assert_eq!(run.stdout, "", "{line}: results only");
         for word in words {
-            assert!(
-                run.stderr.contains(word),
-                "{line}: `{word}` is not in: {}",
-                run.stderr
-            );
+            assert!(run.stderr.contains(word), "{line}: `{word}` is not in: {}", run.stderr);
         }
         assert!(!run.stderr.contains("panicked"), "{line}: {}", run.stderr);
     }
@@ -572,31 +365,24 @@ fn each_kind_of_failure_has_its_exit_code_and_a_clear_line() {
 fn a_stopped_run_keeps_its_rows_and_says_why() {
     let folder = folder();
     // Explicit steps a hundred times longer than an impact cannot hold the contact.
-    let line = "run spcmm --set solver.method=rk4 --set solver.step=2ms --duration 10s --every 1ms --out a.csv --summary json";
+    let line =
+        "run spcmm --set solver.method=rk4 --set solver.step=2ms --duration 10s --every 1ms --out a.csv --summary json";
     let run = jointplay(folder.path(), line).expect(4);
     assert_eq!(run.json()["status"], "diverged");
     assert!(run.stderr.contains("stopped at t ="), "{}", run.stderr);
     let csv = Csv::read(&folder.path().join("a.csv"));
     assert!(!csv.rows.is_empty());
-    let meta: Json =
-        serde_json::from_slice(&fs::read(folder.path().join("a.csv.meta.json")).unwrap()).unwrap();
+    let meta: Json = serde_json::from_slice(&fs::read(folder.path().join("a.csv.meta.json")).unwrap()).unwrap();
     assert_eq!(meta["status"], "diverged");
 }
 
 /// Starts `command` and waits until signal 15, the last that the program asks for, is among those it catches.
 #[cfg(target_os = "linux")]
 pub fn start_and_listen(command: &mut Command) -> std::process::Child {
-    let child = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let listens = || {
         let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-        let caught = status
-            .lines()
-            .find_map(|line| line.strip_prefix("SigCgt:"))
-            .unwrap();
+        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
         u64::from_str_radix(caught.trim(), 16).unwrap() & (1 << 14) != 0
     };
     while !listens() {
@@ -654,22 +440,14 @@ fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child)) {
     // Under nohup this program ignores SIGHUP, and what it starts would, too.
     let mut command = Command::new("env");
     command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_jointplay")]);
-    command
-        .args(line.split_whitespace())
-        .current_dir(folder.path());
+    command.args(line.split_whitespace()).current_dir(folder.path());
     let child = start_and_listen(&mut command);
     interrupt(&child);
     let output = child.wait_with_output().unwrap();
-    assert_eq!(
-        output.status.code(),
-        Some(130),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
     let summary: Json = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(summary["status"], "interrupted");
-    let file: Json =
-        serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let file: Json = serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
     assert_eq!(file["meta"]["status"], "interrupted");
     let times = file["columns"]["t_s"].as_array().unwrap();
     assert_eq!(times.len() as u64, summary["rows"].as_u64().unwrap());
@@ -685,22 +463,14 @@ fn lessons_are_listed_and_a_file_is_checked() {
     assert_eq!(list.lines().count(), 10, "{list}");
     assert!(list.starts_with("rattle "), "{list}");
     let printed = jointplay(folder.path(), "lessons rattle").expect(0).stdout;
-    assert!(
-        printed.contains("[x]  S1") && printed.contains("7.8 ms"),
-        "{printed}"
-    );
+    assert!(printed.contains("[x]  S1") && printed.contains("7.8 ms"), "{printed}");
     let near = jointplay(folder.path(), "lessons ratle").expect(2).stderr;
     assert!(near.contains("did you mean `rattle`?"), "{near}");
     let own = "title = \"x\"\nscene = \"pendulum\"\n[measure]\nfirst = { impact = 1 }\n[[step]]\ntitle = \"x\"\ntext = \"\"\n\
                claims = [\"first < 1 ms\"]\n";
     fs::write(folder.path().join("own.toml"), own).unwrap();
-    let wrong = jointplay(folder.path(), "lessons own.toml")
-        .expect(2)
-        .stderr;
-    assert!(
-        wrong.contains("step 1: `first < 1 ms` does not hold: first is 7.8"),
-        "{wrong}"
-    );
+    let wrong = jointplay(folder.path(), "lessons own.toml").expect(2).stderr;
+    assert!(wrong.contains("step 1: `first < 1 ms` does not hold: first is 7.8"), "{wrong}");
 }
 
 #[test]
@@ -708,24 +478,9 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
     let folder = folder();
     let list = jointplay(folder.path(), "scenes").expect(0).stdout;
     for (scene, words) in [
-        (
-            "spcmm",
-            &[
-                "7 moving",
-                "3 with clearance",
-                "contact forces at S1, S2, S3",
-                "P1, P2, P3",
-            ][..],
-        ),
+        ("spcmm", &["7 moving", "3 with clearance", "contact forces at S1, S2, S3", "P1, P2, P3"][..]),
         ("pendulum", &["1 moving", "1 with clearance"]),
-        (
-            "slider-crank",
-            &[
-                "3 moving",
-                "1 with clearance, 1 ideal",
-                "reactions of the ideal joints at B",
-            ],
-        ),
+        ("slider-crank", &["3 moving", "1 with clearance, 1 ideal", "reactions of the ideal joints at B"]),
         ("slider-crank-driven", &["3 moving", "1 driven revolute"]),
         ("chain", &["8 moving", "8 with clearance"]),
         ("hexapod", &["13 moving", "12 with clearance", "6 driven"]),
@@ -734,79 +489,39 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
         ("suspension", &["5 moving", "4 with clearance"]),
         ("press", &["5 moving", "2 with clearance"]),
     ] {
-        assert!(
-            list.lines()
-                .any(|line| line.split_whitespace().next() == Some(scene)),
-            "{list}"
-        );
-        let report = jointplay(folder.path(), &format!("check {scene}"))
-            .expect(0)
-            .stdout;
+        assert!(list.lines().any(|line| line.split_whitespace().next() == Some(scene)), "{list}");
+        let report = jointplay(folder.path(), &format!("check {scene}")).expect(0).stdout;
         for word in words {
-            assert!(
-                report.contains(word),
-                "{scene}: `{word}` is not in:\n{report}"
-            );
+            assert!(report.contains(word), "{scene}: `{word}` is not in:\n{report}");
         }
     }
     assert_eq!(list.lines().count(), 10);
 
     let line_of = |report: &str, label: &str| {
-        let line = report
-            .lines()
-            .find(|line| line.starts_with(label))
-            .unwrap_or_else(|| panic!("{report}"));
+        let line = report.lines().find(|line| line.starts_with(label)).unwrap_or_else(|| panic!("{report}"));
         line[label.len()..].trim().to_owned()
     };
     let free = jointplay(folder.path(), "check spcmm").expect(0).stdout;
     assert_eq!(line_of(&free, "Degrees of freedom"), "9");
     assert_eq!(line_of(&free, "Constraint rows"), "0");
-    let rigid = jointplay(folder.path(), "check spcmm --set contact.clearance=0")
-        .expect(0)
-        .stdout;
-    assert!(
-        line_of(&rigid, "Degrees of freedom").starts_with("0 "),
-        "{rigid}"
-    );
+    let rigid = jointplay(folder.path(), "check spcmm --set contact.clearance=0").expect(0).stdout;
+    assert!(line_of(&rigid, "Degrees of freedom").starts_with("0 "), "{rigid}");
     assert_eq!(line_of(&rigid, "Constraint rows"), "9");
-    assert!(
-        rigid.contains("Not computed          differential equations"),
-        "{rigid}"
-    );
-    let paper = jointplay(folder.path(), "check spcmm --set formulation=lagrange")
-        .expect(0)
-        .stdout;
-    assert!(
-        line_of(&paper, "Equations").contains("42 velocity coordinates, 33 constraint rows"),
-        "{paper}"
-    );
-    let low = jointplay(folder.path(), "check spcmm --set contact.restitution=0.3")
-        .expect(0)
-        .stdout;
+    assert!(rigid.contains("Not computed          differential equations"), "{rigid}");
+    let paper = jointplay(folder.path(), "check spcmm --set formulation=lagrange").expect(0).stdout;
+    assert!(line_of(&paper, "Equations").contains("42 velocity coordinates, 33 constraint rows"), "{paper}");
+    let low = jointplay(folder.path(), "check spcmm --set contact.restitution=0.3").expect(0).stdout;
     assert!(line_of(&low, "Warning").contains("restitution"), "{low}");
-    let singular = jointplay(folder.path(), "check spcmm --set spcmm.slider_plane=170mm")
-        .expect(0)
-        .stdout;
-    assert!(
-        line_of(&singular, "Warning").contains("singular"),
-        "{singular}"
-    );
+    let singular = jointplay(folder.path(), "check spcmm --set spcmm.slider_plane=170mm").expect(0).stdout;
+    assert!(line_of(&singular, "Warning").contains("singular"), "{singular}");
     // Reactions to a load tell nothing of the pose.
     let text = std::fs::read_to_string("assets/scenes/spcmm.toml").unwrap();
     let load = "[[load]]\nname = \"press\"\non = { body = \"platform\" }\nforce = \"0 0 -900 N\"\n";
-    std::fs::write(
-        folder.path().join("pressed.toml"),
-        format!("{text}\n{load}"),
-    )
-    .unwrap();
-    let pressed = jointplay(folder.path(), "check pressed.toml")
-        .expect(0)
-        .stdout;
+    std::fs::write(folder.path().join("pressed.toml"), format!("{text}\n{load}")).unwrap();
+    let pressed = jointplay(folder.path(), "check pressed.toml").expect(0).stdout;
     assert!(!pressed.contains("singular"), "{pressed}");
     assert!(!free.contains("Warning"), "{free}");
-    let tight = jointplay(folder.path(), "check spcmm --set contact.clearance=5um")
-        .expect(0)
-        .stdout;
+    let tight = jointplay(folder.path(), "check spcmm --set contact.clearance=5um").expect(0).stdout;
     assert!(line_of(&tight, "Warning").contains("Hertz"), "{tight}");
 }
 
@@ -826,14 +541,8 @@ fn a_file_works_wherever_a_name_does() {
     let folder = folder();
     let source = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/pendulum.toml");
     fs::copy(source, folder.path().join("mine.toml")).unwrap();
-    let summary = |scene: &str| {
-        jointplay(
-            folder.path(),
-            &format!("run {scene} --duration 5ms --summary json"),
-        )
-        .expect(0)
-        .json()
-    };
+    let summary =
+        |scene: &str| jointplay(folder.path(), &format!("run {scene} --duration 5ms --summary json")).expect(0).json();
     let (mine, built_in) = (summary("mine.toml"), summary("pendulum"));
     assert_eq!(mine["state_hash"], built_in["state_hash"]);
     assert_eq!(mine["scene_file"], "mine.toml");
@@ -856,8 +565,7 @@ fn a_name_need_be_no_text() {
     };
     let output = run(b"\xff.toml");
     assert!(output.status.success(), "{output:?}");
-    let file: Json =
-        serde_json::from_slice(&fs::read(folder.path().join(name(b"\xfe.json"))).unwrap()).unwrap();
+    let file: Json = serde_json::from_slice(&fs::read(folder.path().join(name(b"\xfe.json"))).unwrap()).unwrap();
     assert_eq!(file["meta"]["scene_file"], "\u{fffd}.toml");
     let missing = run(b"./\xfd.toml");
     assert_eq!(missing.status.code(), Some(1), "{missing:?}");
@@ -869,13 +577,9 @@ fn a_name_need_be_no_text() {
 fn a_full_disk_is_told_in_one_line_and_leaves_nothing() {
     let folder = folder();
     let run = "run spcmm --duration 20ms --every 50us --quiet --out";
-    let sweep = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:2 --periods 2 --discard 0 --no-exponent --quiet --out";
-    for (line, out) in [
-        (run, "a.csv"),
-        (run, "a.json"),
-        (run, "a.npz"),
-        (sweep, "b.npz"),
-    ] {
+    let sweep =
+        "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:2 --periods 2 --discard 0 --no-exponent --quiet --out";
+    for (line, out) in [(run, "a.csv"), (run, "a.json"), (run, "a.npz"), (sweep, "b.npz")] {
         let program = env!("CARGO_BIN_EXE_jointplay");
         let full = format!("trap '' XFSZ; ulimit -f 16; exec {program} {line} {out}");
         let mut shell = Command::new("sh");
@@ -883,10 +587,7 @@ fn a_full_disk_is_told_in_one_line_and_leaves_nothing() {
         let output = output.output().unwrap();
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{stderr}");
-        assert!(
-            stderr.starts_with(&format!("error: cannot write {out}: ")),
-            "{stderr}"
-        );
+        assert!(stderr.starts_with(&format!("error: cannot write {out}: ")), "{stderr}");
         assert_eq!(stderr.lines().count(), 1, "{stderr}");
         assert!(stderr.ends_with("(os error 27)\n"), "{stderr}");
     }
@@ -900,22 +601,10 @@ fn what_would_take_for_ever_is_refused_with_the_largest_that_does_not() {
     for (line, words) in [
         ("run pendulum --duration 1e300s".to_owned(), "1e6 s"),
         ("run pendulum --duration 1000001s".to_owned(), "1e6 s"),
-        (
-            format!("{sweep} --periods 9000000000000000000 --discard 8999999999999999999"),
-            "500000 periods of 2 s",
-        ),
-        (
-            format!("{sweep} --periods 500001 --discard 500000"),
-            "500000 periods of 2 s",
-        ),
-        (
-            format!("{sweep} --periods 9e18 --discard 1"),
-            "67108864 sections",
-        ),
-        (
-            "run pendulum --duration 1s --every 1ns --out a.csv".to_owned(),
-            "4 GiB",
-        ),
+        (format!("{sweep} --periods 9000000000000000000 --discard 8999999999999999999"), "500000 periods of 2 s"),
+        (format!("{sweep} --periods 500001 --discard 500000"), "500000 periods of 2 s"),
+        (format!("{sweep} --periods 9e18 --discard 1"), "67108864 sections"),
+        ("run pendulum --duration 1s --every 1ns --out a.csv".to_owned(), "4 GiB"),
     ] {
         let run = jointplay(folder.path(), &line).expect(2);
         assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
@@ -927,16 +616,8 @@ fn what_would_take_for_ever_is_refused_with_the_largest_that_does_not() {
 fn help_version_and_the_reference_page_are_results() {
     let folder = folder();
     let version = jointplay(folder.path(), "--version").expect(0).stdout;
-    assert_eq!(
-        version.trim(),
-        concat!("jointplay ", env!("CARGO_PKG_VERSION"))
-    );
-    assert!(
-        jointplay(folder.path(), "--help")
-            .expect(0)
-            .stdout
-            .contains("render")
-    );
+    assert_eq!(version.trim(), concat!("jointplay ", env!("CARGO_PKG_VERSION")));
+    assert!(jointplay(folder.path(), "--help").expect(0).stdout.contains("render"));
     let page = jointplay(folder.path(), "reference").expect(0).stdout;
     assert!(page.contains("### `[[ball_joint]]`"));
     let schema = jointplay(folder.path(), "schema").expect(0).stdout;
@@ -977,21 +658,13 @@ mod frames {
     fn frames_come_with_a_manifest_and_repeat_bit_for_bit() {
         let folder = folder();
         for out in ["a", "b"] {
-            let line = format!(
-                "render spcmm --at 0s,7.85ms --size 320x180 --set contact.friction=0.2 --out {out}"
-            );
+            let line = format!("render spcmm --at 0s,7.85ms --size 320x180 --set contact.friction=0.2 --out {out}");
             jointplay(folder.path(), &line).expect(0);
         }
         let (a, b) = (folder.path().join("a"), folder.path().join("b"));
-        assert_eq!(
-            names(&a),
-            ["frame_00000.png", "frame_00001.png", "manifest.json"]
-        );
+        assert_eq!(names(&a), ["frame_00000.png", "frame_00001.png", "manifest.json"]);
         for name in names(&a) {
-            assert!(
-                fs::read(a.join(&name)).unwrap() == fs::read(b.join(&name)).unwrap(),
-                "{name}"
-            );
+            assert!(fs::read(a.join(&name)).unwrap() == fs::read(b.join(&name)).unwrap(), "{name}");
         }
         let manifest = manifest(&a);
         assert_eq!(manifest["scene"], "spcmm");
@@ -1003,10 +676,7 @@ mod frames {
         assert!(manifest["method"].is_string());
         assert!(!manifest["adapter"].as_str().unwrap().is_empty());
         let frames = manifest["frames"].as_array().unwrap();
-        assert_eq!(
-            (frames[0]["time_s"].as_f64(), frames[1]["time_s"].as_f64()),
-            (Some(0.0), Some(7.85e-3))
-        );
+        assert_eq!((frames[0]["time_s"].as_f64(), frames[1]["time_s"].as_f64()), (Some(0.0), Some(7.85e-3)));
         assert_ne!(frames[0]["state_hash"], frames[1]["state_hash"]);
         for frame in frames {
             assert!(frame["state_time_s"].as_f64() >= frame["time_s"].as_f64());
@@ -1015,32 +685,19 @@ mod frames {
             let mut colours: Vec<&[u8]> = pixels.chunks_exact(4).collect();
             colours.sort_unstable();
             colours.dedup();
-            assert!(
-                colours.len() > 200,
-                "a picture of something, not {} colours",
-                colours.len()
-            );
+            assert!(colours.len() > 200, "a picture of something, not {} colours", colours.len());
         }
         let first = picture(&a.join("frame_00000.png")).2;
-        assert!(
-            first != picture(&a.join("frame_00001.png")).2,
-            "an impact is visible"
-        );
+        assert!(first != picture(&a.join("frame_00001.png")).2, "an impact is visible");
     }
 
     #[test]
     fn a_slow_motion_film_has_its_frames_at_equal_times() {
         let folder = folder();
-        let line =
-            "render pendulum --duration 4ms --fps 10 --slow 50 --size 160x90 --out film --overlay";
+        let line = "render pendulum --duration 4ms --fps 10 --slow 50 --size 160x90 --out film --overlay";
         jointplay(folder.path(), line).expect(0);
         let frames = manifest(&folder.path().join("film"))["frames"].clone();
-        let times: Vec<f64> = frames
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|f| f["time_s"].as_f64().unwrap())
-            .collect();
+        let times: Vec<f64> = frames.as_array().unwrap().iter().map(|f| f["time_s"].as_f64().unwrap()).collect();
         assert_eq!(times, [0.0, 0.002, 0.004]);
     }
 
@@ -1054,29 +711,21 @@ mod frames {
                 "render spcmm --duration 9ms --fps 1000 --slow 0.1111111111111111 {common} --arrows {arrows} --out film_{name}"
             );
             jointplay(folder.path(), &film).expect(0);
-            let single =
-                format!("render spcmm --at 9ms {common} --arrows {arrows} --out single_{name}");
+            let single = format!("render spcmm --at 9ms {common} --arrows {arrows} --out single_{name}");
             jointplay(folder.path(), &single).expect(0);
         }
         let frames = manifest(&folder.path().join("film_with"))["frames"].clone();
         assert_eq!(frames[1]["time_s"], 0.009);
         let last = |name: &str, frame: &str| picture(&folder.path().join(name).join(frame)).2;
         let (film, single) = ("frame_00001.png", "frame_00000.png");
-        assert!(
-            last("film_with", film) != last("single_with", single),
-            "peaks are marked"
-        );
-        assert!(
-            last("film_without", film) == last("single_without", single),
-            "and are all that differs"
-        );
+        assert!(last("film_with", film) != last("single_with", single), "peaks are marked");
+        assert!(last("film_without", film) == last("single_without", single), "and are all that differs");
     }
 
     #[test]
     fn a_wear_map_is_that_of_the_run_so_far_whatever_the_frames() {
         let folder = folder();
-        let common =
-            "--size 320x240 --close-up S1 --magnification 20 --arrows none --hide trail,flash";
+        let common = "--size 320x240 --close-up S1 --magnification 20 --arrows none --hide trail,flash";
         let slow = "--fps 1000 --slow 0.1111111111111111";
         for (line, out) in [
             (format!("--duration 9ms {slow} --wear impulse"), "film"),
@@ -1118,10 +767,7 @@ mod frames {
         assert!(old != new);
         crate::common::at_random_instants(length, 3, |instant| {
             jointplay(work.path(), &render("0.1")).expect(0);
-            let mut child = command(work.path(), &render("0.2"))
-                .stdout(Stdio::null())
-                .spawn()
-                .unwrap();
+            let mut child = command(work.path(), &render("0.2")).stdout(Stdio::null()).spawn().unwrap();
             std::thread::sleep(instant);
             child.kill().unwrap();
             child.wait().unwrap();
@@ -1136,11 +782,7 @@ mod frames {
     #[test]
     fn the_whole_application_can_be_drawn() {
         let folder = folder();
-        jointplay(
-            folder.path(),
-            "render spcmm --at 1ms --size 800x500 --ui --out ui",
-        )
-        .expect(0);
+        jointplay(folder.path(), "render spcmm --at 1ms --size 800x500 --ui --out ui").expect(0);
         let (width, height, _) = picture(&folder.path().join("ui/frame_00000.png"));
         assert_eq!((width, height), (800, 500));
     }
@@ -1155,21 +797,9 @@ mod frames {
             ("render spcmm --duration 1s --fps 1e9 --out a", 2, "--fps"),
             ("render spcmm --at 1 --out a", 2, "--at"),
             ("render spcmm --at 0 --size 0x5 --out a", 2, "--size"),
-            (
-                "render spcmm --at 0 --magnification 500 --out a",
-                2,
-                "--magnification",
-            ),
-            (
-                "render spcmm --at 0 --close-up S7 --size 64x64 --out a",
-                2,
-                "S1, S2, S3",
-            ),
-            (
-                "render spcmm --at 0 --size 64x64 --out missing/a",
-                1,
-                "missing/a",
-            ),
+            ("render spcmm --at 0 --magnification 500 --out a", 2, "--magnification"),
+            ("render spcmm --at 0 --close-up S7 --size 64x64 --out a", 2, "S1, S2, S3"),
+            ("render spcmm --at 0 --size 64x64 --out missing/a", 1, "missing/a"),
         ] {
             let run = jointplay(folder.path(), line).expect(code);
             assert!(run.stderr.contains(word), "{line}: {}", run.stderr);
@@ -1183,14 +813,8 @@ mod frames {
     fn without_a_runtime_folder_standard_error_holds_our_own_words_alone() {
         let folder = folder();
         for (line, runtime) in [
-            (
-                "render pendulum --at 0s --size 64x64 --out plain --quiet",
-                None,
-            ),
-            (
-                "render pendulum --at 0s --size 800x500 --ui --out window --quiet",
-                Some("here"),
-            ),
+            ("render pendulum --at 0s --size 64x64 --out plain --quiet", None),
+            ("render pendulum --at 0s --size 800x500 --ui --out window --quiet", Some("here")),
         ] {
             let mut command = command(folder.path(), line);
             command.env_remove("XDG_RUNTIME_DIR");
@@ -1209,11 +833,7 @@ mod frames {
     fn a_window_without_a_display_says_what_works_instead() {
         let folder = folder();
         let view = jointplay(folder.path(), "view pendulum").expect(1);
-        assert!(
-            view.stderr.contains("display") && view.stderr.contains("jointplay render"),
-            "{}",
-            view.stderr
-        );
+        assert!(view.stderr.contains("display") && view.stderr.contains("jointplay render"), "{}", view.stderr);
         let view = jointplay(folder.path(), "view pendulum --set contact.clearance=-1mm").expect(2);
         assert!(view.stderr.contains("contact.clearance"), "{}", view.stderr);
     }
@@ -1268,12 +888,7 @@ fn no_words_of_others_steer_the_terminal() {
         fs::write(folder.path().join(name), text).unwrap();
         format!("./{name}")
     };
-    let hostile = |of: &str| {
-        good.replace(
-            of,
-            &format!("{} = \"{escaped}\"", of.split(' ').next().unwrap()),
-        )
-    };
+    let hostile = |of: &str| good.replace(of, &format!("{} = \"{escaped}\"", of.split(' ').next().unwrap()));
     let scenes = [
         file("title.toml", &titled),
         file(&format!("{STEERING}.toml"), &unnamed),
@@ -1285,11 +900,7 @@ fn no_words_of_others_steer_the_terminal() {
     ];
     let title = scenes[0].clone();
     let mut lines: Vec<Vec<String>> = Vec::new();
-    let words = |line: &[&str]| {
-        line.iter()
-            .map(|word| (*word).to_owned())
-            .collect::<Vec<_>>()
-    };
+    let words = |line: &[&str]| line.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     for scene in &scenes {
         lines.push(words(&["check", scene]));
     }
@@ -1314,12 +925,7 @@ fn no_words_of_others_steer_the_terminal() {
     lines.push(words(&[STEERING]));
     lines.push(words(&["run", &format!("--{STEERING}")]));
     #[cfg(feature = "gui")]
-    for link in [
-        "?scene=%1b]0;title%07",
-        "?%9b=1&%1b=2",
-        "?c=%1b]0;",
-        "?log=%1b",
-    ] {
+    for link in ["?scene=%1b]0;title%07", "?%9b=1&%1b=2", "?c=%1b]0;", "?log=%1b"] {
         lines.push(words(&["view", "--link", link]));
     }
     let mut shown = 0;
@@ -1327,9 +933,7 @@ fn no_words_of_others_steer_the_terminal() {
         let output = command(folder.path(), "").args(&line).output().unwrap();
         for stream in [output.stdout, output.stderr] {
             let text = String::from_utf8(stream).unwrap();
-            let steers = |c: char| {
-                (c.is_control() && c != '\n') || STEERING[10..].contains(c) && !c.is_ascii()
-            };
+            let steers = |c: char| (c.is_control() && c != '\n') || STEERING[10..].contains(c) && !c.is_ascii();
             assert!(!text.contains(steers), "{line:?}: {text:?}");
             assert!(!text.contains("failed inside"), "{text}");
             shown += usize::from(text.contains("\\u001b"));
@@ -1337,9 +941,6 @@ fn no_words_of_others_steer_the_terminal() {
     }
     // They are said, not left out.
     assert!(shown >= 12, "{shown}");
-    let summary = jointplay(
-        folder.path(),
-        &format!("run {title} --duration 1ms --summary json"),
-    );
+    let summary = jointplay(folder.path(), &format!("run {title} --duration 1ms --summary json"));
     summary.expect(0).json();
 }

@@ -29,10 +29,7 @@ const LAST_COLUMNS: &str = "drive_work_J,gravity_work_J,restitution_loss_J,frict
 fn rows_carry_the_ledger_and_balance() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 30ms --every 0.1ms";
-    let summary = done(
-        folder.path(),
-        &format!("{run} --out run.json --summary json"),
-    );
+    let summary = done(folder.path(), &format!("{run} --out run.json --summary json"));
     let summary: Json = serde_json::from_str(&summary).unwrap();
     let file = json(&folder.path().join("run.json"));
     let get = |name: &str| column(&file, name);
@@ -41,27 +38,14 @@ fn rows_carry_the_ledger_and_balance() {
     let exchanged = summary["energy_J"]["exchanged"].as_f64().unwrap();
     for k in 0..kinetic.len() {
         let change = kinetic[k] - kinetic[0] + elastic[k] - elastic[0];
-        let [drive, gravity, restitution, friction, clearance, residual] =
-            [0, 1, 2, 3, 4, 5].map(|i| works[i][k]);
+        let [drive, gravity, restitution, friction, clearance, residual] = [0, 1, 2, 3, 4, 5].map(|i| works[i][k]);
         let accounted = drive + gravity + clearance - restitution - friction + residual;
         assert!((change - accounted).abs() < 1e-12, "row {k}");
         assert!(residual.abs() < 1e-4 * exchanged, "row {k}: {residual:e}");
     }
     let last = kinetic.len() - 1;
-    for (i, key) in [
-        "drive_work",
-        "gravity_work",
-        "restitution_loss",
-        "friction_loss",
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        assert_eq!(
-            summary["energy_J"][key].as_f64().unwrap(),
-            works[i][last],
-            "{key}"
-        );
+    for (i, key) in ["drive_work", "gravity_work", "restitution_loss", "friction_loss"].into_iter().enumerate() {
+        assert_eq!(summary["energy_J"][key].as_f64().unwrap(), works[i][last], "{key}");
         assert!(works[i][last].abs() > 1e-4, "{key}");
     }
     let relative = summary["energy_J"]["relative_residual"].as_f64().unwrap();
@@ -73,10 +57,7 @@ fn rows_carry_the_ledger_and_balance() {
     // They are the last columns, and without the ledger they are not there; the motion is the same.
     done(folder.path(), &format!("{run} --out with.csv"));
     let off = "--set solver.energy_ledger=off";
-    let without = done(
-        folder.path(),
-        &format!("{run} {off} --out without.csv --summary json"),
-    );
+    let without = done(folder.path(), &format!("{run} {off} --out without.csv --summary json"));
     let without: Json = serde_json::from_str(&without).unwrap();
     assert_eq!(without["state_hash"], summary["state_hash"]);
     assert_eq!(without["energy_J"], Json::Null);
@@ -92,30 +73,15 @@ fn rows_carry_the_ledger_and_balance() {
 fn every_impact_has_its_row() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 50ms --set contact.clearance=0.2mm";
-    let summary = done(
-        folder.path(),
-        &format!("{run} --impacts hits.json --summary json"),
-    );
+    let summary = done(folder.path(), &format!("{run} --impacts hits.json --summary json"));
     let summary: Json = serde_json::from_str(&summary).unwrap();
     let file = json(&folder.path().join("hits.json"));
-    assert_eq!(
-        file["meta"]["ball_joints"],
-        serde_json::json!(["S1", "S2", "S3"])
-    );
+    assert_eq!(file["meta"]["ball_joints"], serde_json::json!(["S1", "S2", "S3"]));
     assert_eq!(file["meta"]["scene"], "spcmm");
-    assert!(
-        file["meta"]["wall_s"].is_null(),
-        "files of one run are the same"
-    );
+    assert!(file["meta"]["wall_s"].is_null(), "files of one run are the same");
     let joint = column(&file, "joint");
-    let (approach, separation) = (
-        column(&file, "approach_m_s"),
-        column(&file, "separation_m_s"),
-    );
-    let (given, asked) = (
-        column(&file, "restitution_given"),
-        column(&file, "restitution_asked"),
-    );
+    let (approach, separation) = (column(&file, "approach_m_s"), column(&file, "separation_m_s"));
+    let (given, asked) = (column(&file, "restitution_given"), column(&file, "restitution_asked"));
     let (start, end) = (column(&file, "start_s"), column(&file, "end_s"));
     let disturbed = column(&file, "disturbed");
     assert!(joint.len() > 20, "{}", joint.len());
@@ -135,18 +101,12 @@ fn every_impact_has_its_row() {
         assert!(begun - finished <= 1, "{name}: {finished} of {begun}");
         let entry = &summary["restitution"][name];
         assert_eq!(entry["finished"], finished);
-        let alone = (0..joint.len())
-            .filter(of)
-            .filter(|&k| disturbed[k] == 0.0)
-            .count();
+        let alone = (0..joint.len()).filter(of).filter(|&k| disturbed[k] == 0.0).count();
         assert!(entry["undisturbed"].as_u64().unwrap() <= alone as u64);
         assert!(entry["median_excess"].as_f64().unwrap().abs() < 0.2);
     }
 
-    let words = done(
-        folder.path(),
-        "run spcmm --duration 30ms --impacts words.csv",
-    );
+    let words = done(folder.path(), "run spcmm --duration 30ms --impacts words.csv");
     let said: Vec<&str> = words.lines().filter(|l| l.contains("than asked")).collect();
     assert!(!said.is_empty(), "{words}");
     for line in said {
@@ -165,32 +125,17 @@ fn every_impact_has_its_row() {
         ("--impacts hits.csv", 1, "--force"),
         ("--impacts hits.txt", 2, ".npz"),
         ("--impacts no/hits.csv", 1, "cannot write"),
-        (
-            "--impacts same.csv --out same.csv --every 1ms",
-            2,
-            "same file",
-        ),
-        (
-            "--impacts ./same.csv --out same.csv --every 1ms",
-            2,
-            "same file",
-        ),
+        ("--impacts same.csv --out same.csv --every 1ms", 2, "same file"),
+        ("--impacts ./same.csv --out same.csv --every 1ms", 2, "same file"),
         (
             "--impacts same.csv.meta.json --out same.csv --every 1ms",
             2,
             "--impacts and the .meta.json of --out name the same file",
         ),
         #[cfg(unix)]
-        (
-            "--impacts link.csv --out same.csv --every 1ms --force",
-            2,
-            "same file",
-        ),
+        ("--impacts link.csv --out same.csv --every 1ms --force", 2, "same file"),
     ] {
-        let output = jointplay(
-            folder.path(),
-            &format!("run pendulum --duration 1000000s {line}"),
-        );
+        let output = jointplay(folder.path(), &format!("run pendulum --duration 1000000s {line}"));
         assert_eq!(output.code, Some(code), "{line}");
         assert!(output.stderr.contains(word), "{line}");
     }
@@ -205,16 +150,10 @@ fn every_impact_has_its_row() {
 fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     let folder = tempfile::tempdir().unwrap();
     let run = "run spcmm --duration 30ms";
-    let summary = done(
-        folder.path(),
-        &format!("{run} --every 5us --out rows.json --wear wear.json --summary json"),
-    );
+    let summary = done(folder.path(), &format!("{run} --every 5us --out rows.json --wear wear.json --summary json"));
     let summary: Json = serde_json::from_str(&summary).unwrap();
     assert_eq!(summary["wear_out"], "wear.json");
-    let (rows, wear) = (
-        json(&folder.path().join("rows.json")),
-        json(&folder.path().join("wear.json")),
-    );
+    let (rows, wear) = (json(&folder.path().join("rows.json")), json(&folder.path().join("wear.json")));
     let get = |name: &str| column(&wear, name);
     let (joint, impulse, work) = (get("joint"), get("impulse_N_s"), get("friction_work_J"));
     let contacts = get("contacts");
@@ -247,10 +186,7 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     let whole = 3.0 * 4.0 * std::f64::consts::PI * radius * radius;
     assert!((area.iter().sum::<f64>() / whole - 1.0).abs() < 1e-9);
     let axes = &wear["meta"]["socket_axes"]["S1"];
-    assert_eq!(
-        wear["meta"]["ball_joints"],
-        serde_json::json!(["S1", "S2", "S3"])
-    );
+    assert_eq!(wear["meta"]["ball_joints"], serde_json::json!(["S1", "S2", "S3"]));
     assert!(axes["body"].is_string() && axes["z"].as_array().unwrap().len() == 3);
 
     // The run is the same without, and the file as whole as the others.
@@ -259,10 +195,7 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
     assert_eq!(without["state_hash"], summary["state_hash"]);
     assert_eq!(without["evaluations"], summary["evaluations"]);
     let said = done(folder.path(), &format!("{run} --wear wear.csv"));
-    assert!(
-        said.contains(&format!("{} cells to wear.csv", joint.len())),
-        "{said}"
-    );
+    assert!(said.contains(&format!("{} cells to wear.csv", joint.len())), "{said}");
     let text = fs::read_to_string(folder.path().join("wear.csv")).unwrap();
     assert_eq!(text.lines().count(), joint.len() + 1);
     assert!(folder.path().join("wear.csv.meta.json").is_file());
@@ -271,18 +204,12 @@ fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
         ("--wear wear.txt", 2, ".npz"),
         ("--wear a.csv --impacts a.csv", 2, "same file"),
     ] {
-        let output = jointplay(
-            folder.path(),
-            &format!("run pendulum --duration 1000000s {line}"),
-        );
+        let output = jointplay(folder.path(), &format!("run pendulum --duration 1000000s {line}"));
         assert_eq!(output.code, Some(code), "{line}");
         assert!(output.stderr.contains(word), "{line}");
     }
     // Without play there is no wall to strike.
-    done(
-        folder.path(),
-        "run pendulum --set contact.clearance=0 --duration 1ms --wear none.csv",
-    );
+    done(folder.path(), "run pendulum --set contact.clearance=0 --duration 1ms --wear none.csv");
     let text = fs::read_to_string(folder.path().join("none.csv")).unwrap();
     assert_eq!(text.lines().count(), 1);
 }

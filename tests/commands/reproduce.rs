@@ -55,10 +55,7 @@ fn rows(page: &str) -> Vec<Vec<String>> {
         .skip(1)
         .map(|row| {
             let row = row.split("</tr>").next().unwrap();
-            row.split("</td>")
-                .map(plain)
-                .filter(|cell| !cell.is_empty())
-                .collect()
+            row.split("</td>").map(plain).filter(|cell| !cell.is_empty()).collect()
         })
         .collect()
 }
@@ -84,46 +81,24 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
 
     // The manifest names every file but itself, and every figure of the paper is there twice and in the page.
     let manifest: serde_json::Value = serde_json::from_slice(&all["manifest.json"]).unwrap();
-    let named: Vec<&str> = manifest["files"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|f| f.as_str().unwrap())
-        .collect();
-    let there: Vec<&str> = all
-        .keys()
-        .map(String::as_str)
-        .filter(|name| *name != "manifest.json")
-        .collect();
+    let named: Vec<&str> = manifest["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+    let there: Vec<&str> = all.keys().map(String::as_str).filter(|name| *name != "manifest.json").collect();
     assert_eq!(named, there);
     for figure in 5..=23 {
         let name = format!("figure-{figure:02}");
         for ending in ["svg", "png"] {
-            assert!(
-                all.contains_key(&format!("plots/{name}.{ending}")),
-                "{name}.{ending}"
-            );
+            assert!(all.contains_key(&format!("plots/{name}.{ending}")), "{name}.{ending}");
         }
-        assert!(
-            page.contains(&format!("<h3 id=\"{name}\">Figure {figure}:")),
-            "{name}"
-        );
+        assert!(page.contains(&format!("<h3 id=\"{name}\">Figure {figure}:")), "{name}");
     }
-    assert_eq!(
-        page.matches("<svg ").count(),
-        all.keys().filter(|n| n.ends_with(".svg")).count()
-    );
+    assert_eq!(page.matches("<svg ").count(), all.keys().filter(|n| n.ends_with(".svg")).count());
 
     // One file: nothing comes from anywhere, and nothing is missing that a link names.
     for outside in ["http://", "https://", "<script", "src=", "@import", "<link"] {
         let found = page.replace("http://www.w3.org/2000/svg", "");
         assert!(!found.contains(outside), "{outside}");
     }
-    for link in page
-        .split("href=\"")
-        .skip(1)
-        .map(|rest| rest.split('"').next().unwrap())
-    {
+    for link in page.split("href=\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
         let exists = match link.strip_prefix('#') {
             Some(id) => page.contains(&format!("id=\"{id}\"")),
             None => all.contains_key(link),
@@ -136,37 +111,22 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
     // Every number that the paper prints has its row, with the numbers of the data.
     let text = String::from_utf8(all["data/numbers.csv"].clone()).unwrap();
     let table = rows(&page);
-    let lines: Vec<Vec<&str>> = text
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').collect())
-        .collect();
+    let lines: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
     assert_eq!(lines.len(), PAPER.numbers.len());
     for (line, published) in lines.iter().zip(&PAPER.numbers) {
         let number = |k: usize| line[k].parse::<f64>().unwrap();
-        assert_eq!(
-            (line[0], number(5)),
-            (&published.figure[..], published.value)
-        );
+        assert_eq!((line[0], number(5)), (&published.figure[..], published.value));
         let full = number(6);
         assert!((full / number(5) - number(8)).abs() < 1e-9);
-        let run = format!(
-            "{} mm, {}",
-            published.case.clearance, published.case.friction
-        );
+        let run = format!("{} mm, {}", published.case.clearance, published.case.friction);
         let what = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
-        let row = table
-            .iter()
-            .find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
+        let row = table.iter().find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
         let row = row.unwrap_or_else(|| panic!("no row for {line:?}"));
         assert_eq!(row[3], shown(published.value));
         assert_eq!(row[4], shown(full));
         if !line[7].is_empty() {
             assert_eq!(row[6], shown(number(7)));
-            assert!(
-                number(7) <= full * (1.0 + 1e-9),
-                "samples exceed continuous time: {line:?}"
-            );
+            assert!(number(7) <= full * (1.0 + 1e-9), "samples exceed continuous time: {line:?}");
         }
         let word = if (0.9..=1.1).contains(&number(8)) {
             "agrees within 10 %"
@@ -179,39 +139,22 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
     }
     // The first peaks of the nominal run are those of the reference solution (`tests/physics/reference.rs`).
     let velocity = lines.iter().find(|line| line[0] == "6a").unwrap();
-    assert!(
-        (velocity[7].parse::<f64>().unwrap() / 0.147 - 1.0).abs() < 0.01,
-        "{velocity:?}"
-    );
+    assert!((velocity[7].parse::<f64>().unwrap() / 0.147 - 1.0).abs() < 0.01, "{velocity:?}");
 
     // Statements: each in the page with its verdict, some of either kind.
     let statements = String::from_utf8(all["data/statements.csv"].clone()).unwrap();
-    let confirmed = statements
-        .lines()
-        .filter(|l| l.contains(",confirmed,"))
-        .count();
-    let not = statements
-        .lines()
-        .filter(|l| l.contains(",not confirmed,"))
-        .count();
+    let confirmed = statements.lines().filter(|l| l.contains(",confirmed,")).count();
+    let not = statements.lines().filter(|l| l.contains(",not confirmed,")).count();
     assert_eq!(confirmed + not, statements.lines().count() - 1);
     assert!(confirmed > 10 && not > 5, "{confirmed} {not}");
-    assert_eq!(
-        page.matches("<span class=\"ok\">confirmed</span>").count(),
-        confirmed
-    );
-    assert_eq!(
-        page.matches("<span class=\"off\">not confirmed</span>")
-            .count(),
-        not
-    );
+    assert_eq!(page.matches("<span class=\"ok\">confirmed</span>").count(), confirmed);
+    assert_eq!(page.matches("<span class=\"off\">not confirmed</span>").count(), not);
     assert!(page.contains(&format!("<b>{confirmed} of {}</b>", confirmed + not)));
 
     // A quick report says that it is one; numbers and names are set as in print.
     assert!(page.contains("This is a quick report"), "no notice");
     assert!(!page.contains("beta"), "β has one name on the page");
-    let power =
-        |c: &[char]| c[0].is_ascii_digit() && c[1] == 'e' && (c[2] == '-' || c[2].is_ascii_digit());
+    let power = |c: &[char]| c[0].is_ascii_digit() && c[1] == 'e' && (c[2] == '-' || c[2].is_ascii_digit());
     for row in &table {
         for cell in row {
             let letters: Vec<char> = cell.chars().collect();
@@ -246,11 +189,7 @@ fn bad_input_is_refused_before_anything_runs() {
         assert_eq!(outcome.code, Some(code), "{line}: {}", outcome.stderr);
         assert!(outcome.stderr.contains(says), "{line}: {}", outcome.stderr);
     }
-    assert_eq!(
-        fs::read_dir(folder.path()).unwrap().count(),
-        1,
-        "nothing is left"
-    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left");
 }
 
 #[cfg(unix)]
@@ -259,16 +198,10 @@ fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on_whatever_the_
     let folder = tempfile::tempdir().unwrap();
     let entries = || files(folder.path());
     let line = "reproduce --out report/ --quick --threads 1";
-    let mut child = command(folder.path(), line)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = command(folder.path(), line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // Once some blocks are in.
     let length = || -> usize {
-        let part = |name: &str| {
-            fs::read(folder.path().join("report.partial").join(name)).map_or(0, |b| b.len())
-        };
+        let part = |name: &str| fs::read(folder.path().join("report.partial").join(name)).map_or(0, |b| b.len());
         part("runs_by_clearance.partial") + part("runs_by_friction.partial")
     };
     let mut grown = Vec::new();
@@ -280,62 +213,35 @@ fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on_whatever_the_
         assert!(child.try_wait().unwrap().is_none(), "over before it began");
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    let kill = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(kill.unwrap().success());
     let output = child.wait_with_output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{stderr}");
-    assert!(
-        stderr.contains("no report was written") && stderr.contains("goes on from report.partial"),
-        "{stderr}"
-    );
+    assert!(stderr.contains("no report was written") && stderr.contains("goes on from report.partial"), "{stderr}");
     assert!(output.stdout.is_empty());
     let left = entries();
-    assert!(
-        left.keys().all(|name| name.starts_with("report.partial/")),
-        "{:?}",
-        left.keys()
-    );
+    assert!(left.keys().all(|name| name.starts_with("report.partial/")), "{:?}", left.keys());
 
     // Damage, and what was begun otherwise, is refused by name and left alone.
-    let first = folder
-        .path()
-        .join("report.partial/runs_by_clearance.partial");
+    let first = folder.path().join("report.partial/runs_by_clearance.partial");
     let whole = fs::read(&first).unwrap();
     let mut damage = whole.clone();
     damage[whole.len() / 2] ^= 1;
     fs::write(&first, &damage).unwrap();
     let damaged = jointplay(folder.path(), "reproduce --out report --quick");
     assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
-    assert!(
-        damaged
-            .stderr
-            .contains("report.partial/runs_by_clearance.partial is damaged"),
-        "{}",
-        damaged.stderr
-    );
+    assert!(damaged.stderr.contains("report.partial/runs_by_clearance.partial is damaged"), "{}", damaged.stderr);
     fs::write(&first, &whole).unwrap();
     let other = jointplay(folder.path(), "reproduce --out report");
     assert_eq!(other.code, Some(2), "{}", other.stderr);
-    assert!(
-        other.stderr.contains("begun with other settings"),
-        "{}",
-        other.stderr
-    );
+    assert!(other.stderr.contains("begun with other settings"), "{}", other.stderr);
     assert!(entries() == left, "left as it was");
 
     // It goes on to the very report that comes without an interruption, and from one thread.
     let resumed = jointplay(folder.path(), "reproduce --out report --quick --threads 3");
     assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
-    assert!(
-        resumed
-            .stderr
-            .contains("going on where report.partial stopped"),
-        "{}",
-        resumed.stderr
-    );
+    assert!(resumed.stderr.contains("going on where report.partial stopped"), "{}", resumed.stderr);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     let straight = quick().0.path().join("report");
     let (one, other) = (files(&folder.path().join("report")), files(&straight));

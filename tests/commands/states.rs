@@ -27,24 +27,12 @@ fn check(scene: &str, options: &str) {
     assert_eq!(first["state_out"], "a");
     let second = run("--duration 20ms --out b.csv --from-state a --impacts b-impacts.json");
     let what = format!("{scene} {options}");
-    let (all, later) = (
-        rows(folder.path(), "whole.csv"),
-        rows(folder.path(), "b.csv"),
-    );
+    let (all, later) = (rows(folder.path(), "whole.csv"), rows(folder.path(), "b.csv"));
     assert_eq!((all.len(), later.len()), (82, 42), "{what}");
     assert_eq!(all[0], later[0], "{what}");
     assert_eq!(all[41..], later[1..], "{what}");
     // Everything in the summary is that of the whole run: steps, peaks, energies, doubts, state hash.
-    let without = [
-        "wall_s",
-        "ratio",
-        "slower_than_asked",
-        "from_time_s",
-        "rows",
-        "out",
-        "impacts_out",
-        "restitution",
-    ];
+    let without = ["wall_s", "ratio", "slower_than_asked", "from_time_s", "rows", "out", "impacts_out", "restitution"];
     let kept = |summary: &Json| {
         let mut kept = summary.as_object().unwrap().clone();
         kept.retain(|key, _| !without.contains(&key.as_str()));
@@ -58,49 +46,22 @@ fn check(scene: &str, options: &str) {
         let json: Json = serde_json::from_str(&text).unwrap();
         json["columns"]["end_s"].as_array().unwrap().len()
     };
-    assert_eq!(
-        ends("a-impacts.json") + ends("b-impacts.json"),
-        ends("whole-impacts.json"),
-        "{what}"
-    );
+    assert_eq!(ends("a-impacts.json") + ends("b-impacts.json"), ends("whole-impacts.json"), "{what}");
 }
 
 #[test]
 fn built_in_scenes_go_on_with_the_same_bits_by_every_method() {
-    for scene in [
-        "spcmm",
-        "pendulum",
-        "slider-crank",
-        "slider-crank-driven",
-        "chain",
-    ] {
-        for method in [
-            "automatic",
-            "dopri5",
-            "radau5",
-            "rosenbrock",
-            "rk4",
-            "imex-euler",
-        ] {
+    for scene in ["spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"] {
+        for method in ["automatic", "dopri5", "radau5", "rosenbrock", "rk4", "imex-euler"] {
             let lagrange = method == "dopri5";
             // Implicit contacts need the tree form.
-            let form = if lagrange {
-                "--set formulation=lagrange"
-            } else {
-                ""
-            };
+            let form = if lagrange { "--set formulation=lagrange" } else { "" };
             check(scene, &format!("--set solver.method={method} {form}"));
         }
     }
     check("spcmm", "--set contact.clearance=0");
-    check(
-        "spcmm",
-        "--set joint.S2.clearance=0 --set contact.friction=0.3",
-    );
-    check(
-        "pendulum",
-        "--set contact.approach_speed=largest --set solver.tolerance=1e-7",
-    );
+    check("spcmm", "--set joint.S2.clearance=0 --set contact.friction=0.3");
+    check("pendulum", "--set contact.approach_speed=largest --set solver.tolerance=1e-7");
 }
 
 #[test]
@@ -108,10 +69,7 @@ fn machines_go_on_with_the_same_bits() {
     for name in MACHINES {
         check(name, "--set solver.tolerance=1e-4");
         // Longer steps are too long for the light rods of the delta.
-        check(
-            name,
-            "--set solver.method=semi-implicit-euler --set solver.step=1us",
-        );
+        check(name, "--set solver.method=semi-implicit-euler --set solver.step=1us");
     }
 }
 
@@ -125,13 +83,8 @@ fn the_ideal_motion_beside_a_probe_goes_on_too() {
         assert_ne!(with, text);
         let path = folder.path().join(format!("{name}.toml"));
         fs::write(&path, with).unwrap();
-        let header = jointplay(
-            folder.path(),
-            &format!(
-                "run {} --duration 0s --every 1s --out {name}.csv",
-                path.display()
-            ),
-        );
+        let header =
+            jointplay(folder.path(), &format!("run {} --duration 0s --every 1s --out {name}.csv", path.display()));
         header.expect(0);
         assert!(rows(folder.path(), &format!("{name}.csv"))[0].contains("probe_error_x_m"));
         check(&path.display().to_string(), "");
@@ -152,10 +105,7 @@ fn a_chain_of_states_and_a_wear_map_are_the_run_without_a_break() {
     let last = run("--duration 40ms --from-state s3 --wear last.csv");
     assert_eq!(whole["state_hash"], last["state_hash"]);
     assert_eq!(whole["energy_J"], last["energy_J"]);
-    assert_eq!(
-        rows(folder.path(), "whole.csv"),
-        rows(folder.path(), "last.csv")
-    );
+    assert_eq!(rows(folder.path(), "whole.csv"), rows(folder.path(), "last.csv"));
     // From the start, and with a map that begins late.
     run("--duration 0s --save-state s0");
     let line = "run spcmm --duration 40ms --from-state s0 --wear late.csv --summary json";
@@ -201,11 +151,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     };
     let same = "pendulum --duration 6ms --set contact.friction=0.2";
     refused("spcmm --duration 6ms", 2, &["`pendulum`", "`spcmm`"]);
-    refused(
-        "pendulum --duration 6ms",
-        2,
-        &["--set contact.friction=0.2", "no --set"],
-    );
+    refused("pendulum --duration 6ms", 2, &["--set contact.friction=0.2", "no --set"]);
     let other = "pendulum --duration 6ms --set contact.friction=0.2 --set solver.method=rk4";
     refused(other, 2, &["--set solver.method=rk4"]);
     let short = "pendulum --duration 1ms --set contact.friction=0.2";
@@ -220,10 +166,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
         fs::write(&path, &good[..n]).unwrap();
         refused(same, 2, &["not a state"]);
     }
-    let digits: Vec<usize> = good
-        .match_indices(|c: char| c.is_ascii_digit())
-        .map(|m| m.0)
-        .collect();
+    let digits: Vec<usize> = good.match_indices(|c: char| c.is_ascii_digit()).map(|m| m.0).collect();
     for at in digits.iter().step_by(digits.len() / 40) {
         let mut bytes = good.clone().into_bytes();
         bytes[*at] = if bytes[*at] == b'7' { b'8' } else { b'7' };
@@ -236,10 +179,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
         refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
-        (
-            good.replace("\"state_format\":2", "\"state_format\":3"),
-            "format 2",
-        ),
+        (good.replace("\"state_format\":2", "\"state_format\":3"), "format 2"),
         ("{}".to_owned(), "not a state"),
         ("[1, 2]".to_owned(), "not a state"),
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),
@@ -250,21 +190,9 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     // Right in itself, and not a state of this scene.
     let mut json: Json = serde_json::from_str(&good).unwrap();
     for (pointer, value, words) in [
-        (
-            "/state/state/now/y",
-            serde_json::json!([1.0]),
-            "not those of a run",
-        ),
-        (
-            "/state/state/flights",
-            serde_json::json!([null, null]),
-            "not those of a run",
-        ),
-        (
-            "/state/sampled",
-            serde_json::json!([]),
-            "not those of a run",
-        ),
+        ("/state/state/now/y", serde_json::json!([1.0]), "not those of a run"),
+        ("/state/state/flights", serde_json::json!([null, null]), "not those of a run"),
+        ("/state/sampled", serde_json::json!([]), "not those of a run"),
         ("/state/state", serde_json::json!({}), "not a state"),
     ] {
         *json.pointer_mut(pointer).unwrap() = value;
@@ -314,11 +242,7 @@ fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
 
     write("leg.toml", &load("0.8 kg"));
     let other = run("--duration 6ms --from-state s").expect(2);
-    assert!(
-        other.stderr.contains("its file leg.toml"),
-        "{}",
-        other.stderr
-    );
+    assert!(other.stderr.contains("its file leg.toml"), "{}", other.stderr);
     // A state without the texts of files is one of another scene, too.
     let state = fs::read_to_string(folder.path().join("s")).unwrap();
     let mut state: Json = serde_json::from_str(&state).unwrap();
@@ -332,15 +256,10 @@ fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
     write("s", &state.to_string());
     write("leg.toml", &load("0.4 kg"));
     let lacking = run("--duration 6ms --from-state s").expect(2);
-    assert!(
-        lacking.stderr.contains("its file leg.toml"),
-        "{}",
-        lacking.stderr
-    );
+    assert!(lacking.stderr.contains("its file leg.toml"), "{}", lacking.stderr);
 
     // What names no file says nothing about files.
-    let line =
-        "run pendulum --duration 3ms --save-state s --every 1ms --out a.json --force --quiet";
+    let line = "run pendulum --duration 3ms --save-state s --every 1ms --out a.json --force --quiet";
     jointplay(folder.path(), line).expect(0);
     for meta in [meta("s"), meta("a.json")] {
         let keys = meta.as_object().unwrap().keys();
@@ -355,9 +274,7 @@ fn a_state_belongs_to_the_mesh_that_its_scene_names() {
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
     let mut stl = vec![b's'; 80];
     stl.extend(1_u32.to_le_bytes());
-    for x in [
-        0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 30.0, 0.0,
-    ] {
+    for x in [0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 30.0, 0.0] {
         stl.extend(x.to_le_bytes());
     }
     stl.extend([0; 2]);
@@ -381,9 +298,5 @@ fn a_state_belongs_to_the_mesh_that_its_scene_names() {
     stl[100] ^= 1;
     write("fin.stl", &stl);
     let other = run("--duration 6ms --from-state s").expect(2);
-    assert!(
-        other.stderr.contains("its file fin.stl"),
-        "{}",
-        other.stderr
-    );
+    assert!(other.stderr.contains("its file fin.stl"), "{}", other.stderr);
 }

@@ -51,11 +51,7 @@ fn a_map_has_the_shape_of_its_ranges_and_the_values_of_single_runs() {
     assert_eq!(arrays["contact.clearance"].shape(), [3]);
     for array in meta["arrays"].as_array().unwrap() {
         let name = array["name"].as_str().unwrap();
-        let shape: &[usize] = if array["per_section"] == true {
-            &[2, 3, 2]
-        } else {
-            &[2, 3]
-        };
+        let shape: &[usize] = if array["per_section"] == true { &[2, 3, 2] } else { &[2, 3] };
         assert_eq!(arrays[name].shape(), shape, "{name}");
     }
     assert_eq!(meta["scene"], "spcmm");
@@ -76,16 +72,12 @@ fn a_map_has_the_shape_of_its_ranges_and_the_values_of_single_runs() {
         let separation = value("last_separation_s");
         assert!(separation > 0.01 && separation < 0.3, "{separation}");
     }
-    let rows: Json =
-        serde_json::from_slice(&fs::read(folder.path().join("run.json")).unwrap()).unwrap();
+    let rows: Json = serde_json::from_slice(&fs::read(folder.path().join("run.json")).unwrap()).unwrap();
     for (quantity, tolerance) in [("x_m", 1e-9), ("beta_rad", 1e-8), ("beta_rate_rad_s", 1e-6)] {
         for k in 0..2 {
             let row = rows["columns"][quantity][k + 1].as_f64().unwrap();
             let section = arrays[&format!("section_{quantity}")][[1, 1, k]];
-            assert!(
-                (row - section).abs() < tolerance,
-                "{quantity}: {row} {section}"
-            );
+            assert!((row - section).abs() < tolerance, "{quantity}: {row} {section}");
         }
     }
     let error = arrays["probe_error_max_um"][[1, 1]];
@@ -111,23 +103,11 @@ fn neither_threads_nor_shards_change_a_bit() {
     // What is not all of one sweep is refused, and nothing is written.
     let before = names(folder.path());
     let lacking = merge("s1.npz s3.npz --out bad.npz").expect(2);
-    assert!(
-        lacking.stderr.contains("shards not given: 2/3"),
-        "{}",
-        lacking.stderr
-    );
+    assert!(lacking.stderr.contains("shards not given: 2/3"), "{}", lacking.stderr);
     let twice = merge("s1.npz s2.npz s1.npz s3.npz --out bad.npz").expect(2);
-    assert!(
-        twice.stderr.contains("hold the same points"),
-        "{}",
-        twice.stderr
-    );
+    assert!(twice.stderr.contains("hold the same points"), "{}", twice.stderr);
     let whole = merge("one.npz --out bad.npz").expect(2);
-    assert!(
-        whole.stderr.contains("one.npz is not a shard"),
-        "{}",
-        whole.stderr
-    );
+    assert!(whole.stderr.contains("one.npz is not a shard"), "{}", whole.stderr);
     fs::write(folder.path().join("text.npz"), "no archive").unwrap();
     let text = merge("s1.npz text.npz --out bad.npz").expect(1);
     assert!(text.stderr.contains("text.npz"), "{}", text.stderr);
@@ -141,10 +121,7 @@ fn neither_threads_nor_shards_change_a_bit() {
 
     // More shards than points: an empty one is a shard, too.
     let empty = run("--shard 5/5 --out e5.npz").stdout;
-    assert!(
-        empty.contains("Points            0") && empty.contains("Regimes           none"),
-        "{empty}"
-    );
+    assert!(empty.contains("Points            0") && empty.contains("Regimes           none"), "{empty}");
     for k in 1..5 {
         run(&format!("--shard {k}/5 --out e{k}.npz"));
     }
@@ -157,13 +134,7 @@ fn neither_threads_nor_shards_change_a_bit() {
     )
     .expect(0);
     let mixed = merge("s1.npz other.npz s3.npz --out bad.npz").expect(2);
-    assert!(
-        mixed
-            .stderr
-            .contains("different sweeps: discard: 1 there, 2 now"),
-        "{}",
-        mixed.stderr
-    );
+    assert!(mixed.stderr.contains("different sweeps: discard: 1 there, 2 now"), "{}", mixed.stderr);
 }
 
 #[test]
@@ -187,10 +158,7 @@ fn shards_of_different_files_beside_the_scene_are_not_merged() {
     own("2 mm");
     shard("2/2", "s2.npz");
     let mixed = merge().expect(2).stderr;
-    assert!(
-        mixed.contains("different sweeps: scene_files_crc32: ") && mixed.contains("own.toml"),
-        "{mixed}"
-    );
+    assert!(mixed.contains("different sweeps: scene_files_crc32: ") && mixed.contains("own.toml"), "{mixed}");
     own("1 mm");
     shard("2/2", "s2.npz");
     merge().expect(0);
@@ -225,9 +193,7 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
         if child.try_wait().unwrap().is_none() {
-            let interrupted = Command::new("kill")
-                .args(["-INT", &child.id().to_string()])
-                .status();
+            let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
             assert!(interrupted.unwrap().success());
         }
         let output = child.wait_with_output().unwrap();
@@ -250,17 +216,10 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
     let refused = |bytes: &[u8], line: &str, code: i32, fragment: &str| {
         fs::write(at("a.npz.partial"), bytes).unwrap();
         let outcome = jointplay(folder.path(), line).expect(code);
-        assert!(
-            outcome.stderr.contains("a.npz.partial"),
-            "{}",
-            outcome.stderr
-        );
+        assert!(outcome.stderr.contains("a.npz.partial"), "{}", outcome.stderr);
         assert!(outcome.stderr.contains(fragment), "{}", outcome.stderr);
         assert_eq!(names(folder.path()), ["a.npz.partial"]);
-        assert!(
-            fs::read(at("a.npz.partial")).unwrap() == bytes,
-            "left as it was"
-        );
+        assert!(fs::read(at("a.npz.partial")).unwrap() == bytes, "left as it was");
     };
     let flipped = |place: usize| {
         let mut bytes = partial.clone();
@@ -274,23 +233,14 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
     refused(&flipped(100), &line("a.npz"), 1, "checksum");
     refused(&flipped(0), &line("a.npz"), 1, "not a partial sweep");
     refused(&flipped(7), &line("a.npz"), 1, "another version");
-    refused(
-        &[&partial[..], &partial[n - 8..]].concat(),
-        &line("a.npz"),
-        1,
-        "damaged",
-    );
+    refused(&[&partial[..], &partial[n - 8..]].concat(), &line("a.npz"), 1, "damaged");
     let other = line("a.npz").replace("--periods 6", "--periods 7");
     refused(&partial, &other, 2, "periods: 6 there, 7 now");
 
     // What a crash cut off the last block costs that block alone.
     fs::write(at("a.npz.partial"), &partial[..n - 1]).unwrap();
     let resumed = jointplay(folder.path(), &line("a.npz")).expect(0);
-    assert!(
-        resumed.stderr.contains("going on where"),
-        "{}",
-        resumed.stderr
-    );
+    assert!(resumed.stderr.contains("going on where"), "{}", resumed.stderr);
     jointplay(folder.path(), &line("b.npz")).expect(0);
     assert!(fs::read(at("a.npz")).unwrap() == fs::read(at("b.npz")).unwrap());
     assert_eq!(names(folder.path()), ["a.npz", "b.npz"]);
@@ -303,7 +253,8 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
 #[test]
 fn a_sweep_that_is_killed_at_any_instant_ends_in_the_same_bytes() {
     let folder = folder();
-    let line = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 2 --discard 1 --threads 2 --no-exponent --out";
+    let line =
+        "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 2 --discard 1 --threads 2 --no-exponent --out";
     let started = std::time::Instant::now();
     jointplay(folder.path(), &format!("{line} a.npz")).expect(0);
     let length = started.elapsed();
@@ -330,20 +281,11 @@ fn a_sweep_that_is_killed_at_any_instant_ends_in_the_same_bytes() {
 #[test]
 fn a_point_that_diverges_is_recorded_and_the_rest_goes_on() {
     let folder = folder();
-    let line = "sweep spcmm --set solver.method=rk4 --vary solver.step=20us..10ms:2 --periods 1 --discard 0 --out a.npz";
+    let line =
+        "sweep spcmm --set solver.method=rk4 --vary solver.step=20us..10ms:2 --periods 1 --discard 0 --out a.npz";
     let outcome = jointplay(folder.path(), line).expect(0);
-    assert!(
-        outcome.stdout.contains("2, 1 diverged"),
-        "{}",
-        outcome.stdout
-    );
-    assert!(
-        outcome
-            .stderr
-            .contains("1 section of each point: with fewer than 8 no regime"),
-        "{}",
-        outcome.stderr
-    );
+    assert!(outcome.stdout.contains("2, 1 diverged"), "{}", outcome.stdout);
+    assert!(outcome.stderr.contains("1 section of each point: with fewer than 8 no regime"), "{}", outcome.stderr);
     let (arrays, _) = archive(&folder.path().join("a.npz"));
     assert_eq!(arrays["status"].as_slice(), Some(&[0.0, 1.0][..]));
     assert_eq!(arrays["regime"][1], -1.0);
@@ -361,26 +303,14 @@ fn warnings_come_from_within_the_ranges_and_each_kind_once() {
     let line = "sweep spcmm --vary contact.clearance=0.01mm..0.2mm:2 --vary spcmm.slider_plane=20mm..300mm:15 --periods 1 \
                 --discard 0 --shard 30/30 --no-exponent --out a.npz";
     let outcome = jointplay(folder.path(), line).expect(0);
-    let warnings: Vec<&str> = outcome
-        .stderr
-        .lines()
-        .filter(|l| l.contains("warning:"))
-        .collect();
+    let warnings: Vec<&str> = outcome.stderr.lines().filter(|l| l.contains("warning:")).collect();
     assert_eq!(warnings.len(), 4, "{}", outcome.stderr);
     assert!(warnings[3].contains("fewer than 8"), "{}", outcome.stderr);
     assert!(warnings[0].contains("contact.clearance = 0.01 mm") && warnings[0].contains("Hertz"));
     for kind in ["comes near a singular pose", "has a singular pose"] {
-        assert!(
-            outcome.stderr.matches(kind).count() == 1,
-            "{}",
-            outcome.stderr
-        );
+        assert!(outcome.stderr.matches(kind).count() == 1, "{}", outcome.stderr);
     }
-    assert!(
-        outcome.stderr.contains("spcmm.slider_plane = 140 mm"),
-        "{}",
-        outcome.stderr
-    );
+    assert!(outcome.stderr.contains("spcmm.slider_plane = 140 mm"), "{}", outcome.stderr);
 }
 
 #[test]
@@ -389,61 +319,31 @@ fn bad_input_is_refused_before_anything_runs() {
     let plan = "--periods 3 --discard 1 --out a.npz";
     for (line, code, fragment) in [
         (format!("sweep spcmm {plan}"), 2, "--vary"),
-        (
-            format!("sweep spcmm --vary contact.clearance=1mm..0.1mm:5 {plan}"),
-            2,
-            "reversed",
-        ),
-        (
-            format!("sweep spcmm --vary contact.clearance=1mm..1mm:5 {plan}"),
-            2,
-            "empty",
-        ),
-        (
-            format!("sweep spcmm --vary contact.clearance=1mm..2mm:0 {plan}"),
-            2,
-            "empty",
-        ),
-        (
-            format!("sweep spcmm --vary contact.clearance=0.1..1:5 {plan}"),
-            2,
-            "needs a unit",
-        ),
-        (
-            format!("sweep spcmm --vary contact.clearence=0.1mm..1mm:5 {plan}"),
-            2,
-            "did you mean",
-        ),
+        (format!("sweep spcmm --vary contact.clearance=1mm..0.1mm:5 {plan}"), 2, "reversed"),
+        (format!("sweep spcmm --vary contact.clearance=1mm..1mm:5 {plan}"), 2, "empty"),
+        (format!("sweep spcmm --vary contact.clearance=1mm..2mm:0 {plan}"), 2, "empty"),
+        (format!("sweep spcmm --vary contact.clearance=0.1..1:5 {plan}"), 2, "needs a unit"),
+        (format!("sweep spcmm --vary contact.clearence=0.1mm..1mm:5 {plan}"), 2, "did you mean"),
         (
             format!("sweep spcmm --vary spcmm.slider_plane=10mm..32mm:5 {plan}"),
             2,
             "the range leaves what the scene can do at spcmm.slider_plane = 10 mm",
         ),
+        (format!("sweep spcmm --vary spcmm.frequency=0.5Hz..1Hz:3 --start follow-up {plan}"), 2, "--start cold"),
+        (format!("sweep pendulum --vary contact.clearance=0.1mm..1mm:5 {plan}"), 2, "no drive that repeats"),
         (
-            format!("sweep spcmm --vary spcmm.frequency=0.5Hz..1Hz:3 --start follow-up {plan}"),
-            2,
-            "--start cold",
-        ),
-        (
-            format!("sweep pendulum --vary contact.clearance=0.1mm..1mm:5 {plan}"),
+            format!("sweep spcmm --set spcmm.frequency=0Hz --vary contact.clearance=0.1mm..1mm:5 {plan}"),
             2,
             "no drive that repeats",
         ),
         (
-            format!(
-                "sweep spcmm --set spcmm.frequency=0Hz --vary contact.clearance=0.1mm..1mm:5 {plan}"
-            ),
-            2,
-            "no drive that repeats",
-        ),
-        (
-            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 3 --discard 3 --out a.npz"
-                .to_owned(),
+            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 3 --discard 3 --out a.npz".to_owned(),
             2,
             "--discard must be less",
         ),
         (
-            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 99999999999999 --discard 3 --out a.npz".to_owned(),
+            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 99999999999999 --discard 3 --out a.npz"
+                .to_owned(),
             2,
             "more than a result holds",
         ),
@@ -455,16 +355,8 @@ fn bad_input_is_refused_before_anything_runs() {
         (format!("{SMALL} --section zero --out a.npz"), 2, "phase"),
     ] {
         let outcome = jointplay(folder.path(), &line).expect(code);
-        assert!(
-            outcome.stderr.contains(fragment),
-            "{line}: {}",
-            outcome.stderr
-        );
-        assert!(
-            names(folder.path()).is_empty(),
-            "{line}: {:?}",
-            names(folder.path())
-        );
+        assert!(outcome.stderr.contains(fragment), "{line}: {}", outcome.stderr);
+        assert!(names(folder.path()).is_empty(), "{line}: {:?}", names(folder.path()));
     }
 }
 
@@ -473,12 +365,7 @@ fn small(start: Start, points: usize) -> Sweep {
     let text = format!("contact.clearance=0.2mm..0.3mm:{points}");
     let axis = ParameterRange::parse(&scene, &text).unwrap();
     let grid = Grid::new(&scene, vec![axis], start).unwrap();
-    let plan = Plan {
-        periods: 2,
-        discard: 1,
-        phase: 0.25,
-        exponent: true,
-    };
+    let plan = Plan { periods: 2, discard: 1, phase: 0.25, exponent: true };
     Sweep::new(scene, grid, plan).unwrap()
 }
 
@@ -487,11 +374,7 @@ fn records(sweep: &Sweep, b: usize, steps: u32) -> Vec<u64> {
     while !block.is_done() {
         block.advance(steps);
     }
-    block
-        .records()
-        .iter()
-        .map(|value| value.to_bits())
-        .collect()
+    block.records().iter().map(|value| value.to_bits()).collect()
 }
 
 #[test]
@@ -514,26 +397,18 @@ fn following_continues_the_neighbour_within_fixed_blocks() {
     let cold = small(Start::Cold, points);
     let column = |sweep: &Sweep, name: &str| {
         let columns = sweep.layout().columns();
-        sweep
-            .layout()
-            .offset(columns.iter().position(|c| c.name == name).unwrap())
+        sweep.layout().offset(columns.iter().position(|c| c.name == name).unwrap())
     };
     let length = up.layout().record_length();
     let value = |sweep: &Sweep, records: &[u64], point: usize, name: &str| {
         f64::from_bits(records[point * length + column(sweep, name)])
     };
     // The second block has two points: the first of them in the direction of following starts cold.
-    let (first, second) = (
-        records(&cold, FOLLOW_BLOCK, 999),
-        records(&cold, FOLLOW_BLOCK + 1, 999),
-    );
+    let (first, second) = (records(&cold, FOLLOW_BLOCK, 999), records(&cold, FOLLOW_BLOCK + 1, 999));
     let (up_block, down_block) = (records(&up, 1, 999), records(&down, 1, 999));
     assert!(up_block[..length] == first);
     assert!(down_block[length..] == second);
-    for (sweep, block, followed, single) in [
-        (&up, &up_block, 1, &second),
-        (&down, &down_block, 0, &first),
-    ] {
+    for (sweep, block, followed, single) in [(&up, &up_block, 1, &second), (&down, &down_block, 0, &first)] {
         // No first fall through the gaps again, hence no hard impact; the same settled section at the end.
         let peak = value(sweep, block, followed, "S1_peak_N");
         assert!(peak < 0.2 * value(&cold, single, 0, "S1_peak_N"), "{peak}");

@@ -21,13 +21,7 @@ fn run(folder: &Path, line: &str, code: i32) -> String {
     said.stdout + &said.stderr
 }
 
-const FILES: [&str; 5] = [
-    "manifest.json",
-    "tradeoff.csv",
-    "tradeoff.json",
-    "tradeoff.png",
-    "tradeoff.svg",
-];
+const FILES: [&str; 5] = ["manifest.json", "tradeoff.csv", "tradeoff.json", "tradeoff.png", "tradeoff.svg"];
 
 /// A scene with little to do: a rod without play.
 const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
@@ -36,10 +30,7 @@ const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
 fn the_command_writes_all_files_or_none() {
     let folder = tempfile::tempdir().unwrap();
     let out = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 0);
-    assert!(
-        out.contains("rk4") && out.contains("Settled motion"),
-        "{out}"
-    );
+    assert!(out.contains("rk4") && out.contains("Settled motion"), "{out}");
     let found = folder.path().join("found");
     assert_eq!(names(folder.path()), ["found"], "nothing is left beside");
     assert_eq!(names(&found), FILES);
@@ -94,10 +85,7 @@ fn bad_input_is_answered_with_what_would_be_right() {
         ("tradeoff pendulm --quick", "pendulum"),
         ("tradeoff --all", "--write"),
         ("tradeoff pendulum --all --write .", "cannot be used with"),
-        (
-            "tradeoff pendulum --set contact.clearence=1mm",
-            "contact.clearance",
-        ),
+        ("tradeoff pendulum --set contact.clearence=1mm", "contact.clearance"),
         ("bench --set contact.friction=-1", "contact.friction"),
     ] {
         let answer = run(folder.path(), line, 2);
@@ -126,18 +114,12 @@ fn an_interrupted_measurement_writes_nothing() {
     while !listens() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
-    let kill = Command::new("kill")
-        .args(["-INT", &pid.to_string()])
-        .status();
+    let kill = Command::new("kill").args(["-INT", &pid.to_string()]).status();
     assert!(kill.unwrap().success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     assert!(output.stdout.is_empty());
-    assert!(
-        names(folder.path()).is_empty(),
-        "{:?}",
-        names(folder.path())
-    );
+    assert!(names(folder.path()).is_empty(), "{:?}", names(folder.path()));
 }
 
 /// By a clock that goes on at every look: the same on every machine.
@@ -153,18 +135,13 @@ fn measure<T>(
     let mut go_on = |done: f64| {
         assert!((0.0..=1.0).contains(&done), "{done}");
         reports.set(reports.get() + 1);
-        if reports.get() > most_reports {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        if reports.get() > most_reports { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     analysis(&mut RunContext::new(&mut clock, &mut go_on))
 }
 
 fn error_at(found: &WorkPrecision, method: Method, value: f64) -> f64 {
-    let own =
-        |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
+    let own = |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
     let point = found.points.iter().find(own).unwrap();
     assert_eq!(point.impacts.end, End::Reached);
     point.errors.peak.unwrap()
@@ -182,22 +159,11 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
     };
     let found = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
     for method in Method::ALL {
-        let own: Vec<_> = found
-            .points
-            .iter()
-            .filter(|p| p.setting.method == method)
-            .collect();
+        let own: Vec<_> = found.points.iter().filter(|p| p.setting.method == method).collect();
         assert!(own.len() >= 2, "{method}");
         let adaptive = own[0].setting.adaptive;
-        let [coarse, fine] = if adaptive {
-            [1e-4, 1e-8]
-        } else {
-            [10e-6, 1e-6]
-        };
-        let (coarse_error, fine_error) = (
-            error_at(&found, method, coarse),
-            error_at(&found, method, fine),
-        );
+        let [coarse, fine] = if adaptive { [1e-4, 1e-8] } else { [10e-6, 1e-6] };
+        let (coarse_error, fine_error) = (error_at(&found, method, coarse), error_at(&found, method, fine));
         println!("{method}: {coarse_error:e} {fine_error:e}");
         assert!(fine_error < 0.6 * coarse_error, "{method}");
         let evaluations = |value: f64| {
@@ -227,32 +193,18 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
 #[test]
 fn presets_can_be_measured_on_any_scene_and_broken_off() {
     let scene = crate::common::scene("pendulum", &[("contact.clearance", "0.5 mm")]);
-    let of = |scene: &Scene, most: u64| {
-        measure(
-            |context| presets::measure(scene, &Preset::ALL, context),
-            most,
-        )
-    };
+    let of = |scene: &Scene, most: u64| measure(|context| presets::measure(scene, &Preset::ALL, context), most);
     let points = of(&scene, u64::MAX).unwrap();
     assert_eq!(points.len(), Preset::ALL.len());
     let errors: Vec<f64> = points.iter().map(|p| p.errors.peak.unwrap()).collect();
-    assert!(
-        errors.windows(2).all(|pair| pair[1] < pair[0]),
-        "from fast to accurate: {errors:?}"
-    );
+    assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "from fast to accurate: {errors:?}");
     for (point, preset) in points.iter().zip(Preset::ALL) {
         assert_eq!(point.preset, Some(preset));
         assert!(presets::Measured::of(point).impacts_ratio.is_some());
     }
     assert_eq!(of(&scene, 20).unwrap_err(), AnalysisError::Cancelled);
     // The reference itself cannot be made: balls that leave their sockets.
-    let soft = crate::common::scene(
-        "pendulum",
-        &[
-            ("contact.youngs_modulus", "1 MPa"),
-            ("gravity.z", "-1000 m/s^2"),
-        ],
-    );
+    let soft = crate::common::scene("pendulum", &[("contact.youngs_modulus", "1 MPa"), ("gravity.z", "-1000 m/s^2")]);
     let error = of(&soft, u64::MAX).unwrap_err();
     assert!(matches!(error, AnalysisError::Stopped(_)), "{error}");
 }
@@ -273,10 +225,7 @@ fn the_presets_in_the_program_are_those_that_were_measured() {
             let measured = presets::measured(name, preset).unwrap();
             let error = measured.peak_error.unwrap();
             let limit = presets::limit(preset);
-            assert!(
-                error <= limit,
-                "{name}, {preset:?}: {error:e} against {limit:e}"
-            );
+            assert!(error <= limit, "{name}, {preset:?}: {error:e} against {limit:e}");
         }
     }
     assert_eq!(presets::measured("mine", Preset::Accurate), None);

@@ -11,39 +11,21 @@ pub fn finite(frame: &Frame) -> bool {
     let mut all = vec![frame.time, frame.kinetic, frame.potential, frame.elastic];
     let mut push = |v: &Vec3| all.extend_from_slice(v.as_slice());
     for b in &frame.bodies {
-        for v in [
-            &b.position,
-            &b.velocity,
-            &b.angular_velocity,
-            &b.acceleration,
-            &b.angular_acceleration,
-        ] {
+        for v in [&b.position, &b.velocity, &b.angular_velocity, &b.acceleration, &b.angular_acceleration] {
             push(v);
         }
         (0..3).for_each(|i| push(&b.rotation.column(i).into_owned()));
     }
     for j in &frame.joints {
-        for v in [
-            &j.socket_centre,
-            &j.ball_centre,
-            &j.eccentricity,
-            &j.normal_force,
-            &j.friction_force,
-            &j.contact_point,
-        ] {
+        for v in
+            [&j.socket_centre, &j.ball_centre, &j.eccentricity, &j.normal_force, &j.friction_force, &j.contact_point]
+        {
             push(v);
         }
         push(&Vec3::new(j.penetration, j.penetration_rate, j.slip_speed));
     }
     let p = &frame.pose;
-    for v in [
-        &p.position,
-        &p.angles,
-        &p.velocity,
-        &p.angle_rates,
-        &p.acceleration,
-        &p.angle_accelerations,
-    ] {
+    for v in [&p.position, &p.angles, &p.velocity, &p.angle_rates, &p.acceleration, &p.angle_accelerations] {
         push(v);
     }
     frame.probe_error.iter().for_each(&mut push);
@@ -59,10 +41,7 @@ pub fn fault(frame: &Frame, scene: &Scene, form: &str) -> Option<String> {
     for b in &frame.bodies {
         let skew = (b.rotation.tr_mul(&b.rotation) - jointplay::scene::Mat3::identity()).amax();
         if skew > 1e-9 {
-            return Some(format!(
-                "orientation off by {skew:e} at t = {:e} s",
-                frame.time
-            ));
+            return Some(format!("orientation off by {skew:e} at t = {:e} s", frame.time));
         }
     }
     let pairs = frame.joints.iter().zip(&scene.ball_joints);
@@ -81,13 +60,8 @@ fn joint_fault(report: &JointReport, joint: &BallJoint, form: &str) -> Option<St
         return (open > limit).then(|| format!("{} open by {open:e} m", joint.name));
     }
     if report.penetration > OUT_OF_SOCKET * radius {
-        return Some(format!(
-            "{} {:.3} radii inside the wall",
-            joint.name,
-            report.penetration / radius
-        ));
+        return Some(format!("{} {:.3} radii inside the wall", joint.name, report.penetration / radius));
     }
     let unheld = report.penetration > 1e-9 && report.penetration_rate > 0.0;
-    (unheld && report.normal_force.norm() == 0.0)
-        .then(|| format!("{} leaves its socket without a force", joint.name))
+    (unheld && report.normal_force.norm() == 0.0).then(|| format!("{} leaves its socket without a force", joint.name))
 }

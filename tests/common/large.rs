@@ -27,8 +27,7 @@ pub fn scene_text(kind: &str, n: usize, clearance: &str) -> String {
             "sockets of one body" => ["world", &here, "b0", &here],
             "balls of one body" if i > 0 => ["b0", &here, &own, "0 0 0 mm"],
             "a chain" if i > 0 => [&before, "1 0 0 mm", &own, "0 0 0 mm"],
-            "free bodies" | "hinges in a row" | "hinges on one body" | "balls of one body"
-            | "a chain" => continue,
+            "free bodies" | "hinges in a row" | "hinges on one body" | "balls of one body" | "a chain" => continue,
             other => panic!("no kind {other}"),
         };
         text += &format!(

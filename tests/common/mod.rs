@@ -1,8 +1,5 @@
 //! What several test files need.
-#![allow(
-    dead_code,
-    reason = "each test file is a crate of its own and uses some of this"
-)]
+#![allow(dead_code, reason = "each test file is a crate of its own and uses some of this")]
 
 pub mod invariants;
 
@@ -26,25 +23,12 @@ pub fn at_random_instants(length: Duration, few: u32, mut kill: impl FnMut(Durat
 }
 
 /// The built-in scenes with few joints, which every method runs through in no time.
-pub const SCENES: [&str; 5] = [
-    "spcmm",
-    "pendulum",
-    "slider-crank",
-    "slider-crank-driven",
-    "chain",
-];
+pub const SCENES: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
 /// The others, whose long runs take their time: `tests/physics/machines.rs` checks what each of them is.
 pub const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
 /// Words of `solver.method`.
-pub const METHODS: [&str; 7] = [
-    "semi-implicit-euler",
-    "imex-euler",
-    "rk4",
-    "dopri5",
-    "rosenbrock",
-    "radau5",
-    "automatic",
-];
+pub const METHODS: [&str; 7] =
+    ["semi-implicit-euler", "imex-euler", "rk4", "dopri5", "rosenbrock", "radau5", "automatic"];
 
 /// Keys and values as a user writes them.
 pub type Changes<'a> = [(&'a str, &'a str)];
@@ -60,12 +44,8 @@ pub fn scene(name: &str, changes: &Changes) -> Scene {
 }
 
 /// Methods with formulations that between them have every kind of Jacobian and error control.
-pub const FOUR_WAYS: [(&str, &str); 4] = [
-    ("dopri5", "tree"),
-    ("radau5", "lagrange"),
-    ("automatic", "tree"),
-    ("rosenbrock", "tree"),
-];
+pub const FOUR_WAYS: [(&str, &str); 4] =
+    [("dopri5", "tree"), ("radau5", "lagrange"), ("automatic", "tree"), ("rosenbrock", "tree")];
 
 /// A scene from its text with changes.
 pub fn parse(text: &str, changes: &Changes) -> Scene {

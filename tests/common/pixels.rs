@@ -1,8 +1,5 @@
 //! What can be found in the pixels of a picture: `#[path = "common/pixels.rs"] mod pixels;`.
-#![allow(
-    dead_code,
-    reason = "each test file is a crate of its own and uses some of this"
-)]
+#![allow(dead_code, reason = "each test file is a crate of its own and uses some of this")]
 
 /// A picture: rows of red, green, blue, alpha from the top left corner.
 pub struct Picture {

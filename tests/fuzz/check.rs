@@ -58,21 +58,12 @@ pub fn check(bytes: &[u8]) -> Fate {
             if let Some((line, column)) = error.position {
                 // A carriage return counts as a character of its line.
                 let lines: Vec<&str> = text.split('\n').collect();
-                assert!(
-                    (1..=lines.len()).contains(&(line as usize)),
-                    "line of: {words}"
-                );
+                assert!((1..=lines.len()).contains(&(line as usize)), "line of: {words}");
                 let length = lines[line as usize - 1].chars().count() + 1;
-                assert!(
-                    (1..=length).contains(&(column as usize)),
-                    "column of: {words}"
-                );
+                assert!((1..=length).contains(&(column as usize)), "column of: {words}");
             } else {
                 // A thing that is missing from the whole file has no line.
-                assert!(
-                    error.message.contains("missing") || error.key.is_some(),
-                    "no place: {words}"
-                );
+                assert!(error.message.contains("missing") || error.key.is_some(), "no place: {words}");
             }
             return Fate::Refused;
         }
@@ -85,12 +76,7 @@ pub fn check(bytes: &[u8]) -> Fate {
         let value = scene.get(parameter.key).expect("its own key");
         if value != Value::Unset {
             let written = parameter.write(&value);
-            assert_eq!(
-                parameter.read(&written).as_ref(),
-                Ok(&value),
-                "{} = {written}",
-                parameter.key
-            );
+            assert_eq!(parameter.read(&written).as_ref(), Ok(&value), "{} = {written}", parameter.key);
         }
     }
     if !changes.is_empty() {
@@ -106,9 +92,7 @@ pub fn check(bytes: &[u8]) -> Fate {
         _ => "tree",
     };
     let mut scene = scene;
-    scene
-        .set("formulation", other)
-        .expect("a choice of every scene");
+    scene.set("formulation", other).expect("a choice of every scene");
     run(&scene);
     fate
 }

@@ -75,16 +75,9 @@ fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>
 }
 
 /// The window on `scene` with some changes, paused at t = 0, its bench open.
-fn sized(
-    scene: &str,
-    changes: &[(&str, &str)],
-    size: [f32; 2],
-    theme: egui::Theme,
-) -> Harness<'static, App> {
+fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut harness = opened(scene, changes, size, theme, crate::common::looks::<100>);
-    harness
-        .state_mut()
-        .set_host(Box::new(DesktopHost::default()));
+    harness.state_mut().set_host(Box::new(DesktopHost::default()));
     harness.run();
     harness.key_press(Key::B);
     harness.run();
@@ -105,9 +98,7 @@ fn click(harness: &mut Harness<'_, App>, role: Role, label: &str) {
 }
 
 fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
-    harness
-        .get_by_role_and_label(Role::SpinButton, label)
-        .set_value_accesskit(number);
+    harness.get_by_role_and_label(Role::SpinButton, label).set_value_accesskit(number);
     harness.step();
     harness.step();
 }
@@ -263,9 +254,8 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     sweep(&mut harness, "0.2 mm", "0.4", 3.0);
     wait(&mut harness, |app| !app.bench().is_sweeping());
     harness.run_steps(3);
-    harness.get_by_label_contains(
-        "clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, cold",
-    );
+    harness
+        .get_by_label_contains("clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, cold");
     harness.get_by_label("For the scene shown, with its values");
     let click_point = |harness: &mut Harness<'_, App>| {
         let at = harness.state().bench().place(1, 1).expect("drawn");
@@ -364,9 +354,7 @@ fn the_portrait_and_the_section_fill_while_the_scene_runs() {
     assert_eq!(harness.state().player().watch().phase(), 0.25);
     harness.state_mut().player_mut().pacer.set_scale(1.0);
     click(&mut harness, Role::Button, "Play");
-    wait(&mut harness, |app| {
-        app.player().watch().sections().len() >= 3
-    });
+    wait(&mut harness, |app| app.player().watch().sections().len() >= 3);
     let player = harness.state_mut().player_mut();
     player.set_playing(false);
     assert!(player.watch().orbit().count() > 300);
@@ -472,12 +460,7 @@ fn every_control_of_the_bench_has_a_name() {
         let node = node.accesskit_node();
         let is_control = matches!(
             node.role(),
-            Role::Button
-                | Role::Slider
-                | Role::TextInput
-                | Role::ComboBox
-                | Role::CheckBox
-                | Role::SpinButton
+            Role::Button | Role::Slider | Role::TextInput | Role::ComboBox | Role::CheckBox | Role::SpinButton
         );
         controls += usize::from(is_control);
         let named = node.label().is_some_and(|label| !label.trim().is_empty());
@@ -507,9 +490,7 @@ fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it(
     // The pendulum has no drive, so no sweep of its own.
     let mut harness = window("pendulum", &[]);
     let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
-    harness
-        .state_mut()
-        .set_host(Box::new(Asking(asked.clone())));
+    harness.state_mut().set_host(Box::new(Asking(asked.clone())));
     for ready in &READY {
         harness.get_by_label(ready.shows);
         click(&mut harness, Role::Button, ready.name);
@@ -544,9 +525,7 @@ fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it(
 fn from_the_start_of_the_window_chaos_is_two_gestures_away() {
     let mut harness = sized("spcmm", &[], [1280.0, 800.0], egui::Theme::Light);
     let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
-    harness
-        .state_mut()
-        .set_host(Box::new(Asking(asked.clone())));
+    harness.state_mut().set_host(Box::new(Asking(asked.clone())));
     let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0));
     let within = |harness: &Harness<'_, App>, label: &str| {
         let node = harness.get_by_role_and_label(Role::Button, label);

@@ -19,10 +19,7 @@ fn picture([width, height]: [u32; 2], k: u32, colour: [u8; 3]) -> Vec<u8> {
     let mut rgba = Vec::new();
     for y in 0..height {
         for x in 0..width {
-            let (dx, dy) = (
-                f64::from(x) - 30.0 - 3.0 * f64::from(k),
-                f64::from(y) - 30.0,
-            );
+            let (dx, dy) = (f64::from(x) - 30.0 - 3.0 * f64::from(k), f64::from(y) - 30.0);
             let inside = dx * dx + dy * dy < 400.0;
             let ground = [200 + (x / 8) as u8, 200, 210];
             rgba.extend(if inside { colour } else { ground });
@@ -38,22 +35,14 @@ fn decode(file: &[u8], [width, height]: [usize; 2]) -> Vec<(f64, bool, Vec<u8>)>
     while let Some(wanted) = demuxer.required_input() {
         let from = wanted.position as usize;
         let size = wanted.size.unwrap_or(file.len() - from);
-        demuxer.handle_input(Input {
-            position: wanted.position,
-            data: &file[from..from + size],
-        });
+        demuxer.handle_input(Input { position: wanted.position, data: &file[from..from + size] });
     }
     let mut decoder = Decoder::new();
     let mut frames = Vec::new();
     while let Some(sample) = demuxer.next_sample().unwrap() {
         let mut unit = Vec::new();
         if let Some(SampleEntry::Avc1(entry)) = sample.sample_entry {
-            for set in entry
-                .avcc_box
-                .sps_list
-                .iter()
-                .chain(&entry.avcc_box.pps_list)
-            {
+            for set in entry.avcc_box.sps_list.iter().chain(&entry.avcc_box.pps_list) {
                 unit.extend([0, 0, 0, 1]);
                 unit.extend(set);
             }
@@ -70,11 +59,7 @@ fn decode(file: &[u8], [width, height]: [usize; 2]) -> Vec<(f64, bool, Vec<u8>)>
                 let part = |plane: &[u8]| (f64::from(plane[at]) - 128.0) * 255.0 / 224.0;
                 let (blue, red) = (part(&yuv.u), part(&yuv.v));
                 // The inverse of BT.709-6, as its Table 3 gives it to five digits.
-                let colour = [
-                    luma + 1.5748 * red,
-                    luma - 0.18732 * blue - 0.46812 * red,
-                    luma + 1.8556 * blue,
-                ];
+                let colour = [luma + 1.5748 * red, luma - 0.18732 * blue - 0.46812 * red, luma + 1.8556 * blue];
                 rgb.extend(colour.map(|part| part.round().clamp(0.0, 255.0) as u8));
             }
         }
@@ -108,10 +93,7 @@ fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
         for (k, ((time, key, rgb), picture)) in frames.iter().zip(&pictures).enumerate() {
             assert!((time - k as f64 / rate).abs() < 1e-9, "{time}");
             assert_eq!(*key, k % 60 == 0, "{k}");
-            let wanted: Vec<u8> = picture
-                .chunks_exact(4)
-                .flat_map(|pixel| pixel[..3].to_vec())
-                .collect();
+            let wanted: Vec<u8> = picture.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
             // The edge of the disc loses half its resolution of colour.
             let ratio = signal_to_noise(&wanted, rgb);
             assert!(ratio > 30.0, "{k}: {ratio}");
@@ -122,8 +104,7 @@ fn an_mp4_has_the_frames_at_their_times_in_their_colours() {
                     continue;
                 }
                 for part in 0..3 {
-                    let difference =
-                        i32::from(wanted[3 * at + part]) - i32::from(rgb[3 * at + part]);
+                    let difference = i32::from(wanted[3 * at + part]) - i32::from(rgb[3 * at + part]);
                     assert!(difference.abs() <= 6, "{k} {x} {y}: {difference}");
                 }
             }
@@ -152,8 +133,7 @@ fn a_gif_keeps_its_pace_and_draws_what_changed() {
     while let Some(frame) = decoder.read_next_frame().unwrap() {
         assert!(frame.delay == 3 || frame.delay == 4);
         hundredths += u32::from(frame.delay);
-        let [left, top, width, height] =
-            [frame.left, frame.top, frame.width, frame.height].map(usize::from);
+        let [left, top, width, height] = [frame.left, frame.top, frame.width, frame.height].map(usize::from);
         for y in 0..height {
             let to = 4 * ((top + y) * 120 + left);
             let from = 4 * y * width;
@@ -197,15 +177,10 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    let line =
-        "render spcmm --duration 8ms --fps 10 --slow 100 --size 320x180 --quiet --hide trail";
+    let line = "render spcmm --duration 8ms --fps 10 --slow 100 --size 320x180 --quiet --hide trail";
     let output = jointplay(folder, &format!("{line} --out frames"));
     assert!(output.status.success());
-    let file = |name: &str| jointplay::app::SaveFile {
-        name: name.to_owned(),
-        mime: "",
-        bytes: read(folder, name),
-    };
+    let file = |name: &str| jointplay::app::SaveFile { name: name.to_owned(), mime: "", bytes: read(folder, name) };
     for (name, magic) in [("a.mp4", &b"ftyp"[..]), ("a.gif", b"9a")] {
         let output = jointplay(folder, &format!("{line} --film {name}"));
         assert!(output.status.success(), "{name}");
@@ -237,16 +212,8 @@ fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
         ("--film b.gif --fps 60", "50 frames a second"),
     ] {
         let line = line.replace("--size 320x180 ", "").replace("--fps 10 ", "");
-        let rest = if options.contains("--size") {
-            "--fps 10"
-        } else {
-            "--size 320x180"
-        };
-        let fps = if options.contains("--fps") || rest == "--fps 10" {
-            ""
-        } else {
-            "--fps 10"
-        };
+        let rest = if options.contains("--size") { "--fps 10" } else { "--size 320x180" };
+        let fps = if options.contains("--fps") || rest == "--fps 10" { "" } else { "--fps 10" };
         let output = jointplay(folder, &format!("{line} {rest} {fps} {options}"));
         assert!(!output.status.success(), "{options}");
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -262,12 +229,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     harness.run();
     let state = |harness: &egui_kittest::Harness<'_, jointplay::app::App>| {
         let player = harness.state().player();
-        (
-            player.pacer.shown(),
-            player.reached(),
-            player.simulation().state_hash(),
-            player.pacer.scale(),
-        )
+        (player.pacer.shown(), player.reached(), player.simulation().state_hash(), player.pacer.scale())
     };
     let before = state(&harness);
 
@@ -290,11 +252,9 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
 
     click(&mut harness, "Save");
     click(&mut harness, "Film…");
-    for (name, choice) in [
-        ("Size of the film", "640 × 360"),
-        ("Frames of the film", "15 a second"),
-        ("Time scale of the film", "1:20"),
-    ] {
+    for (name, choice) in
+        [("Size of the film", "640 × 360"), ("Frames of the film", "15 a second"), ("Time scale of the film", "1:20")]
+    {
         harness.get_by_role_and_label(Role::ComboBox, name).click();
         harness.run_steps(2);
         click(&mut harness, choice);
@@ -302,10 +262,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     assert!(label(&harness, "10 frames, 0.7 s of film"));
     click(&mut harness, "Make film");
     let file = next_file(&mut harness, &calls);
-    assert_eq!(
-        (file.name.as_str(), file.mime),
-        ("pendulum.mp4", "video/mp4")
-    );
+    assert_eq!((file.name.as_str(), file.mime), ("pendulum.mp4", "video/mp4"));
     assert_eq!(state(&harness), before);
     let frames = decode(&file.bytes, [640, 360]);
     assert_eq!(frames.len(), 10);
@@ -313,39 +270,23 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     // Each frame is the picture of its instant.
     click(&mut harness, "Save");
     click(&mut harness, "Own size");
-    for (name, edge) in [
-        ("Width of the picture", 640.0),
-        ("Height of the picture", 360.0),
-    ] {
-        harness
-            .get_by_role_and_label(Role::SpinButton, name)
-            .set_value_accesskit(edge);
+    for (name, edge) in [("Width of the picture", 640.0), ("Height of the picture", 360.0)] {
+        harness.get_by_role_and_label(Role::SpinButton, name).set_value_accesskit(edge);
         harness.run_steps(2);
     }
     harness.key_press(eframe::egui::Key::Escape);
     harness.run_steps(2);
     for k in [0_usize, 4, 9] {
-        harness
-            .state_mut()
-            .player_mut()
-            .go_to(k as f64 / 15.0 / 20.0);
+        harness.state_mut().player_mut().go_to(k as f64 / 15.0 / 20.0);
         harness.run();
         click(&mut harness, "Save");
         click(&mut harness, "Picture…");
         let (_, rgba) = decoded(&next_file(&mut harness, &calls));
-        let picture: Vec<u8> = rgba
-            .chunks_exact(4)
-            .flat_map(|pixel| pixel[..3].to_vec())
-            .collect();
+        let picture: Vec<u8> = rgba.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
         let ratio = |k: usize| signal_to_noise(&picture, &frames[k].2);
         // But for the trail and the fading marks of impacts, which only a film has.
         assert!(ratio(k) > 25.0, "{k}: {}", ratio(k));
         let other = if k == 9 { 0 } else { 9 };
-        assert!(
-            ratio(k) > ratio(other) + 1.0,
-            "{k}: {} {}",
-            ratio(k),
-            ratio(other)
-        );
+        assert!(ratio(k) > ratio(other) + 1.0, "{k}: {} {}", ratio(k), ratio(other));
     }
 }

@@ -22,20 +22,13 @@ fn jointplay(folder: &Path, line: &str) -> Output {
         .env_remove("RUST_LOG")
         .output()
         .expect("the program starts");
-    assert!(
-        output.status.success(),
-        "{line}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
     output
 }
 
 /// Draws one frame into `folder`/frames and returns its file.
 pub fn draw(folder: &Path, what: &str) -> PathBuf {
-    jointplay(
-        folder,
-        &format!("render {what} --out frames --quiet --force"),
-    );
+    jointplay(folder, &format!("render {what} --out frames --quiet --force"));
     folder.join("frames/frame_00000.png")
 }
 
@@ -48,27 +41,16 @@ pub struct Picture {
 impl Picture {
     pub fn read(path: &Path) -> Self {
         let file = fs::File::open(path).unwrap_or_else(|error| {
-            panic!(
-                "{}: {error}; UPDATE_GOLDEN=1 cargo test --test interface frames::",
-                path.display()
-            )
+            panic!("{}: {error}; UPDATE_GOLDEN=1 cargo test --test interface frames::", path.display())
         });
-        let mut reader = png::Decoder::new(std::io::BufReader::new(file))
-            .read_info()
-            .expect("a PNG file");
+        let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG file");
         let mut pixels = vec![0; reader.output_buffer_size().expect("it fits")];
         let info = reader.next_frame(&mut pixels).expect("a PNG file");
         let rgb = match info.color_type {
             png::ColorType::Rgb => pixels,
-            _ => pixels
-                .chunks_exact(4)
-                .flat_map(|p| [p[0], p[1], p[2]])
-                .collect(),
+            _ => pixels.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect(),
         };
-        Self {
-            size: [info.width, info.height],
-            rgb,
-        }
+        Self { size: [info.width, info.height], rgb }
     }
 
     /// Small, for golden frames live in the history for ever: without the lowest three bits, which hold the noise that
@@ -87,11 +69,7 @@ impl Picture {
     /// Which pixels differ from `other`'s, which has the same size.
     fn differing(&self, other: &Self) -> Vec<bool> {
         let far = |(a, b): (&u8, &u8)| a.abs_diff(*b) > TOLERANCE.0;
-        self.rgb
-            .chunks_exact(3)
-            .zip(other.rgb.chunks_exact(3))
-            .map(|(a, b)| a.iter().zip(b).any(far))
-            .collect()
+        self.rgb.chunks_exact(3).zip(other.rgb.chunks_exact(3)).map(|(a, b)| a.iter().zip(b).any(far)).collect()
     }
 
     /// The picture, faded, with the marked pixels red.
@@ -100,15 +78,7 @@ impl Picture {
             true => [220, 0, 0],
             false => [p[0], p[1], p[2]].map(|c| 170 + c / 3),
         };
-        Self {
-            size: self.size,
-            rgb: self
-                .rgb
-                .chunks_exact(3)
-                .zip(marks)
-                .flat_map(pixel)
-                .collect(),
-        }
+        Self { size: self.size, rgb: self.rgb.chunks_exact(3).zip(marks).flat_map(pixel).collect() }
     }
 }
 
@@ -153,9 +123,7 @@ pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
         if let Some(diff) = diff {
             diff.write(&left("diff"));
         }
-        panic!(
-            "{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({what})"
-        );
+        panic!("{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({what})");
     }
 }
 
@@ -199,10 +167,7 @@ fn every_scene_is_drawn_dark_as_it_was() {
 
 #[test]
 fn spcmm_dark_near_a_ball_joint() {
-    golden(
-        "spcmm_close_up_dark",
-        "spcmm --at 7.85ms --size 480x300 --magnification 20 --close-up S1 --theme dark",
-    );
+    golden("spcmm_close_up_dark", "spcmm --at 7.85ms --size 480x300 --magnification 20 --close-up S1 --theme dark");
 }
 
 #[test]
@@ -215,19 +180,11 @@ fn what_is_missing_is_found() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let whole = Picture::read(&draw(folder.path(), IMPACT));
     assert!(objection(&whole, &whole).is_none());
-    for less in [
-        "--arrows none",
-        "--hide sockets",
-        "--hide names",
-        "--set contact.clearance=0.1mm",
-    ] {
+    for less in ["--arrows none", "--hide sockets", "--hide names", "--set contact.clearance=0.1mm"] {
         let picture = Picture::read(&draw(folder.path(), &format!("{IMPACT} {less}")));
         let marks = whole.differing(&picture);
         let count = marks.iter().filter(|mark| **mark).count();
-        assert!(
-            count > 2 * TOLERANCE.1,
-            "{less} changes {count} pixels only"
-        );
+        assert!(count > 2 * TOLERANCE.1, "{less} changes {count} pixels only");
     }
 }
 
@@ -235,9 +192,7 @@ fn what_is_missing_is_found() {
 fn a_frame_has_the_same_bytes_each_time() {
     for what in [IMPACT, "pendulum --at 20ms --size 640x400 --ui"] {
         let folders = [(); 2].map(|()| tempfile::tempdir().expect("a scratch folder"));
-        let [a, b] = folders
-            .each_ref()
-            .map(|folder| fs::read(draw(folder.path(), what)).expect("written"));
+        let [a, b] = folders.each_ref().map(|folder| fs::read(draw(folder.path(), what)).expect("written"));
         assert!(a == b, "{what}");
     }
 }
@@ -247,10 +202,7 @@ fn a_frame_has_the_same_bytes_each_time() {
 fn the_manifest_has_the_state_that_a_run_reaches() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let scene = "spcmm --set solver.method=rk4 --set solver.step=10us";
-    draw(
-        folder.path(),
-        &format!("{scene} --at 7.853ms,0s,7.85ms --size 64x64"),
-    );
+    draw(folder.path(), &format!("{scene} --at 7.853ms,0s,7.85ms --size 64x64"));
     let manifest = fs::read(folder.path().join("frames/manifest.json")).expect("written");
     let manifest: Json = serde_json::from_slice(&manifest).expect("JSON");
     assert_eq!(manifest["scene"], "spcmm");
@@ -263,10 +215,7 @@ fn the_manifest_has_the_state_that_a_run_reaches() {
     for frame in frames {
         let end = number(frame, "state_time_s");
         assert!(end >= number(frame, "time_s") && end < number(frame, "time_s") + 10e-6);
-        let run = jointplay(
-            folder.path(),
-            &format!("run {scene} --duration {end:e}s --summary json --quiet"),
-        );
+        let run = jointplay(folder.path(), &format!("run {scene} --duration {end:e}s --summary json --quiet"));
         let run: Json = serde_json::from_slice(&run.stdout).expect("JSON");
         assert_eq!(frame["state_hash"], run["state_hash"], "at {end} s");
     }

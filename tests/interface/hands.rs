@@ -1,8 +1,6 @@
 //! The window as a user opens it, and gestures.
 
-use eframe::egui::{
-    self, Event, Key, Modifiers, PointerButton, Pos2, Shape, TouchPhase, accesskit::Role,
-};
+use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, Shape, TouchPhase, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::Scene;
@@ -75,15 +73,11 @@ fn add_texts(shape: &Shape, clip: egui::Rect, out: &mut String) {
 
 /// Replaces what stands in a text field; nothing is entered yet.
 pub fn type_over(harness: &mut Harness<'_, App>, label: &str, text: &str) {
-    harness
-        .get_by_role_and_label(Role::TextInput, label)
-        .focus();
+    harness.get_by_role_and_label(Role::TextInput, label).focus();
     harness.step();
     harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
     harness.step();
-    harness
-        .get_by_role_and_label(Role::TextInput, label)
-        .type_text(text);
+    harness.get_by_role_and_label(Role::TextInput, label).type_text(text);
     harness.step();
 }
 

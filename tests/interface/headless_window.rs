@@ -31,11 +31,7 @@ fn a_frame_of_the_application_is_the_same_each_time_and_shows_its_instant() {
     let first = app_frame(7.85e-3, [900, 600]).expect("drawn");
     assert_eq!((first.width, first.height), (900, 600));
     assert_eq!(first.rgba.len(), 900 * 600 * 4);
-    assert!(
-        colours(&first) > 500,
-        "an empty picture has few colours: {}",
-        colours(&first)
-    );
+    assert!(colours(&first) > 500, "an empty picture has few colours: {}", colours(&first));
     let again = app_frame(7.85e-3, [900, 600]).expect("drawn");
     assert!(first == again, "same instant, same picture");
     let later = app_frame(12e-3, [900, 600]).expect("drawn");
@@ -79,27 +75,10 @@ fn the_overlay_adds_to_the_plain_picture() {
     assert!(notes[0].starts_with("S1  normal "), "{}", notes[0]);
 
     let mut headless = Headless::new().expect("software Vulkan at least");
-    let plain = headless
-        .picture(&list, &Overlay::default(), Theme::Light, 1.0)
-        .expect("drawn");
-    let overlay = Overlay {
-        time: Some(7.85e-3),
-        notes,
-        legend: true,
-        labels: true,
-    };
-    let written = headless
-        .picture(&list, &overlay, Theme::Light, 1.0)
-        .expect("drawn");
-    let changed = plain
-        .rgba
-        .chunks_exact(4)
-        .zip(written.rgba.chunks_exact(4))
-        .filter(|(a, b)| a != b)
-        .count();
+    let plain = headless.picture(&list, &Overlay::default(), Theme::Light, 1.0).expect("drawn");
+    let overlay = Overlay { time: Some(7.85e-3), notes, legend: true, labels: true };
+    let written = headless.picture(&list, &overlay, Theme::Light, 1.0).expect("drawn");
+    let changed = plain.rgba.chunks_exact(4).zip(written.rgba.chunks_exact(4)).filter(|(a, b)| a != b).count();
     let part = changed as f64 / (640.0 * 360.0);
-    assert!(
-        (0.01..0.3).contains(&part),
-        "the overlay covers {part} of the picture"
-    );
+    assert!((0.01..0.3).contains(&part), "the overlay covers {part} of the picture");
 }

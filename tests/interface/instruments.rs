@@ -16,12 +16,7 @@ const WIDE: [f32; 2] = [1280.0, 800.0];
 const PHONE: [f32; 2] = [390.0, 844.0];
 
 /// The window on `scene` with some changes at t = 0, paused.
-fn window(
-    scene: &str,
-    changes: &[(&str, &str)],
-    size: [f32; 2],
-    theme: egui::Theme,
-) -> Harness<'static, App> {
+fn window(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     opened(scene, changes, size, theme, crate::common::looks::<10>)
 }
 
@@ -83,9 +78,7 @@ fn the_ball_s_centre_is_drawn_where_eccentricity_over_scale_says() {
         let area = [area[0].x, area[0].y, area[1].x, area[1].y].map(|edge| edge as usize);
         let dot = picture.coloured(area, [0x1E, 0x2A, 0x36], 24);
         assert!(dot.len() > 20, "{time}: {} at {expected}", dot.len());
-        let mean = |of: fn(&(usize, usize)) -> usize| {
-            dot.iter().map(of).sum::<usize>() as f32 / dot.len() as f32 + 0.5
-        };
+        let mean = |of: fn(&(usize, usize)) -> usize| dot.iter().map(of).sum::<usize>() as f32 / dot.len() as f32 + 0.5;
         let found = Pos2::new(mean(|p| p.0), mean(|p| p.1));
         assert!(found.distance(expected) < 1.0, "{found} {expected}");
         assert!(expected.distance(circle.centre) < circle.radius + 1.0);
@@ -151,10 +144,7 @@ fn what_is_told_of_an_impact_is_what_the_run_recorded() {
     harness.state_mut().player_mut().run_to(9.5e-3);
     harness.run();
     let player = harness.state().player();
-    let impact = player
-        .simulation()
-        .impacts()
-        .find(|impact| impact.joint == 0);
+    let impact = player.simulation().impacts().find(|impact| impact.joint == 0);
     let impact = *impact.expect("S1 was hit");
     let given = format!("{:.4}", impact.achieved());
     harness.get_by_label(given.trim_end_matches('0'));
@@ -164,11 +154,7 @@ fn what_is_told_of_an_impact_is_what_the_run_recorded() {
     for step in 0.. {
         assert!(step < 2000);
         harness.state_mut().player_mut().single_step();
-        if harness.state().player().frame().joints[0]
-            .normal_force
-            .norm()
-            > 0.0
-        {
+        if harness.state().player().frame().joints[0].normal_force.norm() > 0.0 {
             break;
         }
     }
@@ -199,9 +185,7 @@ fn instruments_cost_the_run_no_bit() {
             harness.run();
         }
         let player = harness.state().player();
-        let error = player
-            .ideal()
-            .map(|ideal| ideal.output_error(player.frame()));
+        let error = player.ideal().map(|ideal| ideal.output_error(player.frame()));
         assert_eq!(error.is_some(), instruments);
         if let Some(error) = error {
             assert!(error.expect("came there").norm() > 1e-7);
@@ -222,17 +206,11 @@ fn an_ideal_ghost_that_cannot_be_says_so() {
     let path = folder.path().join("between.toml");
     std::fs::write(&path, text).expect("written");
     let mut harness = spcmm();
-    harness
-        .state_mut()
-        .open(path.to_str().expect("plain"))
-        .expect("opens");
+    harness.state_mut().open(path.to_str().expect("plain")).expect("opens");
     harness.run();
     harness.key_press(Key::G);
     harness.run();
-    assert!(said(
-        &harness,
-        "No ideal ghost: with ideal joints, ball joint S"
-    ));
+    assert!(said(&harness, "No ideal ghost: with ideal joints, ball joint S"));
     harness.key_press(Key::Escape);
     harness.key_press(Key::G);
     harness.run();
@@ -256,10 +234,8 @@ fn every_control_of_the_microscope_has_a_name() {
         harness.run();
         for node in harness.root().children_recursive() {
             let node = node.accesskit_node();
-            let is_control = matches!(
-                node.role(),
-                Role::Button | Role::ComboBox | Role::CheckBox | Role::Image | Role::Window
-            );
+            let is_control =
+                matches!(node.role(), Role::Button | Role::ComboBox | Role::CheckBox | Role::Image | Role::Window);
             let named = node.label().is_some_and(|label| !label.trim().is_empty());
             assert!(!is_control || named, "{:?}", node.role());
         }
@@ -300,10 +276,7 @@ fn pictures() {
         compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
-    for (name, theme) in [
-        ("ghosts_light", egui::Theme::Light),
-        ("ghosts_dark", egui::Theme::Dark),
-    ] {
+    for (name, theme) in [("ghosts_light", egui::Theme::Light), ("ghosts_dark", egui::Theme::Dark)] {
         let changes = [("contact.clearance", "0.8 mm"), ("contact.friction", "0")];
         let mut harness = window("slider-crank", &changes, WIDE, theme);
         harness.state_mut().plots_mut().chosen = vec![Quantity::TipError];

@@ -7,9 +7,7 @@ use std::sync::Arc;
 use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
 use jointplay::analysis::task::{Job, Message};
-use jointplay::app::{
-    App, Event, Host, Link, Log, OpenedFile, Player, Replay, Running, SceneText, Verdict,
-};
+use jointplay::app::{App, Event, Host, Link, Log, OpenedFile, Player, Replay, Running, SceneText, Verdict};
 use jointplay::simulate::{ContactState, Quantity};
 
 use crate::hands::{compare_window, fingers, fingers_down, lift};
@@ -65,11 +63,7 @@ fn a_click_on_the_timeline_shows_that_instant_and_a_drag_passes_over_all_between
             drag(&mut harness, &[at]);
             harness.run();
             let pixel = 40e-3 / f64::from(strip(&harness).width());
-            assert!(
-                (shown(&harness) - time).abs() <= pixel,
-                "{size:?} {}",
-                shown(&harness)
-            );
+            assert!((shown(&harness) - time).abs() <= pixel, "{size:?} {}", shown(&harness));
             assert_eq!(harness.state().player().frame().time, shown(&harness));
             assert_eq!(harness.state().player().reached(), 40e-3);
         }
@@ -85,25 +79,14 @@ fn the_lanes_have_the_colours_of_the_states_that_were() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 20e-3);
     let player = harness.state().player();
-    let touch = player
-        .contact_history()
-        .touches(0, 0.0, 1.0)
-        .next()
-        .expect("strikes");
-    let until = player
-        .contact_history()
-        .states(0, touch, 1.0)
-        .find(|state| state.2 == ContactState::Free);
+    let touch = player.contact_history().touches(0, 0.0, 1.0).next().expect("strikes");
+    let until = player.contact_history().states(0, touch, 1.0).find(|state| state.2 == ContactState::Free);
     let until = until.expect("leaves again").0;
     let rect = strip(&harness);
     let lane = rect.height() / 3.0;
     let x = |time: f64| place(&harness, time).x as usize;
-    let (row, before, strikes, after) = (
-        (rect.top() + 0.5 * lane) as usize,
-        x(0.5 * touch),
-        x(touch),
-        x(until + 0.3e-3),
-    );
+    let (row, before, strikes, after) =
+        ((rect.top() + 0.5 * lane) as usize, x(0.5 * touch), x(touch), x(until + 0.3e-3));
     let drawn = picture(&mut harness);
     let blue = |column: usize| {
         let area = [column - 1, row - 1, column + 2, row + 1];
@@ -151,11 +134,7 @@ fn keys_go_from_impact_to_impact_to_both_ends_and_backwards() {
 fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_link_does_not_carry() {
     let mut harness = window("spcmm");
     run_to(&mut harness, 10e-3);
-    harness
-        .state_mut()
-        .player_mut()
-        .set("contact.friction", "0")
-        .expect("in range");
+    harness.state_mut().player_mut().set("contact.friction", "0").expect("in range");
     run_to(&mut harness, 30e-3);
     let at = place(&harness, 5e-3);
     drag(&mut harness, &[at]);
@@ -171,10 +150,7 @@ fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_lin
     let player = harness.state().player();
     follows(player);
     run_to(&mut harness, 31e-3);
-    assert!(
-        harness.state().player().abandoned_future().is_none(),
-        "replaced"
-    );
+    assert!(harness.state().player().abandoned_future().is_none(), "replaced");
 }
 
 /// A link to the instant on show leads there again, to the same bits.
@@ -221,10 +197,7 @@ fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
     let player = harness.state().player();
     assert!(player.frame().pull.is_none());
     let pulls = |log: &Log| {
-        let pulls = log
-            .entries
-            .iter()
-            .filter(|entry| matches!(entry.event, Event::Pull(_)));
+        let pulls = log.entries.iter().filter(|entry| matches!(entry.event, Event::Pull(_)));
         pulls.count()
     };
     assert!(pulls(&player.log()) >= 2);
@@ -247,9 +220,7 @@ fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
     run_to(&mut harness, 30e-3);
     let place = |harness: &mut Harness<'_, App>, time: f64| {
         let plots = harness.state_mut().plots_mut();
-        plots
-            .place(Quantity::NormalForce, time, 100.0)
-            .expect("shown")
+        plots.place(Quantity::NormalForce, time, 100.0).expect("shown")
     };
     let width = |harness: &mut Harness<'_, App>| {
         let [a, b] = [7.8e-3, 8.0e-3].map(|time| place(harness, time).x);
@@ -270,28 +241,18 @@ fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
     }
     harness.run();
     assert!(width(&mut harness) > 4.0 * before, "an impact enlarged");
-    assert!(
-        (place(&mut harness, 7.85e-3).x - impact.x).abs() < 2.0,
-        "about the pointer"
-    );
+    assert!((place(&mut harness, 7.85e-3).x - impact.x).abs() < 2.0, "about the pointer");
     // A click goes there, and the cursor stands there.
     harness.drag_at(impact);
     harness.step();
     harness.drop_at(impact);
     harness.run_steps(40);
-    assert!(
-        (shown(&harness) - 7.85e-3).abs() < 2e-5,
-        "{}",
-        shown(&harness)
-    );
+    assert!((shown(&harness) - 7.85e-3).abs() < 2e-5, "{}", shown(&harness));
     let now = shown(&harness);
     let line = place(&mut harness, now);
     assert!((line.x - impact.x).abs() < 2.0);
     // A drag shifts the stretch that is shown.
-    drag(
-        &mut harness,
-        &[impact, impact + vec2(20.0, 0.0), impact + vec2(40.0, 0.0)],
-    );
+    drag(&mut harness, &[impact, impact + vec2(20.0, 0.0), impact + vec2(40.0, 0.0)]);
     harness.run();
     let shifted = place(&mut harness, 7.85e-3).x - impact.x;
     assert!((shifted - 40.0).abs() < 10.0, "{shifted}");
@@ -325,11 +286,7 @@ fn pictures_of_the_past() {
     ] {
         let mut harness = sized("spcmm", size, theme);
         run_to(&mut harness, 25e-3);
-        harness
-            .state_mut()
-            .player_mut()
-            .set("contact.clearance", "0.6 mm")
-            .expect("in range");
+        harness.state_mut().player_mut().set("contact.clearance", "0.6 mm").expect("in range");
         run_to(&mut harness, 60e-3);
         let player = harness.state_mut().player_mut();
         player.go_to(15e-3);
@@ -439,10 +396,7 @@ impl Lecture {
     }
 
     fn on(size: [f32; 2]) -> Self {
-        Self {
-            harness: sized("spcmm", size, egui::Theme::Light),
-            gestures: 0,
-        }
+        Self { harness: sized("spcmm", size, egui::Theme::Light), gestures: 0 }
     }
 
     fn app(&self) -> &App {
@@ -577,10 +531,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     let first = shown(&class.harness);
     class.frames(30);
     let passed = shown(&class.harness) - first;
-    assert!(
-        (passed / (30.0 * scale / 60.0) - 1.0).abs() < 0.2,
-        "{passed}"
-    );
+    assert!((passed / (30.0 * scale / 60.0) - 1.0).abs() < 0.2, "{passed}");
     class.done("an impact slowly");
     class.harness.state_mut().player_mut().run_to(30e-3);
     class.key(Key::Comma);
@@ -596,9 +547,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.key(Key::Space);
     class.frames(90);
     let player = class.app().player();
-    let error = player
-        .ideal()
-        .and_then(|ideal| ideal.output_error(player.frame()));
+    let error = player.ideal().and_then(|ideal| ideal.output_error(player.frame()));
     assert!(error.expect("came there").norm() > 1e-6);
     class.done("ideal beside real");
 
@@ -606,9 +555,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.harness.state_mut().player_mut().run_to(30e-3);
     class.frames(2);
     let plots = class.harness.state_mut().plots_mut();
-    let at = plots
-        .place(Quantity::NormalForce, 7.85e-3, 100.0)
-        .expect("shown");
+    let at = plots.place(Quantity::NormalForce, 7.85e-3, 100.0).expect("shown");
     class.gestures += 2;
     class.harness.hover_at(at);
     class.harness.step();
@@ -631,13 +578,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     class.click(Role::CheckBox, "Twin run");
     class.key(Key::Space);
     class.frames(30);
-    assert!(
-        class
-            .app()
-            .player()
-            .twin()
-            .is_some_and(|twin| twin.distances().len() > 5)
-    );
+    assert!(class.app().player().twin().is_some_and(|twin| twin.distances().len() > 5));
     class.done("a billionth apart");
 
     // 9: where chaos begins: the bench, and a sweep over a parameter.
@@ -668,10 +609,7 @@ fn to_the_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), a
     press(class, Role::Button, "Copy link");
     assert_eq!(calls.borrow().shared.len(), 1);
     assert!(class.gestures <= 3);
-    for (entry, then, name) in [
-        ("Picture…", None, "png"),
-        ("Film…", Some("Make film"), "mp4"),
-    ] {
+    for (entry, then, name) in [("Picture…", None, "png"), ("Film…", Some("Make film"), "mp4")] {
         class.gestures = 0;
         press(class, Role::Button, all.unwrap_or("Save"));
         press(class, Role::Button, entry);
@@ -726,9 +664,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     while class.app().player().is_seeking() {
         class.frames(1);
     }
-    let list = class
-        .harness
-        .get_by_role_and_label(Role::ComboBox, "Time scale preset");
+    let list = class.harness.get_by_role_and_label(Role::ComboBox, "Time scale preset");
     let at = list.rect().center();
     class.fingers(&[&[at, at - vec2(20.0, 0.0), at - vec2(45.0, 0.0)]]);
     assert_eq!(class.app().player().pacer.scale(), 1e-3);
@@ -736,10 +672,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     let first = shown(&class.harness);
     class.frames(30);
     let passed = shown(&class.harness) - first;
-    assert!(
-        (passed / (30.0 * 1e-3 / 60.0) - 1.0).abs() < 0.2,
-        "{passed}"
-    );
+    assert!((passed / (30.0 * 1e-3 / 60.0) - 1.0).abs() < 0.2, "{passed}");
     class.done("an impact slowly");
     class.harness.state_mut().player_mut().run_to(30e-3);
     class.tap(Role::Button, "Previous impact");
@@ -757,9 +690,7 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     class.frames(90);
     let player = class.app().player();
     assert!(player.is_playing());
-    let error = player
-        .ideal()
-        .and_then(|ideal| ideal.output_error(player.frame()));
+    let error = player.ideal().and_then(|ideal| ideal.output_error(player.frame()));
     assert!(error.expect("came there").norm() > 1e-6);
     class.done("ideal beside real");
 

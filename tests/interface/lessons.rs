@@ -27,11 +27,7 @@ fn taught(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
 fn settle(harness: &mut Harness<'_, App>) {
     for _ in 0..FRAMES {
         harness.step();
-        if harness
-            .state()
-            .course()
-            .is_none_or(|course| !course.is_busy())
-        {
+        if harness.state().course().is_none_or(|course| !course.is_busy()) {
             // The camera glides, rings appear.
             harness.run_steps(3);
             return;
@@ -77,39 +73,19 @@ fn says(harness: &Harness<'_, App>, words: &str) -> bool {
 fn every_lesson_is_walked_to_its_end_by_page_down_and_play() {
     for (name, _) in BUILT_IN_LESSONS {
         let mut harness = taught(name, 0, WIDE);
-        let steps = harness
-            .state()
-            .course()
-            .expect("a lesson")
-            .lesson()
-            .steps
-            .len();
+        let steps = harness.state().course().expect("a lesson").lesson().steps.len();
         for k in 0..steps {
             let at = format!("{name}, step {}", k + 1);
             assert_eq!(step(&harness), k, "{at}");
-            assert!(
-                says(&harness, &format!("Step {} of {steps}", k + 1)),
-                "{at}"
-            );
-            assert!(
-                harness.state().points_out(&harness.ctx),
-                "{at}: something pointed at is not there"
-            );
-            assert!(
-                !says(&harness, "It is:"),
-                "{at}: the answer shows too early"
-            );
+            assert!(says(&harness, &format!("Step {} of {steps}", k + 1)), "{at}");
+            assert!(harness.state().points_out(&harness.ctx), "{at}: something pointed at is not there");
+            assert!(!says(&harness, "It is:"), "{at}: the answer shows too early");
             assert!(!says(&harness, "The machine was changed"), "{at}");
-            let asked = harness.state().course().expect("a lesson").lesson().steps[k]
-                .question
-                .clone();
+            let asked = harness.state().course().expect("a lesson").lesson().steps[k].question.clone();
             if play(&mut harness) && asked.is_some() {
                 let course = harness.state().course().expect("a lesson");
                 let answer = course.answer().unwrap_or_else(|| panic!("{at}: no answer"));
-                assert!(
-                    says(&harness, &format!("It is: {answer}")),
-                    "{at}: {answer}"
-                );
+                assert!(says(&harness, &format!("It is: {answer}")), "{at}: {answer}");
             }
             press(&mut harness, Key::PageDown);
         }
@@ -125,25 +101,19 @@ fn every_lesson_is_walked_to_its_end_by_page_down_and_play() {
 fn the_answer_is_what_the_run_on_show_gave() {
     let mut harness = taught("rattle", 0, WIDE);
     press(&mut harness, Key::PageDown);
-    harness
-        .get_by_role_and_label(Role::RadioButton, "S2")
-        .click();
+    harness.get_by_role_and_label(Role::RadioButton, "S2").click();
     harness.run_steps(2);
     assert!(play(&mut harness));
     let player = harness.state().player();
     let touch = |joint| player.contact_history().touches(joint, 0.0, 1.0).next();
     let touches: Vec<f64> = (0..3).map(|joint| touch(joint).expect("touched")).collect();
-    let first = (0..3)
-        .min_by(|a, b| touches[*a].total_cmp(&touches[*b]))
-        .expect("three");
+    let first = (0..3).min_by(|a, b| touches[*a].total_cmp(&touches[*b])).expect("three");
     let name = player.scene().ball_joints[first].name.clone();
     harness.get_by_label(&format!("Not as predicted. It is: {name}"));
     // Back, the class tries again.
     press(&mut harness, Key::PageUp);
     press(&mut harness, Key::PageDown);
-    harness
-        .get_by_role_and_label(Role::RadioButton, &name)
-        .click();
+    harness.get_by_role_and_label(Role::RadioButton, &name).click();
     harness.run_steps(2);
     play(&mut harness);
     harness.get_by_label(&format!("As predicted: {name}"));
@@ -226,10 +196,7 @@ fn a_link_opens_the_lesson_at_its_step() {
     let link = harness.state().share_state();
     assert!(link.contains("lesson=rattle&step=2"), "{link}");
     let before = harness.state().player().simulation().state_hash();
-    let (mut harness, _) = page::open(
-        AppOptions::from_link(&format!("#{link}")).expect("a link"),
-        WIDE,
-    );
+    let (mut harness, _) = page::open(AppOptions::from_link(&format!("#{link}")).expect("a link"), WIDE);
     settle(&mut harness);
     for _ in 0..100 {
         harness.step();
@@ -237,25 +204,17 @@ fn a_link_opens_the_lesson_at_its_step() {
     assert_eq!(step(&harness), 1);
     assert_eq!(harness.state().verdict(), Some(&Verdict::Agrees(before)));
     assert!(!says(&harness, "The machine was changed"));
-    let (mut harness, _) = page::open(
-        AppOptions::from_link("?lesson=rattle&step=5").expect("a link"),
-        WIDE,
-    );
+    let (mut harness, _) = page::open(AppOptions::from_link("?lesson=rattle&step=5").expect("a link"), WIDE);
     settle(&mut harness);
     assert_eq!(step(&harness), 4);
     assert!((harness.state().player().pacer.shown() - 9.5e-3).abs() < 1e-12);
-    for (text, wrong) in [
-        ("?lesson=ratle", "did you mean `rattle`?"),
-        ("?lesson=rattle&step=0", "allowed 1 and more"),
-    ] {
+    for (text, wrong) in [("?lesson=ratle", "did you mean `rattle`?"), ("?lesson=rattle&step=0", "allowed 1 and more")]
+    {
         let error = AppOptions::from_link(text).expect_err(text);
         assert!(error.contains(wrong), "{error}");
     }
     let link = Link::parse("?lesson=rattle&step=2").expect("a link");
-    assert_eq!(
-        (link.lesson.as_deref(), link.step),
-        (Some("rattle"), Some(2))
-    );
+    assert_eq!((link.lesson.as_deref(), link.step), (Some("rattle"), Some(2)));
 }
 
 #[test]
@@ -270,10 +229,7 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
     let title = &Lesson::built_in("first-impact").expect("a lesson").title;
     harness.get_by_role_and_label(Role::Button, title).click();
     settle(&mut harness);
-    assert_eq!(
-        harness.state().course().expect("a lesson").lesson().title,
-        *title
-    );
+    assert_eq!(harness.state().course().expect("a lesson").lesson().title, *title);
 
     let tap = |harness: &mut Harness<'_, App>, role: Role, label: &str| {
         let at = harness.get_by_role_and_label(role, label).rect().center();
@@ -284,11 +240,7 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
     let next = harness.get_by_role_and_label(Role::Button, "Next").rect();
     tap(&mut harness, Role::Button, "Next");
     assert_eq!(step(&harness), 1);
-    assert_eq!(
-        harness.get_by_role_and_label(Role::Button, "Next").rect(),
-        next,
-        "nothing moves"
-    );
+    assert_eq!(harness.get_by_role_and_label(Role::Button, "Next").rect(), next, "nothing moves");
     tap(&mut harness, Role::Button, "Play");
     for _ in 0..FRAMES {
         harness.step();
@@ -302,11 +254,7 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
     assert_eq!(step(&harness), 0);
     // The sheet folds away, and comes back.
     tap(&mut harness, Role::Button, "Lesson");
-    assert!(
-        harness
-            .query_by_role_and_label(Role::Button, "Next")
-            .is_none()
-    );
+    assert!(harness.query_by_role_and_label(Role::Button, "Next").is_none());
     tap(&mut harness, Role::Button, "Lesson");
     tap(&mut harness, Role::Button, "Leave the lesson");
     assert!(harness.state().course().is_none());
@@ -329,12 +277,7 @@ fn a_presented_lesson_is_legible_from_the_last_row() {
     assert!(harness.state().is_presenting());
     let zoom = harness.ctx.zoom_factor();
     let styles = &harness.ctx.global_style().text_styles;
-    for style in [
-        TextStyle::Small,
-        TextStyle::Body,
-        TextStyle::Monospace,
-        TextStyle::Heading,
-    ] {
+    for style in [TextStyle::Small, TextStyle::Body, TextStyle::Monospace, TextStyle::Heading] {
         let share = styles[&style].size * zoom / WIDE[1];
         assert!(share >= 1.0 / 40.0 - 1e-6, "{style:?}: {share}");
     }

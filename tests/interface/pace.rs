@@ -67,11 +67,7 @@ fn while_it_moves_slowly_the_picture_has_fewer_pixels_and_at_rest_all_of_them() 
         let player = harness.state().player();
         (player.steps(), player.simulation().state_hash())
     };
-    assert_eq!(
-        hash(&follows),
-        hash(&plain),
-        "no bit of the run depends on it"
-    );
+    assert_eq!(hash(&follows), hash(&plain), "no bit of the run depends on it");
 
     // A turn of the view is motion, too, and a change of what is shown at rest is seen.
     follows.key_press(eframe::egui::Key::Num2);

@@ -17,9 +17,7 @@ use egui_kittest::{
     Harness, SnapshotResults,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::{
-    App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window,
-};
+use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window};
 use jointplay::cli::output::Table;
 use jointplay::scene::{DEFAULT_SCENE, DriveData, Scene, Value};
 use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
@@ -126,9 +124,7 @@ pub fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell
 
 /// The one label whose text contains `words`; the report for screen readers may say the same.
 pub fn label(harness: &Harness<'_, App>, words: &str) -> bool {
-    let labels = harness
-        .query_all_by_label_contains(words)
-        .filter(|node| node.accesskit_node().role() == Role::Label);
+    let labels = harness.query_all_by_label_contains(words).filter(|node| node.accesskit_node().role() == Role::Label);
     labels.count() == 1
 }
 
@@ -163,13 +159,9 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
     let (mut harness, calls) = window("spcmm", LARGE);
     click(&mut harness, "Play");
     harness.run_steps(30);
-    harness
-        .get_by_role_and_label(Role::Slider, "Clearance")
-        .set_value_accesskit(0.55);
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.55);
     harness.run_steps(30);
-    harness
-        .get_by_role_and_label(Role::Slider, "Friction coefficient")
-        .set_value_accesskit(0.4);
+    harness.get_by_role_and_label(Role::Slider, "Friction coefficient").set_value_accesskit(0.4);
     harness.run_steps(20);
     click(&mut harness, "Pause");
     click(&mut harness, "Step");
@@ -178,17 +170,11 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
     click(&mut harness, "Copy link");
     assert!(harness.state().announcement().starts_with("Link copied."));
     let link = calls.borrow().shared.last().expect("shared").clone();
-    assert!(
-        link.starts_with("https://example.org/lab/#scene=spcmm&"),
-        "{link}"
-    );
+    assert!(link.starts_with("https://example.org/lab/#scene=spcmm&"), "{link}");
     assert!(link.len() < 600, "{} characters", link.len());
 
     let options = AppOptions::from_link(&link).expect("a link");
-    assert_eq!(
-        options.scene.contact.clearance, 0.3e-3,
-        "the change came on the way"
-    );
+    assert_eq!(options.scene.contact.clearance, 0.3e-3, "the change came on the way");
     let (mut copy, _) = open(options, LARGE);
     assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
     copy.run();
@@ -209,14 +195,9 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
     click(&mut copy, "Dismiss");
     assert!(!label(&copy, &words));
 
-    let wrong = link
-        .replace("hash=", "hash=0000000000000000&was=")
-        .replace("&was=", "&utm_was=");
+    let wrong = link.replace("hash=", "hash=0000000000000000&was=").replace("&was=", "&utm_was=");
     let (mut copy, _) = open(AppOptions::from_link(&wrong).expect("a link"), LARGE);
-    assert!(matches!(
-        verdict(&mut copy),
-        Verdict::Differs { expected: 0, .. }
-    ));
+    assert!(matches!(verdict(&mut copy), Verdict::Differs { expected: 0, .. }));
     copy.run();
     assert!(label(&copy, "State differs: hash"));
 }
@@ -239,10 +220,7 @@ fn a_long_way_shows_how_far_it_is_and_can_be_stopped() {
     assert!(harness.state().share_state().contains("t=100s"));
     click(&mut harness, "Stop here");
     assert!(harness.state().replaying().is_none());
-    assert!(matches!(
-        harness.state().verdict(),
-        Some(Verdict::Failed(_))
-    ));
+    assert!(matches!(harness.state().verdict(), Some(Verdict::Failed(_))));
     assert!(harness.state().player().simulation().time() > 0.0);
     click(&mut harness, "Step");
     harness.key_press(Key::R);
@@ -264,11 +242,7 @@ fn a_bad_link_is_explained_and_the_default_scene_runs() {
         assert!(AppOptions::from_link(link).is_err(), "{link}");
         let (mut harness, _) = open(AppOptions::from_link_or_default(link), LARGE);
         assert!(label(&harness, "link: "));
-        assert!(
-            harness.state().announcement().contains(words),
-            "{link}: {}",
-            harness.state().announcement()
-        );
+        assert!(harness.state().announcement().contains(words), "{link}: {}", harness.state().announcement());
         let player = harness.state().player();
         assert_eq!(player.scene().name, DEFAULT_SCENE);
         assert!(player.is_playing());
@@ -276,21 +250,12 @@ fn a_bad_link_is_explained_and_the_default_scene_runs() {
         assert!(harness.state_mut().open_link(&ctx, "?c=2").is_err());
     }
     let options = AppOptions::from_link_or_default("?scene=pendulum&c=0.5mm&scale=1:10");
-    assert_eq!(
-        (options.problem, options.playing, options.time_scale),
-        (None, true, 0.1)
-    );
+    assert_eq!((options.problem, options.playing, options.time_scale), (None, true, 0.1));
     assert_eq!(options.scene.contact.clearance, 0.5e-3);
 }
 
 fn touch(harness: &Harness<'_, App>, id: u64, phase: TouchPhase, pos: Pos2) {
-    harness.event(Event::Touch {
-        device_id: TouchDeviceId(0),
-        id: TouchId(id),
-        phase,
-        pos,
-        force: None,
-    });
+    harness.event(Event::Touch { device_id: TouchDeviceId(0), id: TouchId(id), phase, pos, force: None });
     // The first finger is the pointer, too.
     if id == 1 {
         let button = |pressed| Event::PointerButton {
@@ -367,10 +332,7 @@ fn one_finger_turns_and_two_shift_and_come_nearer() {
         harness.step();
     }
     let nearer = camera(&harness).expect("nearer");
-    assert!(
-        nearer.distance < 0.8 * shifted.distance,
-        "{shifted:?} {nearer:?}"
-    );
+    assert!(nearer.distance < 0.8 * shifted.distance, "{shifted:?} {nearer:?}");
     assert_eq!((nearer.yaw, nearer.pitch), (again.yaw, again.pitch));
     // The finger that stays longer turns nothing.
     touch(&harness, 2, TouchPhase::End, middle + vec2(120.0, 0.0));
@@ -411,11 +373,7 @@ fn a_double_tap_follows_what_it_hits() {
     }
     harness.run_steps(3);
     // The link follows it, too, from where the camera is.
-    harness
-        .state_mut()
-        .plots_mut()
-        .chosen
-        .push(Quantity::Energy);
+    harness.state_mut().plots_mut().chosen.push(Quantity::Energy);
     harness.state_mut().plots_mut().window = Window::Last(0.01);
     harness.state_mut().microscope_mut().set_open(true);
     harness.state_mut().microscope_mut().focus(1);
@@ -446,26 +404,12 @@ fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
         let (mut harness, _) = window("spcmm", size);
         harness.run();
         let view = harness.get_by_label("3D view").rect();
-        assert!(
-            view.width() > 240.0 && view.height() > 200.0,
-            "{size:?}: {view:?}"
-        );
+        assert!(view.width() > 240.0 && view.height() > 200.0, "{size:?}: {view:?}");
         let mut seen = 0;
-        for name in [
-            "Reset",
-            "Play",
-            "Step",
-            "Menu",
-            "View options",
-            "Controls",
-            "Plots",
-        ] {
+        for name in ["Reset", "Play", "Step", "Menu", "View options", "Controls", "Plots"] {
             let rect = harness.get_by_role_and_label(Role::Button, name).rect();
             assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
-            assert!(
-                rect.right() <= size[0] && rect.bottom() <= size[1],
-                "{name}: {rect:?}"
-            );
+            assert!(rect.right() <= size[0] && rect.bottom() <= size[1], "{name}: {rect:?}");
             seen += 1;
         }
         for (role, name) in [
@@ -486,38 +430,20 @@ fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
             .into();
         for (i, a) in rects.iter().enumerate() {
             for b in &rects[i + 1..] {
-                assert!(
-                    !a.shrink(1.0).intersects(b.shrink(1.0)),
-                    "{size:?}: {a:?} {b:?}"
-                );
+                assert!(!a.shrink(1.0).intersects(b.shrink(1.0)), "{size:?}: {a:?} {b:?}");
             }
         }
 
         click(&mut harness, "Controls");
         harness.run();
         let wide = harness.get_by_label("3D view").rect();
-        assert!(
-            wide.area() > 1.3 * view.area(),
-            "{size:?}: {view:?} {wide:?}"
-        );
-        assert!(
-            harness
-                .query_by_role_and_label(Role::Slider, "Clearance")
-                .is_none()
-        );
+        assert!(wide.area() > 1.3 * view.area(), "{size:?}: {view:?} {wide:?}");
+        assert!(harness.query_by_role_and_label(Role::Slider, "Clearance").is_none());
         harness.key_press(Key::P);
         harness.run();
         harness.get_by_label("Choose plots");
         click(&mut harness, "Menu");
-        for name in [
-            "Open…",
-            "Copy link",
-            "Picture…",
-            "Record…",
-            "Scene…",
-            "Keys",
-            "About",
-        ] {
+        for name in ["Open…", "Copy link", "Picture…", "Record…", "Scene…", "Keys", "About"] {
             harness.get_by_label(name);
         }
     }
@@ -542,10 +468,7 @@ fn dialogs_and_menus_stay_on_a_small_screen() {
         let step = harness.get_by_role_and_label(Role::Button, "Step").rect();
         let scale = harness.get_by_role_and_label(Role::ComboBox, "Time scale preset");
         let scale = scale.rect();
-        assert!(
-            scale.left() >= step.right() && scale.right() <= size[0],
-            "{size:?}: {scale:?}"
-        );
+        assert!(scale.left() >= step.right() && scale.right() <= size[0], "{size:?}: {scale:?}");
         harness.key_press(Key::Questionmark);
         harness.run();
         let words = harness.get_by_label("Turn the view").rect();
@@ -585,17 +508,14 @@ fn dialogs_and_menus_stay_on_a_small_screen() {
 fn a_file_held_over_the_window_and_a_large_one_are_told() {
     let (mut harness, calls) = window("pendulum", LARGE);
     let picture = harness.render().expect("a picture");
-    harness
-        .input_mut()
-        .hovered_files
-        .push(egui::HoveredFile::default());
+    harness.input_mut().hovered_files.push(egui::HoveredFile::default());
     harness.step();
     assert_ne!(harness.render().expect("a picture"), picture);
     let before = hash(&harness);
-    calls.borrow_mut().to_open.push_back(vec![OpenedFile {
-        name: "film.mp4".to_owned(),
-        content: Err(jointplay::scene::too_large()),
-    }]);
+    calls
+        .borrow_mut()
+        .to_open
+        .push_back(vec![OpenedFile { name: "film.mp4".to_owned(), content: Err(jointplay::scene::too_large()) }]);
     harness.step();
     harness.run_steps(3);
     assert!(label(&harness, "film.mp4: too large for a scene file"));
@@ -634,18 +554,13 @@ fn a_finger_makes_the_controls_of_a_large_window_large_as_well() {
 fn scene_record_and_picture_are_saved() {
     let (mut harness, calls) = window("spcmm", LARGE);
     let player = harness.state_mut().player_mut();
-    player
-        .set("contact.clearance", "0.45 mm")
-        .expect("in range");
+    player.set("contact.clearance", "0.45 mm").expect("in range");
     player.run_to(12e-3);
     harness.run();
     click(&mut harness, "Save");
     click(&mut harness, "Scene…");
     let saved = calls.borrow_mut().saved.remove(0);
-    assert_eq!(
-        (saved.name.as_str(), saved.mime),
-        ("spcmm.toml", "application/toml")
-    );
+    assert_eq!((saved.name.as_str(), saved.mime), ("spcmm.toml", "application/toml"));
     let text = String::from_utf8(saved.bytes).expect("text");
     let scene = Scene::parse(&text, Some("spcmm.toml"), &[]).expect("a scene");
     assert_eq!(scene.contact.clearance, 0.45e-3);
@@ -660,47 +575,25 @@ fn scene_record_and_picture_are_saved() {
     click(&mut harness, "Save");
     click(&mut harness, "Record…");
     let record = calls.borrow_mut().saved.remove(0);
-    assert_eq!(
-        (record.name.as_str(), record.mime),
-        ("spcmm-12.000ms.csv", "text/csv")
-    );
+    assert_eq!((record.name.as_str(), record.mime), ("spcmm-12.000ms.csv", "text/csv"));
     let text = String::from_utf8(record.bytes).expect("text");
-    assert!(
-        text.starts_with("t_s,S1_normal_N_min,S1_normal_N_max,"),
-        "{text:.80}"
-    );
+    assert!(text.starts_with("t_s,S1_normal_N_min,S1_normal_N_max,"), "{text:.80}");
     let meta = calls.borrow_mut().saved.remove(0);
     assert_eq!(meta.name, "spcmm-12.000ms.csv.meta.json");
 
     click(&mut harness, "Save");
     click(&mut harness, "Picture…");
     let picture = next_file(&mut harness, &calls);
-    assert_eq!(
-        (picture.name.as_str(), picture.mime),
-        ("spcmm-12.000ms.png", "image/png")
-    );
+    assert_eq!((picture.name.as_str(), picture.mime), ("spcmm-12.000ms.png", "image/png"));
     let (info, rgba) = decoded(&picture);
     let view = harness.get_by_label("3D view").rect();
-    assert_eq!(
-        (info.width, info.height),
-        (view.width().round() as u32, view.height().round() as u32)
-    );
+    assert_eq!((info.width, info.height), (view.width().round() as u32, view.height().round() as u32));
     let texts = &info.uncompressed_latin1_text;
-    assert!(
-        texts
-            .iter()
-            .any(|t| t.text.contains("contact.clearance = 0.45 mm"))
-    );
+    assert!(texts.iter().any(|t| t.text.contains("contact.clearance = 0.45 mm")));
     let pixels: std::collections::HashSet<&[u8]> = rgba.chunks_exact(4).collect();
-    assert!(
-        pixels.len() > 500,
-        "an empty picture has few colours: {}",
-        pixels.len()
-    );
+    assert!(pixels.len() > 500, "an empty picture has few colours: {}", pixels.len());
     // Where the button was on the screen, there is the ground.
-    let button = harness
-        .get_by_role_and_label(Role::Button, "View options")
-        .rect();
+    let button = harness.get_by_role_and_label(Role::Button, "View options").rect();
     let at = (button.left_top() + vec2(6.0, 10.0)) - view.min;
     let pixel = |x: f32, y: f32| {
         let i = 4 * (y as usize * info.width as usize + x as usize);
@@ -724,9 +617,7 @@ pub fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> 
 
 /// A picture's header and its pixels.
 pub fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
-    let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice()))
-        .read_info()
-        .expect("a PNG file");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice())).read_info().expect("a PNG file");
     let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
     reader.next_frame(&mut rgba).expect("whole");
     (reader.info().clone(), rgba)
@@ -735,14 +626,9 @@ pub fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
 /// Mean difference of the colours of a picture of the same view at `times` the size, put together again, 0 to 255.
 fn apart(small: &(png::Info<'_>, Vec<u8>), large: &(png::Info<'_>, Vec<u8>), times: usize) -> f64 {
     let (width, height) = (small.0.width as usize, small.0.height as usize);
-    assert_eq!(
-        (large.0.width as usize, large.0.height as usize),
-        (times * width, times * height)
-    );
+    assert_eq!((large.0.width as usize, large.0.height as usize), (times * width, times * height));
     let mut sum = 0.0;
-    for (y, x, c) in
-        (0..height).flat_map(|y| (0..width).flat_map(move |x| (0..3).map(move |c| (y, x, c))))
-    {
+    for (y, x, c) in (0..height).flat_map(|y| (0..width).flat_map(move |x| (0..3).map(move |c| (y, x, c)))) {
         let block = (0..times * times).map(|k| {
             let (row, column) = (times * y + k / times, times * x + k % times);
             f64::from(large.1[4 * (row * times * width + column) + c])
@@ -798,10 +684,7 @@ fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_sh
     // Finer lines of the floor, and letters.
     assert!(off < 4.5, "the view at twice the size: {off}");
     let [short, long] = [ruler(&once), ruler(&twice)];
-    assert!(
-        short > 40 && long.abs_diff(2 * short) <= 3,
-        "ruler {short}, {long}"
-    );
+    assert!(short > 40 && long.abs_diff(2 * short) <= 3, "ruler {short}, {long}");
     // A little more than the view was: its buttons are left out, and the plots are below.
     let plots = picture(&mut harness, &["View and plots", "1×"]);
     assert_eq!(plots.0.width, once.0.width);
@@ -818,10 +701,7 @@ fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_sh
     click(&mut harness, "Save");
     click(&mut harness, "View only");
     click(&mut harness, "Own size");
-    for (name, edge) in [
-        ("Width of the picture", 300.0),
-        ("Height of the picture", 777.0),
-    ] {
+    for (name, edge) in [("Width of the picture", 300.0), ("Height of the picture", 777.0)] {
         let field = harness.get_by_role_and_label(Role::SpinButton, name);
         field.set_value_accesskit(edge);
         harness.run_steps(2);
@@ -846,9 +726,7 @@ fn on_the_desktop_a_path_is_asked_for_and_nothing_is_overwritten() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("mine.csv").display().to_string();
     let (mut harness, _) = window("pendulum", LARGE);
-    harness
-        .state_mut()
-        .set_host(Box::new(DesktopHost::default()));
+    harness.state_mut().set_host(Box::new(DesktopHost::default()));
     for again in [false, true] {
         click(&mut harness, "Save");
         click(&mut harness, "Record…");
@@ -872,12 +750,7 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     click(&mut harness, "Open…");
     assert_eq!(calls.borrow().picked, 1);
     assert!(harness.query_by_label("Path").is_none(), "the host asks");
-    let file = |name: &str, content| {
-        vec![OpenedFile {
-            name: name.to_owned(),
-            content,
-        }]
-    };
+    let file = |name: &str, content| vec![OpenedFile { name: name.to_owned(), content }];
     for (bad, words) in [
         (Ok(b"name = [".to_vec()), "mine.toml:1"),
         (Ok(vec![0xff, 0xfe]), "not a text file"),
@@ -890,10 +763,7 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     }
     let text = Scene::load("pendulum", &[]).expect("built in").source.text;
     let mine = text.replace("name = \"pendulum\"", "name = \"mine\"");
-    calls
-        .borrow_mut()
-        .to_open
-        .push_back(file("mine.toml", Ok(mine.into_bytes())));
+    calls.borrow_mut().to_open.push_back(file("mine.toml", Ok(mine.into_bytes())));
     harness.run_steps(3);
     assert_eq!(harness.state().player().scene().name, "mine");
     assert!(!label(&harness, "it is gone"));
@@ -918,14 +788,8 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
     let all: [(&str, &'static [u8]); 4] = [
         ("lifted.toml", LIFTED.as_bytes()),
         ("lift.csv", b"time_s,position_mm\n0,0\n0.5,3\n1,0\n"),
-        (
-            "own.toml",
-            b"[[parameter]]\nname = \"reach\"\nvalue = \"2 mm\"\n",
-        ),
-        (
-            "a.obj",
-            b"v 0 -10 -10\nv 0 10 -10\nv 0 0 10\nv 30 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
-        ),
+        ("own.toml", b"[[parameter]]\nname = \"reach\"\nvalue = \"2 mm\"\n"),
+        ("a.obj", b"v 0 -10 -10\nv 0 10 -10\nv 0 0 10\nv 30 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"),
     ];
     let drop = |names: &[&str], harness: &mut Harness<'_, App>| {
         for (name, bytes) in all.iter().filter(|(name, _)| names.contains(name)) {
@@ -937,24 +801,15 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
     // What is missing is named, with what to do.
     drop(&["lifted.toml", "a.obj", "own.toml"], &mut harness);
     assert!(label(&harness, "joint.a.drive.file = \"lift.csv\""));
-    assert!(label(
-        &harness,
-        "choose or drop that file and the scene's at once"
-    ));
+    assert!(label(&harness, "choose or drop that file and the scene's at once"));
     assert_eq!(harness.state().player().scene().name, "pendulum");
     drop(&["lift.csv", "a.obj"], &mut harness);
     assert!(label(&harness, "lift.csv, a.obj: no scene among them"));
 
-    drop(
-        &["lifted.toml", "lift.csv", "own.toml", "a.obj"],
-        &mut harness,
-    );
+    drop(&["lifted.toml", "lift.csv", "own.toml", "a.obj"], &mut harness);
     let scene = harness.state().player().scene().clone();
     assert_eq!(scene.name, "lifted", "{}", harness.state().announcement());
-    assert_eq!(
-        scene.get("parameter.reach").expect("included"),
-        Value::Number(2e-3)
-    );
+    assert_eq!(scene.get("parameter.reach").expect("included"), Value::Number(2e-3));
     let names: Vec<&String> = scene.source.beside.keys().collect();
     assert_eq!(names, ["lift.csv", "own.toml", "parts/a.obj"]);
     let drive = scene.joints[0].drive.as_ref().expect("driven");
@@ -965,17 +820,11 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
     // A reset reads them again, from what was dropped.
     harness.key_press(Key::R);
     harness.run_steps(3);
-    assert_eq!(
-        harness.state().player().scene().source.beside,
-        scene.source.beside
-    );
+    assert_eq!(harness.state().player().scene().source.beside, scene.source.beside);
     assert!(!label(&harness, "no folder"));
 
     // Chosen in the host's own dialog, with another scene after it.
-    let mut files = all.map(|(name, bytes)| OpenedFile {
-        name: name.to_owned(),
-        content: Ok(bytes.to_vec()),
-    });
+    let mut files = all.map(|(name, bytes)| OpenedFile { name: name.to_owned(), content: Ok(bytes.to_vec()) });
     files[0].content = Ok(LIFTED.replace("lifted", "again").into_bytes());
     calls.borrow_mut().to_open.push_back(files.to_vec());
     harness.run_steps(3);
@@ -996,30 +845,18 @@ fn keys_and_tab_work_before_anything_was_clicked() {
 #[test]
 fn what_goes_on_is_told_to_who_does_not_see_it() {
     let (mut harness, calls) = window("pendulum", LARGE);
-    assert_eq!(
-        harness.state().announcement(),
-        "Pendulum on a ball joint. Paused at the start. S1 free."
-    );
+    assert_eq!(harness.state().announcement(), "Pendulum on a ball joint. Paused at the start. S1 free.");
     harness.key_press(Key::Space);
     harness.run_steps(2);
     harness.run_steps(120);
     harness.key_press(Key::Space);
     harness.run_steps(3);
     let words = harness.state().announcement().to_owned();
-    assert!(
-        words.contains("Paused at ") && words.contains("S1 "),
-        "{words}"
-    );
+    assert!(words.contains("Paused at ") && words.contains("S1 "), "{words}");
     let told = calls.borrow().announced.clone();
     assert_eq!(told.last(), Some(&words));
-    assert!(
-        told.iter()
-            .any(|text| text.contains("Running at time scale 1:50"))
-    );
-    assert!(
-        told.iter()
-            .any(|text| text.contains("Largest normal force since the last report"))
-    );
+    assert!(told.iter().any(|text| text.contains("Running at time scale 1:50")));
+    assert!(told.iter().any(|text| text.contains("Largest normal force since the last report")));
     assert!((4..=6).contains(&told.len()), "{told:#?}");
     let node = harness.get_by_role_and_label(Role::Status, &words);
     assert_eq!(node.accesskit_node().live(), Live::Polite);
@@ -1039,18 +876,14 @@ fn recorded_channels_have_the_columns_of_a_run() {
     for name in jointplay::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
         let mut frame = Frame::default();
-        Simulation::new(&scene)
-            .expect("starts")
-            .sample(0.0, &mut frame);
+        Simulation::new(&scene).expect("starts").sample(0.0, &mut frame);
         let table = Table::new(&scene, &frame);
         for channel in Channels::of(&scene).list() {
             // A run has friction as a vector, energies instead of their changes, no live change that does work, no hand that pulls,
             // and no ghost.
             let in_other_words = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
-            let own = matches!(
-                channel.quantity,
-                Quantity::FrictionForce | Quantity::TipError
-            ) || in_other_words.contains(&channel.column())
+            let own = matches!(channel.quantity, Quantity::FrictionForce | Quantity::TipError)
+                || in_other_words.contains(&channel.column())
                 || (channel.column() == "external_work_J" && scene.elements.is_empty());
             let there = table.names().iter().any(|name| name == channel.column());
             assert_eq!(there, !own, "{name}: {}", channel.column());
@@ -1114,18 +947,13 @@ fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
     std::fs::write(&path, "[contact]\nclearance = 3\n".repeat(20)).expect("written");
     for size in [LARGE, LYING, TINY] {
         let (mut harness, _) = window("spcmm", size);
-        harness
-            .state_mut()
-            .set_host(Box::new(DesktopHost::default()));
-        harness
-            .get_by_role_and_label(Role::ComboBox, "Scene")
-            .click();
+        harness.state_mut().set_host(Box::new(DesktopHost::default()));
+        harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
         harness.run_steps(3);
         click(&mut harness, "Link…");
         answer(&mut harness, &path.display().to_string());
         harness.get_by_label_contains("bad.toml:");
-        let [open, close] =
-            ["Open", "Close"].map(|name| harness.get_by_role_and_label(Role::Button, name).rect());
+        let [open, close] = ["Open", "Close"].map(|name| harness.get_by_role_and_label(Role::Button, name).rect());
         assert!(!open.intersects(close.shrink(1.0)), "{open:?} {close:?}");
         assert!(open.bottom() <= size[1] && (open.center().y - close.center().y).abs() < 1.0);
         // It can be mended and entered with the mouse.
@@ -1174,13 +1002,7 @@ fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
     let pairs = bare.trim_start_matches('#');
     let here = (hash(&harness), camera(&harness));
     assert!(here.1.is_some());
-    for link in [
-        whole.clone(),
-        bare.clone(),
-        format!("?{pairs}"),
-        pairs.to_owned(),
-        format!("{page}?{pairs}"),
-    ] {
+    for link in [whole.clone(), bare.clone(), format!("?{pairs}"), pairs.to_owned(), format!("{page}?{pairs}")] {
         assert!(AppOptions::from_link(&link).is_ok(), "{link}");
         for pasted in [false, true] {
             let (mut other, _) = window("pendulum", LARGE);

@@ -20,13 +20,8 @@ const LARGEST: u64 = 60_000;
 const LAWS: &str = "drives";
 
 /// Instants of the pictures; 0.1 s for the others.
-const INSTANTS: [(&str, &str); 5] = [
-    ("shapes", "0s"),
-    ("joints", "0s"),
-    ("own-parameters", "0s"),
-    ("crank", "25ms"),
-    ("flap", "25ms"),
-];
+const INSTANTS: [(&str, &str); 5] =
+    [("shapes", "0s"), ("joints", "0s"), ("own-parameters", "0s"), ("crank", "25ms"), ("flap", "25ms")];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -40,18 +35,14 @@ fn page() -> String {
 fn first_picture(text: &str) -> Option<&str> {
     let link = text.trim_start().strip_prefix("![")?;
     let (alternative, link) = link.split_once("](pictures/")?;
-    assert!(
-        !alternative.contains('\n') && alternative.len() > 10,
-        "{alternative}"
-    );
+    assert!(!alternative.contains('\n') && alternative.len() > 10, "{alternative}");
     Some(link.split_once(".png)")?.0)
 }
 
 /// Names of all pictures of the page, in its order.
 fn all_pictures(page: &str) -> Vec<&str> {
     let places = page.match_indices("![");
-    let names =
-        places.map(|(at, _)| first_picture(&page[at..]).expect("a picture of its own folder"));
+    let names = places.map(|(at, _)| first_picture(&page[at..]).expect("a picture of its own folder"));
     names.collect()
 }
 
@@ -61,10 +52,7 @@ fn examples(page: &str) -> Vec<(&str, &str)> {
     let pair = |rest| {
         let (text, after) = str::split_once(rest, "```").expect("an end");
         let name = first_picture(after);
-        (
-            name.unwrap_or_else(|| panic!("a picture follows\n{text}")),
-            text,
-        )
+        (name.unwrap_or_else(|| panic!("a picture follows\n{text}")), text)
     };
     blocks.map(pair).collect()
 }
@@ -74,9 +62,7 @@ fn check(name: &str, file: &str) {
     let own = INSTANTS.iter().find(|(of, _)| *of == name);
     let instant = own.map_or("0.1s", |(_, instant)| instant);
     let (width, height) = SIZE;
-    let what = format!(
-        "{file} --at {instant} --size {width}x{height} --arrows none --hide triad,flash,peaks"
-    );
+    let what = format!("{file} --at {instant} --size {width}x{height} --arrows none --hide triad,flash,peaks");
     let actual = Picture::read(&draw(folder.path(), &what));
     compare(FOLDER, name, &actual, &format!("jointplay render {what}"));
 }
@@ -131,22 +117,13 @@ const DRIVES: [(&str, &str); 7] = [
         "harmonics",
         "terms = [{ amplitude = \"30 mm\", frequency = \"1 Hz\" }, { amplitude = \"15 mm\", frequency = \"4 Hz\" }]",
     ),
-    (
-        "ramp",
-        "from = \"-40 mm\", to = \"40 mm\", start = \"0.3 s\", duration = \"0.4 s\"",
-    ),
-    (
-        "pulse",
-        "height = \"50 mm\", start = \"0.25 s\", duration = \"0.5 s\"",
-    ),
+    ("ramp", "from = \"-40 mm\", to = \"40 mm\", start = \"0.3 s\", duration = \"0.4 s\""),
+    ("pulse", "height = \"50 mm\", start = \"0.25 s\", duration = \"0.5 s\""),
     (
         "table",
         "points = [[\"0 s\", \"-30 mm\"], [\"0.2 s\", \"30 mm\"], [\"0.5 s\", \"-10 mm\"], [\"0.8 s\", \"20 mm\"]]",
     ),
-    (
-        "formula",
-        "formula = \"45 * sin(2*pi*5*t) * exp(-3*t)\", unit = \"mm\"",
-    ),
+    ("formula", "formula = \"45 * sin(2*pi*5*t) * exp(-3*t)\", unit = \"mm\""),
 ];
 
 /// The motion of a slide under a law through a second, as the program runs it: s, mm.
@@ -199,10 +176,5 @@ fn the_laws_of_drives_are_drawn_as_curves() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let file = folder.path().join("drives.png");
     fs::write(&file, sheet.png(1.0).expect("a picture")).expect("writable");
-    compare(
-        FOLDER,
-        LAWS,
-        &Picture::read(&file),
-        "the laws of drives as curves",
-    );
+    compare(FOLDER, LAWS, &Picture::read(&file), "the laws of drives as curves");
 }

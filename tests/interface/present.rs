@@ -61,17 +61,11 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
             let digits: String = text.chars().take_while(|c| !c.is_whitespace()).collect();
             digits.replace('\u{2212}', "-").parse().expect("a number")
         };
-        let (force, lasted) = (
-            parts.next().expect("a force"),
-            parts.next().expect("a time"),
-        );
+        let (force, lasted) = (parts.next().expect("a force"), parts.next().expect("a time"));
         assert!(force.ends_with(" N") && lasted.ends_with(" ms"), "{words}");
         assert!((number(force) / last.peak - 1.0).abs() < 5.1e-3, "{words}");
         let milliseconds = (last.end - last.start) * 1e3;
-        assert!(
-            (number(lasted) / milliseconds - 1.0).abs() < 0.051,
-            "{words}"
-        );
+        assert!((number(lasted) / milliseconds - 1.0).abs() < 0.051, "{words}");
 
         harness.key_press(Key::Escape);
         harness.step();
@@ -130,11 +124,7 @@ fn pictures_of_a_presentation() {
     let mut results = SnapshotResults::new();
     for (name, scene, theme) in [
         ("presentation_light", "spcmm", egui::Theme::Light),
-        (
-            "presentation_dark",
-            "slider-crank-driven",
-            egui::Theme::Dark,
-        ),
+        ("presentation_dark", "slider-crank-driven", egui::Theme::Dark),
     ] {
         let mut harness = sized(scene, SCREEN.into(), theme);
         harness.state_mut().player_mut().run_to(30e-3);

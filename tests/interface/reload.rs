@@ -88,10 +88,7 @@ fn shown(scene: Scene, clock: Clock, host: Box<dyn Host>) -> Harness<'static, Ap
 }
 
 fn save(harness: &mut Harness<'_, App>, calls: &RefCell<Calls>, name: &str, text: &str) {
-    calls.borrow_mut().saved.push_back(OpenedFile {
-        name: name.to_owned(),
-        content: Ok(text.as_bytes().to_vec()),
-    });
+    calls.borrow_mut().saved.push_back(OpenedFile { name: name.to_owned(), content: Ok(text.as_bytes().to_vec()) });
     harness.run_steps(2);
 }
 
@@ -131,11 +128,7 @@ fn a_saved_file_is_shown_at_the_same_instant_by_the_same_camera() {
     assert!(!player.is_playing());
     assert_eq!(player.wanted().source.file.as_deref(), Some(NAME));
     assert_eq!(harness.state().link().camera, before);
-    assert!(
-        says(&harness, "Reloaded at 12.500 ms"),
-        "{}",
-        harness.state().announcement()
-    );
+    assert!(says(&harness, "Reloaded at 12.500 ms"), "{}", harness.state().announcement());
     // The run is that of the new file from its start.
     let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
     let mut simulation = jointplay::simulate::Simulation::new(&scene).expect("starts");
@@ -160,9 +153,7 @@ fn an_error_in_the_file_is_shown_with_its_line_beside_the_running_scene() {
     let (mut harness, calls) = window(&[], still);
     harness.state_mut().run_to(12.5e-3);
     let wrong = text().replace("friction = 0.15", "friction = -0.15");
-    let line = wrong
-        .lines()
-        .position(|line| line.starts_with("friction = -"));
+    let line = wrong.lines().position(|line| line.starts_with("friction = -"));
     let place = format!("{NAME}:{}:", line.expect("a line") + 1);
     for (text, words) in [(wrong.as_str(), place.as_str()), ("[[[", NAME)] {
         save(&mut harness, &calls, NAME, text);
@@ -176,10 +167,10 @@ fn an_error_in_the_file_is_shown_with_its_line_beside_the_running_scene() {
     save(&mut harness, &calls, NAME, &text());
     assert_eq!(harness.query_all_by_label_contains(NAME).count(), 0);
     assert_eq!(harness.state().player().steps(), steps);
-    calls.borrow_mut().saved.push_back(OpenedFile {
-        name: NAME.to_owned(),
-        content: Err("cannot read this file: gone".to_owned()),
-    });
+    calls
+        .borrow_mut()
+        .saved
+        .push_back(OpenedFile { name: NAME.to_owned(), content: Err("cannot read this file: gone".to_owned()) });
     harness.run_steps(2);
     assert!(harness.query_all_by_label_contains("gone").count() > 0);
 }
@@ -251,9 +242,7 @@ fn files_beside_the_scene_are_read_again_with_it_and_watched() {
 
     // The included file alone.
     write("own.toml", &own("reach", "25 mm"));
-    wait(&mut harness, |harness| {
-        get(harness, "parameter.reach") != before
-    });
+    wait(&mut harness, |harness| get(harness, "parameter.reach") != before);
     assert!(says(&harness, notice), "{}", harness.state().announcement());
     // The scene's own, which includes another one now, with an error in it.
     write("other.toml", "[[parameter]]\nname = 1\n");
@@ -267,9 +256,7 @@ fn files_beside_the_scene_are_read_again_with_it_and_watched() {
     let width = get(&harness, "parameter.width");
     assert!(width.is_some());
     write("other.toml", &own("width", "3.5 mm"));
-    wait(&mut harness, |harness| {
-        get(harness, "parameter.width") != width
-    });
+    wait(&mut harness, |harness| get(harness, "parameter.width") != width);
 }
 
 /// A file dropped on the window.
@@ -298,21 +285,13 @@ fn a_dropped_scene_finds_its_files_and_that_of_a_link_does_not() {
     let file = Arc::new(Dropped(path.clone()));
     harness.input_mut().dropped_files.push(file);
     harness.run_steps(3);
-    assert_eq!(
-        friction(&harness),
-        0.25,
-        "{}",
-        harness.state().announcement()
-    );
+    assert_eq!(friction(&harness), 0.25, "{}", harness.state().announcement());
     let source = &harness.state().player().wanted().source;
     assert!(source.beside.contains_key("own.toml"));
 
     let name = path.display().to_string();
     let scene = SceneText::File { name, text };
-    let link = Link {
-        scene,
-        ..Link::default()
-    };
+    let link = Link { scene, ..Link::default() };
     let ctx = harness.ctx.clone();
     let opened = harness.state_mut().open_link(&ctx, &link.format());
     let reason = opened.expect_err("no folder");
@@ -330,10 +309,5 @@ fn a_file_on_the_disk_is_noticed() {
     wait(&mut harness, |harness| friction(harness) == 0.25);
     assert!(says(&harness, "Reloaded"));
     let labels = harness.query_all_by_label_contains("Reloaded");
-    assert!(
-        labels
-            .filter(|node| node.accesskit_node().role() == Role::Status)
-            .count()
-            > 0
-    );
+    assert!(labels.filter(|node| node.accesskit_node().role() == Role::Status).count() > 0);
 }

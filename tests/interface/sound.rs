@@ -73,11 +73,7 @@ fn impacts(harness: &Harness<'_, App>, time: f64) -> Vec<Impact> {
 
 #[test]
 fn while_it_plays_the_clicks_are_the_impacts_of_the_run_at_any_speed() {
-    for (scene, scale, frames) in [
-        ("pendulum", 0.02, 240),
-        ("spcmm", 0.005, 240),
-        ("spcmm", 0.05, 90),
-    ] {
+    for (scene, scale, frames) in [("pendulum", 0.02, 240), ("spcmm", 0.005, 240), ("spcmm", 0.05, 90)] {
         let (mut harness, heard) = with_ears(scene);
         harness.key_press(Key::M);
         harness.step();
@@ -87,34 +83,19 @@ fn while_it_plays_the_clicks_are_the_impacts_of_the_run_at_any_speed() {
         let stretches: Vec<_> = (0..frames).map(|_| frame(&mut harness, &heard)).collect();
         let all = impacts(&harness, shown(&harness));
         assert!(all.len() > 5, "{scene}: {} impacts", all.len());
-        let mass: f64 = harness
-            .state()
-            .player()
-            .scene()
-            .bodies
-            .iter()
-            .map(|body| body.mass)
-            .sum();
+        let mass: f64 = harness.state().player().scene().bodies.iter().map(|body| body.mass).sum();
         let mut told = 0;
         for (from, to, clicks) in stretches {
             let within = |impact: &&Impact| from < impact.end && impact.end <= to;
             let ended: Vec<&Impact> = all.iter().filter(within).collect();
-            assert_eq!(
-                clicks.len(),
-                ended.len().min(MOST_CLICKS),
-                "{scene} at {to} s"
-            );
+            assert_eq!(clicks.len(), ended.len().min(MOST_CLICKS), "{scene} at {to} s");
             if ended.len() > MOST_CLICKS {
                 continue;
             }
             for (click, impact) in clicks.iter().zip(ended) {
                 told += 1;
                 let time = from + click.after * scale;
-                assert!(
-                    (time - impact.end).abs() < 1e-9,
-                    "{time} s for {} s",
-                    impact.end
-                );
+                assert!((time - impact.end).abs() < 1e-9, "{time} s for {} s", impact.end);
                 let pitch = (0.5 / (impact.end - impact.start)).clamp(PITCHES.0, PITCHES.1);
                 assert!((click.pitch / pitch - 1.0).abs() < 1e-9);
                 // Two fifths of force times way is the energy of the blow after Hertz.
@@ -183,11 +164,7 @@ fn a_run_has_the_same_bits_with_sound_and_without() {
         harness.run_steps(90);
         assert_eq!(heard.clicks.borrow().is_empty(), !sound);
         let player = harness.state().player();
-        (
-            player.simulation().state_hash(),
-            player.pacer.shown(),
-            player.steps(),
-        )
+        (player.simulation().state_hash(), player.pacer.shown(), player.steps())
     };
     assert_eq!(run(true), run(false));
 }
@@ -230,16 +207,11 @@ fn without_a_device_the_window_says_so_and_goes_on() {
     harness.run_steps(3);
     assert!(harness.state().is_sounding());
     // It turns out later, as opening a device takes a while.
-    heard
-        .deaf
-        .replace(Some("this machine has no sound device".to_owned()));
+    heard.deaf.replace(Some("this machine has no sound device".to_owned()));
     harness.run_steps(90);
     assert!(!harness.state().is_sounding() && !heard.on.get());
     let words = harness.state().announcement();
-    assert!(
-        words.contains("No sound: this machine has no sound device."),
-        "{words}"
-    );
+    assert!(words.contains("No sound: this machine has no sound device."), "{words}");
     assert!(harness.state().player().is_playing());
 
     // A window without any services knows at once.

@@ -57,10 +57,7 @@ fn a_finger_on_a_slider_scrolls_up_and_down_and_moves_it_sideways() {
     assert_eq!(clearance(&harness), before, "a tap moves the slider");
 
     let from = track.left_center() + vec2(0.3 * track.width(), 0.0);
-    fingers(
-        &mut harness,
-        &[&path(from, vec2(0.4 * track.width(), 20.0))],
-    );
+    fingers(&mut harness, &[&path(from, vec2(0.4 * track.width(), 20.0))]);
     harness.run();
     let part = clearance(&harness) / 1e-3;
     assert!((0.6..0.8).contains(&part), "{part}");
@@ -110,10 +107,7 @@ fn nothing_covers_anything_however_small_the_window_is() {
             assert!(shown.len() >= 9, "{size:?}: {shown:?}");
             let whole = Rect::from_min_size(Pos2::ZERO, size.into());
             for (i, (name, rect)) in shown.iter().enumerate() {
-                assert!(
-                    whole.contains_rect(rect.shrink(0.5)),
-                    "{size:?}: {name} sticks out: {rect:?}"
-                );
+                assert!(whole.contains_rect(rect.shrink(0.5)), "{size:?}: {name} sticks out: {rect:?}");
                 for (other, there) in &shown[i + 1..] {
                     assert!(
                         !rect.shrink(1.0).intersects(there.shrink(1.0)),
@@ -152,10 +146,7 @@ fn a_phone_held_upright_shows_the_speed_that_is_reached() {
     assert!(label(&harness, "reached 1:"));
     let words = harness.get_by_label_contains("reached 1:").rect();
     let bench = rect(&harness, Role::Button, "Bench");
-    assert!(
-        words.left() >= bench.right() && words.right() <= UPRIGHT[0],
-        "{words:?}"
-    );
+    assert!(words.left() >= bench.right() && words.right() <= UPRIGHT[0], "{words:?}");
     assert!((words.center().y - bench.center().y).abs() < 4.0);
 }
 

@@ -32,13 +32,7 @@ pub(crate) fn shown(harness: &Harness<'_, App>) -> f64 {
 }
 
 fn clearance(harness: &Harness<'_, App>) -> f64 {
-    harness
-        .state()
-        .player()
-        .simulation()
-        .scene()
-        .contact
-        .clearance
+    harness.state().player().simulation().scene().contact.clearance
 }
 
 /// Largest normal force since the reset, N.
@@ -66,21 +60,10 @@ fn the_clearance_slider_changes_when_the_balls_hit() {
     // A free fall through 0.3 mm takes 7.8 ms, through 0.5 mm 10.1 ms.
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(9.0e-3);
-    assert!(
-        hardest(&harness) > 100.0,
-        "at 0.3 mm all three joints have been hit by 9 ms"
-    );
+    assert!(hardest(&harness) > 100.0, "at 0.3 mm all three joints have been hit by 9 ms");
 
     let slider = harness.get_by_role_and_label(Role::Slider, "Clearance");
-    assert!(
-        (slider
-            .accesskit_node()
-            .numeric_value()
-            .expect("a slider has a value")
-            - 0.3)
-            .abs()
-            < 1e-9
-    );
+    assert!((slider.accesskit_node().numeric_value().expect("a slider has a value") - 0.3).abs() < 1e-9);
     slider.set_value_accesskit(0.5);
     harness.run();
     assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
@@ -88,10 +71,7 @@ fn the_clearance_slider_changes_when_the_balls_hit() {
     click(&mut harness, "Reset");
     assert_eq!(time(&harness), 0.0);
     harness.state_mut().player_mut().run_to(9.0e-3);
-    assert!(
-        hardest(&harness) < 1.0,
-        "at 0.5 mm nothing has been hit by 9 ms"
-    );
+    assert!(hardest(&harness) < 1.0, "at 0.5 mm nothing has been hit by 9 ms");
     harness.state_mut().player_mut().run_to(12.0e-3);
     assert!(hardest(&harness) > 100.0);
 }
@@ -99,46 +79,26 @@ fn the_clearance_slider_changes_when_the_balls_hit() {
 #[test]
 fn a_live_change_of_clearance_reaches_the_running_joints() {
     let mut harness = window("spcmm");
-    harness
-        .get_by_role_and_label(Role::Slider, "Clearance")
-        .set_value_accesskit(0.6);
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.6);
     harness.run();
     harness.state_mut().player_mut().run_to(0.1);
     for joint in &harness.state().player().frame().joints {
-        assert!(
-            (joint.clearance - 0.6e-3).abs() < 1e-9,
-            "{}",
-            joint.clearance
-        );
+        assert!((joint.clearance - 0.6e-3).abs() < 1e-9, "{}", joint.clearance);
     }
 }
 
 #[test]
 fn a_drag_on_the_friction_slider_moves_friction() {
     let mut harness = window("spcmm");
-    let before = harness
-        .state()
-        .player()
-        .simulation()
-        .scene()
-        .contact
-        .friction;
-    let track = harness
-        .get_by_role_and_label(Role::Slider, "Friction coefficient")
-        .rect();
+    let before = harness.state().player().simulation().scene().contact.friction;
+    let track = harness.get_by_role_and_label(Role::Slider, "Friction coefficient").rect();
     harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
     harness.step();
     harness.hover_at(track.right_center() - egui::vec2(4.0, 0.0));
     harness.step();
     harness.drop_at(track.right_center() - egui::vec2(4.0, 0.0));
     harness.run();
-    let after = harness
-        .state()
-        .player()
-        .simulation()
-        .scene()
-        .contact
-        .friction;
+    let after = harness.state().player().simulation().scene().contact.friction;
     assert!(after > before, "{before} to {after}");
 }
 
@@ -148,36 +108,20 @@ fn a_typed_value_takes_any_unit_and_a_bad_one_stays_to_be_mended() {
     type_into(&mut harness, "Clearance", "500 um");
     assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
     type_into(&mut harness, "Clearance", "0.4");
-    assert!(
-        (clearance(&harness) - 0.4e-3).abs() < 1e-12,
-        "a bare number takes the unit on show"
-    );
+    assert!((clearance(&harness) - 0.4e-3).abs() < 1e-12, "a bare number takes the unit on show");
 
     type_into(&mut harness, "Clearance", "0.4 kg");
-    assert!(
-        (clearance(&harness) - 0.4e-3).abs() < 1e-12,
-        "the running value stays"
-    );
+    assert!((clearance(&harness) - 0.4e-3).abs() < 1e-12, "the running value stays");
     let field = harness.get_by_role_and_label(Role::TextInput, "Clearance");
-    assert_eq!(
-        field.value().as_deref(),
-        Some("0.4 kg"),
-        "what was typed is not lost"
-    );
+    assert_eq!(field.value().as_deref(), Some("0.4 kg"), "what was typed is not lost");
     harness.get_by_label_contains("wrong unit");
 
     type_into(&mut harness, "Clearance", "0.2 mm");
     assert!((clearance(&harness) - 0.2e-3).abs() < 1e-12);
-    assert!(
-        harness.query_by_label_contains("wrong unit").is_none(),
-        "mended, the complaint goes"
-    );
+    assert!(harness.query_by_label_contains("wrong unit").is_none(), "mended, the complaint goes");
 
     click(&mut harness, "Reset Clearance");
-    assert!(
-        (clearance(&harness) - 0.3e-3).abs() < 1e-12,
-        "back to the scene's own value"
-    );
+    assert!((clearance(&harness) - 0.3e-3).abs() < 1e-12, "back to the scene's own value");
 }
 
 #[test]
@@ -208,10 +152,7 @@ fn a_single_step_is_one_step_of_the_solver() {
     let mut harness = window("spcmm");
     for expected in 1..=3 {
         click(&mut harness, "Step");
-        assert_eq!(
-            harness.state().player().simulation().statistics().steps,
-            expected
-        );
+        assert_eq!(harness.state().player().simulation().statistics().steps, expected);
         assert_eq!(shown(&harness), time(&harness));
     }
     harness.key_press(Key::ArrowRight);
@@ -234,9 +175,7 @@ fn reset_goes_back_to_the_same_bits() {
 #[test]
 fn the_time_scale_sets_how_fast_simulated_time_passes() {
     let mut harness = window("spcmm");
-    harness
-        .get_by_role_and_label(Role::Slider, "Time scale")
-        .set_value_accesskit(1e-3);
+    harness.get_by_role_and_label(Role::Slider, "Time scale").set_value_accesskit(1e-3);
     harness.step();
     click(&mut harness, "Play");
     let before = shown(&harness);
@@ -287,46 +226,27 @@ fn the_question_mark_lists_the_keys_and_escape_closes() {
 #[test]
 fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
     let mut harness = window("spcmm");
-    harness
-        .get_by_role_and_label(Role::ComboBox, "Scene")
-        .click();
+    harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
     harness.run();
     harness.get_by_label("pendulum").click();
     harness.run();
-    assert_eq!(
-        harness.state().player().simulation().scene().name,
-        "pendulum"
-    );
+    assert_eq!(harness.state().player().simulation().scene().name, "pendulum");
 
     click(&mut harness, "Open…");
     type_into(&mut harness, "Path", "missing/scene.toml");
     harness.run();
     harness.get_by_label_contains("missing/scene.toml");
-    assert_eq!(
-        harness.state().player().simulation().scene().name,
-        "pendulum"
-    );
+    assert_eq!(harness.state().player().simulation().scene().name, "pendulum");
 }
 
 #[test]
 fn a_value_that_waits_for_the_reset_says_so() {
     let mut harness = window("spcmm");
     let frequency = |harness: &Harness<'_, App>| {
-        harness
-            .state()
-            .player()
-            .simulation()
-            .scene()
-            .spcmm
-            .expect("the paper's scene")
-            .frequency
+        harness.state().player().simulation().scene().spcmm.expect("the paper's scene").frequency
     };
     harness.state_mut().player_mut().run_to(1e-3);
-    harness
-        .state_mut()
-        .player_mut()
-        .set("spcmm.frequency", "0.4 Hz")
-        .expect("in range");
+    harness.state_mut().player_mut().set("spcmm.frequency", "0.4 Hz").expect("in range");
     let group = Scene::load("spcmm", &[])
         .expect("built in")
         .parameters()
@@ -338,11 +258,7 @@ fn a_value_that_waits_for_the_reset_says_so() {
     harness.run();
     harness.get_by_label("Applies at the next reset");
     click(&mut harness, "Reset");
-    assert!(
-        harness
-            .query_by_label("Applies at the next reset")
-            .is_none()
-    );
+    assert!(harness.query_by_label("Applies at the next reset").is_none());
     assert!((frequency(&harness) - 0.4).abs() < 1e-12);
 }
 
@@ -356,10 +272,7 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
         .expect("the machine of the guide");
     let mut harness = window("pendulum");
     let bytes = example.as_bytes().to_vec();
-    harness
-        .state_mut()
-        .open_bytes("my-crank.toml", bytes)
-        .expect("starts");
+    harness.state_mut().open_bytes("my-crank.toml", bytes).expect("starts");
     harness.run();
     let length = |harness: &Harness<'_, App>| {
         let player = harness.state().player();
@@ -381,14 +294,8 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
 #[test]
 fn low_restitution_with_the_papers_law_is_commented_on() {
     let mut harness = window("spcmm");
-    assert!(
-        harness
-            .query_by_label_contains("right only near 1")
-            .is_none()
-    );
-    harness
-        .get_by_role_and_label(Role::Slider, "Restitution")
-        .set_value_accesskit(0.3);
+    assert!(harness.query_by_label_contains("right only near 1").is_none());
+    harness.get_by_role_and_label(Role::Slider, "Restitution").set_value_accesskit(0.3);
     harness.run();
     let comments = harness.query_all_by_label_contains("right only near 1");
     assert!(comments.count() > 0);
@@ -401,17 +308,10 @@ fn the_divergence_guard_says_what_happened_and_a_reset_helps() {
     player.set("solver.method", "rk4").expect("a method");
     player.set("solver.step", "1 ms").expect("in range");
     player.run_to(0.5);
-    assert!(
-        player.stopped().is_some(),
-        "steps ten times longer than an impact cannot hold"
-    );
+    assert!(player.stopped().is_some(), "steps ten times longer than an impact cannot hold");
     harness.run();
     harness.get_by_label_contains("Stopped at");
-    harness
-        .state_mut()
-        .player_mut()
-        .set("solver.step", "10 us")
-        .expect("in range");
+    harness.state_mut().player_mut().set("solver.step", "10 us").expect("in range");
     click(&mut harness, "Reset the run");
     harness.run();
     assert!(harness.query_by_label_contains("Stopped at").is_none());
@@ -424,18 +324,11 @@ fn a_narrow_window_keeps_the_controls_within_reach() {
     let mut harness = sized("spcmm", [420.0, 800.0], egui::Theme::Light);
     for label in ["Play", "Step", "Reset"] {
         let rect = harness.get_by_role_and_label(Role::Button, label).rect();
-        assert!(
-            rect.right() <= 420.0 && rect.bottom() <= 800.0,
-            "{label}: {rect:?}"
-        );
+        assert!(rect.right() <= 420.0 && rect.bottom() <= 800.0, "{label}: {rect:?}");
     }
-    let rect = harness
-        .get_by_role_and_label(Role::Slider, "Clearance")
-        .rect();
+    let rect = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
     assert!(rect.right() <= 420.0 && rect.bottom() <= 800.0, "{rect:?}");
-    harness
-        .get_by_role_and_label(Role::Slider, "Clearance")
-        .set_value_accesskit(0.7);
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.7);
     harness.run();
     assert!((clearance(&harness) - 0.7e-3).abs() < 1e-12);
 }
@@ -448,20 +341,13 @@ fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewher
         scene.contact.friction
     };
     let steps = |harness: &Harness<'_, App>| harness.state().player().steps();
-    let track = harness
-        .get_by_role_and_label(Role::Slider, "Friction coefficient")
-        .rect();
+    let track = harness.get_by_role_and_label(Role::Slider, "Friction coefficient").rect();
     harness.drag_at(track.center());
     harness.step();
     harness.drop_at(track.center());
     harness.run();
     let mut before = friction(&harness);
-    for (key, sign) in [
-        (Key::ArrowRight, 1.0),
-        (Key::ArrowLeft, -1.0),
-        (Key::ArrowUp, 1.0),
-        (Key::ArrowDown, -1.0),
-    ] {
+    for (key, sign) in [(Key::ArrowRight, 1.0), (Key::ArrowLeft, -1.0), (Key::ArrowUp, 1.0), (Key::ArrowDown, -1.0)] {
         harness.key_press(key);
         harness.run();
         let now = friction(&harness);
@@ -484,9 +370,7 @@ fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewher
 #[test]
 fn keys_leave_a_field_alone_that_is_being_typed_in() {
     let mut harness = window("spcmm");
-    harness
-        .get_by_role_and_label(Role::TextInput, "Clearance")
-        .focus();
+    harness.get_by_role_and_label(Role::TextInput, "Clearance").focus();
     harness.step();
     harness.key_press(Key::Space);
     harness.key_press(Key::R);
@@ -511,12 +395,7 @@ fn every_control_has_a_name() {
             let node = node.accesskit_node();
             matches!(
                 node.role(),
-                Role::Button
-                    | Role::Slider
-                    | Role::TextInput
-                    | Role::ComboBox
-                    | Role::CheckBox
-                    | Role::SpinButton
+                Role::Button | Role::Slider | Role::TextInput | Role::ComboBox | Role::CheckBox | Role::SpinButton
             ) && node.label().is_none_or(|label| label.trim().is_empty())
         })
         .map(|node| node.accesskit_node().role())
@@ -542,9 +421,7 @@ fn pictures() {
 
 fn open_a_bad_file(h: &mut Harness<'_, App>) {
     let text = b"name = 'mine'\n[contact]\nclearance = 3\n".to_vec();
-    h.state_mut()
-        .open_bytes("mine.toml", text)
-        .expect_err("needs a unit");
+    h.state_mut().open_bytes("mine.toml", text).expect_err("needs a unit");
 }
 
 #[test]
@@ -554,11 +431,7 @@ fn look() {
         return;
     };
     let save = |harness: &mut Harness<'_, App>, name: &str| {
-        harness
-            .render()
-            .expect("drawn")
-            .save(format!("{folder}/{name}.png"))
-            .expect("written");
+        harness.render().expect("drawn").save(format!("{folder}/{name}.png")).expect("written");
     };
     let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
     h.state_mut().player_mut().set_playing(true);
@@ -575,17 +448,12 @@ fn look() {
     h.key_press(Key::Escape);
     h.run();
     for group in ["Contact", "Solver", "One joint"] {
-        h.get_by_role_and_label(Role::DisclosureTriangle, group)
-            .click();
+        h.get_by_role_and_label(Role::DisclosureTriangle, group).click();
         h.run();
     }
     type_into(&mut h, "Clearance", "0.4 kg");
-    h.get_by_role_and_label(Role::Slider, "Restitution")
-        .set_value_accesskit(0.3);
-    h.state_mut()
-        .player_mut()
-        .set("spcmm.frequency", "0.4 Hz")
-        .expect("ok");
+    h.get_by_role_and_label(Role::Slider, "Restitution").set_value_accesskit(0.3);
+    h.state_mut().player_mut().set("spcmm.frequency", "0.4 Hz").expect("ok");
     h.run();
     save(&mut h, "groups");
     let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Dark);
@@ -646,10 +514,7 @@ fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
             harness.state_mut().player_mut().run_to(time);
             harness.state_mut().player_mut().set_playing(true);
             harness.step();
-            assert!(
-                harness.query_by_label("Settled: R restarts").is_none(),
-                "{scene} swings at {time} s"
-            );
+            assert!(harness.query_by_label("Settled: R restarts").is_none(), "{scene} swings at {time} s");
         }
     }
 }
@@ -679,13 +544,7 @@ fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
     harness.state_mut().player_mut().run_to(9.0e-3);
     harness.run();
     let player = harness.state().player();
-    assert!(
-        player
-            .frame()
-            .joints
-            .iter()
-            .all(|joint| joint.normal_force.norm() == 0.0)
-    );
+    assert!(player.frame().joints.iter().all(|joint| joint.normal_force.norm() == 0.0));
     let marked = orange(&mut harness);
     assert!(marked > 100, "three joints were hit: {marked}");
     // It stands for as long as nobody plays.
@@ -694,9 +553,7 @@ fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
 
     harness.get_by_label("View options").click();
     harness.run();
-    harness
-        .get_by_role_and_label(Role::CheckBox, "Peaks")
-        .click();
+    harness.get_by_role_and_label(Role::CheckBox, "Peaks").click();
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
@@ -712,15 +569,11 @@ fn the_wear_map_comes_with_its_scale_and_goes_with_the_reset() {
     let purple = |harness: &mut Harness<'_, App>| {
         let view = harness.get_by_label("3D view").rect();
         let area = [view.left(), view.top(), view.right(), view.bottom()].map(|edge| edge as usize);
-        picture(harness)
-            .coloured(area, [0x47, 0x2D, 0x7B], 12)
-            .len()
+        picture(harness).coloured(area, [0x47, 0x2D, 0x7B], 12).len()
     };
     let choose = |harness: &mut Harness<'_, App>, name: &str| {
         click(harness, "View options");
-        harness
-            .get_by_role_and_label(Role::RadioButton, name)
-            .click();
+        harness.get_by_role_and_label(Role::RadioButton, name).click();
         harness.run();
         harness.key_press(Key::Escape);
         harness.run();
@@ -773,30 +626,19 @@ fn after_a_reset_or_a_step_back_no_force_is_on_show_that_is_yet_to_come() {
 #[test]
 fn a_tooltip_of_a_control_leaves_the_picture_alone_and_gives_way_to_a_dialog() {
     let mut harness = window("spcmm");
-    let slider = harness
-        .get_by_role_and_label(Role::Slider, "Clearance")
-        .rect();
+    let slider = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
     harness.hover_at(slider.center());
     harness.run_steps(60);
-    let range = |harness: &Harness<'_, App>| {
-        harness
-            .query_by_label_contains("Key contact.clearance")
-            .map(|label| label.rect())
-    };
+    let range =
+        |harness: &Harness<'_, App>| harness.query_by_label_contains("Key contact.clearance").map(|label| label.rect());
     let tooltip = range(&harness).expect("a tooltip");
     let view = harness.get_by_label("3D view").rect();
     assert!(tooltip.right() < view.left(), "{tooltip:?} over {view:?}");
-    assert!(
-        tooltip.top() > slider.bottom(),
-        "{tooltip:?} over {slider:?}"
-    );
+    assert!(tooltip.top() > slider.bottom(), "{tooltip:?} over {slider:?}");
     harness.key_press(Key::Questionmark);
     harness.run_steps(10);
     harness.get_by_label("Play or pause");
-    assert!(
-        range(&harness).is_none(),
-        "it stays open over the list of keys"
-    );
+    assert!(range(&harness).is_none(), "it stays open over the list of keys");
 }
 
 #[test]
@@ -845,9 +687,7 @@ fn the_chosen_plots_are_shown_with_their_units() {
     assert!(harness.query_by_label("Energy, mJ").is_none());
     harness.get_by_label("Choose plots").click();
     harness.run();
-    harness
-        .get_by_role_and_label(Role::CheckBox, "Energy, mJ")
-        .click();
+    harness.get_by_role_and_label(Role::CheckBox, "Energy, mJ").click();
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
@@ -860,14 +700,10 @@ fn any_channel_is_found_by_name_plotted_and_carried_by_links() {
     harness.get_by_label("Choose plots").click();
     harness.run();
     type_into(&mut harness, "Search channels", "rod1.po");
-    harness
-        .get_by_role_and_label(Role::CheckBox, "rod1.pose, mm, rad")
-        .click();
+    harness.get_by_role_and_label(Role::CheckBox, "rod1.pose, mm, rad").click();
     harness.run();
     type_into(&mut harness, "Search channels", "*.reaction");
-    harness
-        .get_by_role_and_label(Role::CheckBox, "*.reaction, N")
-        .click();
+    harness.get_by_role_and_label(Role::CheckBox, "*.reaction, N").click();
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
@@ -914,11 +750,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     let impact = *player.simulation().impacts().next_back().expect("hit");
     assert!(impact.steps >= 10, "{impact:?}");
     let joint = &player.scene().ball_joints[impact.joint].name;
-    let disturbed = if impact.disturbed {
-        "disturbed"
-    } else {
-        "undisturbed"
-    };
+    let disturbed = if impact.disturbed { "disturbed" } else { "undisturbed" };
     harness.get_by_label(&format!("{joint}, {disturbed}"));
     harness.get_by_label(&impact.steps.to_string());
     harness.get_by_label_contains(", asked 0.9");
@@ -951,9 +783,7 @@ fn the_energy_balance_is_stacked_from_both_sides() {
 #[test]
 fn a_preset_is_measured_beside_the_running_scene() {
     let mut harness = window("pendulum");
-    harness
-        .state_mut()
-        .set_host(Box::new(jointplay::app::DesktopHost::default()));
+    harness.state_mut().set_host(Box::new(jointplay::app::DesktopHost::default()));
     // As it comes, the scene was measured for the program.
     assert!(harness.query_by_label("not measured").is_none());
     let player = harness.state_mut().player_mut();
@@ -979,8 +809,7 @@ fn a_preset_is_measured_beside_the_running_scene() {
 }
 
 /// Colours of the first three curves in the light theme.
-pub(crate) const CURVES: [[u8; 3]; 3] =
-    [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
+pub(crate) const CURVES: [[u8; 3]; 3] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
 
 pub(crate) fn picture(harness: &mut Harness<'_, App>) -> Picture {
     let image = harness.render().expect("drawn");
@@ -1017,10 +846,7 @@ fn plotted_peaks_are_those_of_the_run() {
             let (time, force) = (statistics.peak_time[joint], statistics.peak_normal[joint]);
             let (area, row) = spike(&mut harness, time, force, 1.04 * most);
             let highest = top(&drawn.covered(area, colour, WHITE)).expect("every joint is seen");
-            assert!(
-                highest.abs_diff(row) <= 1,
-                "{size:?}: {force} N of joint {joint} in row {highest}, not {row}"
-            );
+            assert!(highest.abs_diff(row) <= 1, "{size:?}: {force} N of joint {joint} in row {highest}, not {row}");
         }
         // In the midst of an impact: the newest of it is the highest, and nothing is drawn beyond it.
         let player = harness.state_mut().player_mut();
@@ -1032,10 +858,7 @@ fn plotted_peaks_are_those_of_the_run() {
         let drawn = picture(&mut harness);
         let (area, row) = spike(&mut harness, shown, force, 1.2 * force);
         let highest = top(&drawn.covered(area, CURVES[0], WHITE)).expect("drawn");
-        assert!(
-            highest.abs_diff(row) <= 1,
-            "{size:?}: {force} N in row {highest}, not {row}"
-        );
+        assert!(highest.abs_diff(row) <= 1, "{size:?}: {force} N in row {highest}, not {row}");
         let beyond = [area[0] + 5, area[1], area[0] + 60, area[3] + 6];
         for colour in CURVES {
             assert_eq!(drawn.covered(beyond, colour, WHITE), []);
@@ -1052,11 +875,7 @@ fn a_doubt_that_stands_beside_a_slider_is_not_denied_below() {
     harness.run_steps(3);
     harness.get_by_label_contains("restitution 0.4 with lankarani-nikravesh");
     harness.get_by_label("No doubts but those beside the controls");
-    assert!(
-        harness
-            .query_by_label("No doubts about this run so far")
-            .is_none()
-    );
+    assert!(harness.query_by_label("No doubts about this run so far").is_none());
 }
 
 #[test]
@@ -1080,9 +899,7 @@ fn a_low_plot_keeps_its_numbers() {
             let left = zero.x as usize;
             (left - 36..left - 3).any(|x| drawn.at(x, y).into_iter().all(|part| part < 150))
         };
-        let rows: Vec<bool> = (above.y as usize - 8..(zero.y as usize + 8).min(height as usize))
-            .map(inked)
-            .collect();
+        let rows: Vec<bool> = (above.y as usize - 8..(zero.y as usize + 8).min(height as usize)).map(inked).collect();
         let pieces = rows.windows(2).filter(|pair| !pair[0] && pair[1]).count();
         assert!(pieces >= 2, "{height}: {pieces} numbers");
     }
@@ -1110,11 +927,7 @@ fn the_clearance_of_the_past_stays_where_it_was() {
     for (clearance, past, since) in [(0.3e-3, true, false), (0.6e-3, false, true)] {
         let before = dashes(&mut harness, 1e-3, 0.018, clearance);
         let after = dashes(&mut harness, 0.025, 0.049, clearance);
-        assert_eq!(
-            (before > 0.3, after > 0.3),
-            (past, since),
-            "{clearance}: {before} {after}"
-        );
+        assert_eq!((before > 0.3, after > 0.3), (past, since), "{clearance}: {before} {after}");
     }
 }
 
@@ -1136,12 +949,7 @@ fn units_are_printed_alike_everywhere() {
     });
     let plain: Vec<String> = texts
         .flatten()
-        .filter(|text| {
-            text.contains("^2")
-                || text
-                    .split(|c: char| !c.is_alphabetic())
-                    .any(|w| w == "um" || w == "us")
-        })
+        .filter(|text| text.contains("^2") || text.split(|c: char| !c.is_alphabetic()).any(|w| w == "um" || w == "us"))
         .collect();
     assert!(plain.is_empty(), "{plain:?}");
 }
@@ -1198,13 +1006,7 @@ fn nothing_moves(harness: &mut Harness<'_, App>, what: &str) {
 
 #[test]
 fn nothing_moves_while_a_scene_plays() {
-    for size in [
-        [1280.0, 800.0],
-        [900.0, 640.0],
-        [390.0, 844.0],
-        [844.0, 390.0],
-        [320.0, 480.0],
-    ] {
+    for size in [[1280.0, 800.0], [900.0, 640.0], [390.0, 844.0], [844.0, 390.0], [320.0, 480.0]] {
         let mut options = AppOptions::new(Scene::load("spcmm", &[]).expect("built in"));
         options.playing = false;
         let mut harness = Harness::builder()

@@ -55,9 +55,8 @@ fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
                 // About one axis it is linear however far it turns.
                 let mut about = [0, 0, 0];
                 about[axis] = 1;
-                let start = format!(
-                    "position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}"
-                );
+                let start =
+                    format!("position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}");
                 let mut simulation = started(&one(&start, ""), &changes);
                 let frame = at(&mut simulation, t);
                 let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
@@ -79,8 +78,7 @@ fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
     let rest = Quat::from_axis_angle(&Vec3::x_axis(), 20_f64.to_radians());
     let bushing = "damping = \"10 10 10 N s/m\"\nturning_damping = \"5e-3 5e-3 5e-3 N m s/rad\"\n\
         axes = { axis = [0, 0, 1], angle = \"30 deg\" }\nrotation = { axis = [1, 0, 0], angle = \"20 deg\" }\n";
-    let start =
-        "position = \"100 200 300 mm\", rotation = { axis = [1, 0, 0], angle = \"20 deg\" }";
+    let start = "position = \"100 200 300 mm\", rotation = { axis = [1, 0, 0], angle = \"20 deg\" }";
     for formulation in FORMULATIONS {
         for method in ["radau5", "rosenbrock", "dopri5"] {
             for axis in 0..3 {
@@ -94,36 +92,22 @@ fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
                     list(4.0, "N"),
                     list(0.05, "N m")
                 );
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.tolerance", "1e-8"),
-                    ("formulation", formulation),
-                ];
+                let changes = [("solver.method", method), ("solver.tolerance", "1e-8"), ("formulation", formulation)];
                 let text = one(start, bushing) + &load;
                 let mut simulation = started(&text, &changes);
                 let frame = at(&mut simulation, 3.0);
                 let label = format!("{method} {formulation} {axis}");
                 let moved = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
                 let expected = direction * (4.0 / STIFFNESS[axis]);
-                assert!(
-                    (moved - expected).norm() < 1e-7,
-                    "{label}: {moved} {expected}"
-                );
-                let turn =
-                    turned(&(frame.bodies[0].rotation * rest.inverse().to_rotation_matrix()));
+                assert!((moved - expected).norm() < 1e-7, "{label}: {moved} {expected}");
+                let turn = turned(&(frame.bodies[0].rotation * rest.inverse().to_rotation_matrix()));
                 let expected = direction * (0.05 / TURNING[axis]);
-                assert!(
-                    (turn - expected).norm() < 1e-6,
-                    "{label}: {turn} {expected}"
-                );
+                assert!((turn - expected).norm() < 1e-6, "{label}: {turn} {expected}");
                 // Loads come first.
                 let report = &frame.elements[1];
                 let off = (report.force + direction * 4.0).norm();
                 assert!(off < 1e-3, "{label}: {off:e}");
-                assert!(
-                    (report.torque.unwrap() + direction * 0.05).norm() < 1e-5,
-                    "{label}: {report:?}"
-                );
+                assert!((report.torque.unwrap() + direction * 0.05).norm() < 1e-5, "{label}: {report:?}");
             }
         }
     }
@@ -153,11 +137,7 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
             ("rosenbrock", "lagrange"),
             ("automatic", "tree"),
         ] {
-            let changes = [
-                ("solver.method", method),
-                ("solver.tolerance", "1e-10"),
-                ("formulation", formulation),
-            ];
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = started(&format!("{pair}{more}"), &changes);
             let scene = simulation.scene().clone();
             let before = at(&mut simulation, 0.0);
@@ -170,18 +150,12 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
             assert!(furthest > 0.7 && furthest < 3.0, "{furthest}");
             let frame = at(&mut simulation, 1.0);
             let label = format!("{method} {formulation} {}", more.len());
-            for (then, now) in momenta(&before, &scene)
-                .iter()
-                .zip(&momenta(&frame, &scene))
-            {
+            for (then, now) in momenta(&before, &scene).iter().zip(&momenta(&frame, &scene)) {
                 let off = (now - then).norm() / then.norm();
                 assert!(off < 1e-8, "{label}: {off:e}");
             }
             let ledger = simulation.ledger().unwrap();
-            assert!(
-                ledger.relative_residual().abs() < 1e-6,
-                "{label}: {ledger:?}"
-            );
+            assert!(ledger.relative_residual().abs() < 1e-6, "{label}: {ledger:?}");
             if more.is_empty() {
                 let off = (frame.kinetic + frame.elastic) / (before.kinetic + before.elastic) - 1.0;
                 assert!(off.abs() < 1e-8, "{label}: {off:e}");
@@ -206,11 +180,7 @@ fn a_stiff_bushing_does_not_hold_implicit_methods_back() {
     .replace("0.1 0.2 0.3 N m/rad", "1e4 2e4 3e4 N m/rad");
     for formulation in FORMULATIONS {
         let evaluations = |method: &str| {
-            let changes = [
-                ("solver.method", method),
-                ("solver.tolerance", "1e-6"),
-                ("formulation", formulation),
-            ];
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
             let mut simulation = started(&stiff, &changes);
             let frame = at(&mut simulation, 1.0);
             let off = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
@@ -221,10 +191,7 @@ fn a_stiff_bushing_does_not_hold_implicit_methods_back() {
         for method in ["radau5", "rosenbrock", "automatic"] {
             let implicit = evaluations(method);
             println!("{formulation} {method} {implicit}, dopri5 {explicit}");
-            assert!(
-                4 * implicit < explicit,
-                "{method} {formulation}: {implicit} {explicit}"
-            );
+            assert!(4 * implicit < explicit, "{method} {formulation}: {implicit} {explicit}");
         }
     }
 }
@@ -247,27 +214,13 @@ fn a_body_on_a_bushing_does_not_fly_freely() {
 fn bad_bushings_are_refused_where_they_stand() {
     let start = "position = [0, 0, 0]";
     for (text, said) in [
+        (one(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"), ["bushing.b.stiffness", "allowed 0 N/m to"]),
+        (one(start, "").replace("0.3 N m/rad", "0.3 N/m"), ["wrong unit `N/m`", "units of turning stiffness"]),
         (
-            one(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"),
-            ["bushing.b.stiffness", "allowed 0 N/m to"],
+            one(start, "").replace("200 300 500", "0 0 0").replace("0.1 0.2 0.3", "0 0 0"),
+            ["does nothing: stiffness, damping, turning_stiffness", "are 0"],
         ),
-        (
-            one(start, "").replace("0.3 N m/rad", "0.3 N/m"),
-            ["wrong unit `N/m`", "units of turning stiffness"],
-        ),
-        (
-            one(start, "")
-                .replace("200 300 500", "0 0 0")
-                .replace("0.1 0.2 0.3", "0 0 0"),
-            [
-                "does nothing: stiffness, damping, turning_stiffness",
-                "are 0",
-            ],
-        ),
-        (
-            one(start, "axes = { axis = [0, 0, 1] }\n"),
-            ["bushing.b.axes.angle", "missing"],
-        ),
+        (one(start, "axes = { axis = [0, 0, 1] }\n"), ["bushing.b.axes.angle", "missing"]),
         (
             one(start, "").replace("body = \"mass\" }\nstiff", "body = \"world\" }\nstiff"),
             ["bushing.b.to", "same body"],
@@ -297,11 +250,7 @@ fn bushings_of_a_pattern_turn_with_its_copies() {
     for (copy, body) in frame.bodies.iter().enumerate() {
         let angle = std::f64::consts::TAU / 3.0 * copy as f64;
         let expected = Vec3::new(angle.cos(), angle.sin(), 0.0) * out;
-        assert!(
-            (body.position - expected).norm() < 1e-9,
-            "{copy}: {}",
-            body.position
-        );
+        assert!((body.position - expected).norm() < 1e-9, "{copy}: {}", body.position);
         let torque = frame.elements[copy].torque.expect("a torque").norm();
         assert!(torque < 1e-12, "{copy}: {torque:e}");
     }
@@ -311,9 +260,6 @@ fn bushings_of_a_pattern_turn_with_its_copies() {
     );
     let error = Scene::parse(&backwards, None, &[]).expect_err("refused");
     let message = error.to_string();
-    assert!(
-        message.contains("bushing.b1.to") || message.contains("bushing.b2.to"),
-        "{message}"
-    );
+    assert!(message.contains("bushing.b1.to") || message.contains("bushing.b2.to"), "{message}");
     assert!(message.contains("make it that of `from`"), "{message}");
 }

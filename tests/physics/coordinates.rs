@@ -22,12 +22,7 @@ struct Case {
 }
 
 const fn case(kind: &'static str, coordinate: &'static str, part: usize) -> Case {
-    Case {
-        kind,
-        coordinate,
-        part,
-        closes_loop: false,
-    }
+    Case { kind, coordinate, part, closes_loop: false }
 }
 
 const OF_TWO: [Case; 4] = [
@@ -39,14 +34,8 @@ const OF_TWO: [Case; 4] = [
 
 /// Those, and all whose joint closes a loop.
 fn cases() -> impl Iterator<Item = Case> {
-    let of_one = [
-        case("prismatic", "position", 0),
-        case("revolute", "angle", 0),
-    ];
-    let closing = OF_TWO.into_iter().chain(of_one).map(|case| Case {
-        closes_loop: true,
-        ..case
-    });
+    let of_one = [case("prismatic", "position", 0), case("revolute", "angle", 0)];
+    let closing = OF_TWO.into_iter().chain(of_one).map(|case| Case { closes_loop: true, ..case });
     OF_TWO.into_iter().chain(closing)
 }
 
@@ -82,19 +71,14 @@ impl Case {
             "universal" => "child_axis = [1, 0, 0]\n",
             _ => "",
         };
-        let joint = format!(
-            "name = \"j\"\nkind = \"{}\"\nchild = \"mass\"\naxis = [0, 0, 1]\n{second}",
-            self.kind
-        );
+        let joint = format!("name = \"j\"\nkind = \"{}\"\nchild = \"mass\"\naxis = [0, 0, 1]\n{second}", self.kind);
         let about = match self.coordinate {
             "child_angle" => "[1, 0, 0]",
             _ => "[0, 0, 1]",
         };
         let joints = match (self.closes_loop, self.slides()) {
             (false, _) => {
-                let other = OF_TWO
-                    .iter()
-                    .find(|c| c.kind == self.kind && c.part != self.part);
+                let other = OF_TWO.iter().find(|c| c.kind == self.kind && c.part != self.part);
                 let other = other.expect("another");
                 let [_, unit, ..] = other.units();
                 format!(
@@ -109,11 +93,7 @@ impl Case {
                  start = {{ position = \"0 0 {q:e} m\", velocity = \"0 0 {rate:e} m/s\" }}\n[[joint]]\n{joint}closes_loop = true\n"
             ),
             (true, false) => {
-                let [x, z] = if about == "[1, 0, 0]" {
-                    [rate, 0.0]
-                } else {
-                    [0.0, rate]
-                };
+                let [x, z] = if about == "[1, 0, 0]" { [rate, 0.0] } else { [0.0, rate] };
                 format!(
                     "[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\n\
                      start = {{ position = [0, 0, 0], rotation = {{ axis = {about}, angle = \"{q:e} rad\" }}, \
@@ -187,10 +167,7 @@ fn a_spring_on_one_coordinate_swings_as_it_should_in_every_method_and_formulatio
                 if !case.closes_loop {
                     let [q, rate] = frame.coordinates[1 - case.part];
                     let (off, still) = (differ(q, 0.3), (rate - 3.0).abs());
-                    assert!(
-                        off < 20.0 * bound && still < 20.0 * bound,
-                        "{label}: {off:e} {still:e}"
-                    );
+                    assert!(off < 20.0 * bound && still < 20.0 * bound, "{label}: {off:e} {still:e}");
                 }
                 let residual = simulation.ledger().unwrap().relative_residual();
                 assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
@@ -217,10 +194,7 @@ fn a_motor_on_one_coordinate_drives_that_alone_and_its_work_is_the_drives() {
             assert!((rate - 1.1).abs() < 1e-8, "{label}: {rate}");
             let ledger = simulation.ledger().unwrap();
             let work = 5.0 * m * expected;
-            assert!(
-                (ledger.drive_work - work).abs() < 1e-7 * m,
-                "{label}: {ledger:?}"
-            );
+            assert!((ledger.drive_work - work).abs() < 1e-7 * m, "{label}: {ledger:?}");
         }
     }
 }
@@ -231,10 +205,8 @@ fn a_stop_turns_one_coordinate_back() {
         let m = case.inertia();
         let [length, _, force, ..] = case.units();
         let key = if case.slides() { "force" } else { "torque" };
-        let stop = format!(
-            "upper = \"0.05 {length}\"\n{key} = \"{:e} {force}\"\ndepth = \"1e-3 {length}\"\n",
-            200.0 * m
-        );
+        let stop =
+            format!("upper = \"0.05 {length}\"\n{key} = \"{:e} {force}\"\ndepth = \"1e-3 {length}\"\n", 200.0 * m);
         let stop = case.element("stop", &stop);
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.tolerance", "1e-10")];
@@ -247,10 +219,7 @@ fn a_stop_turns_one_coordinate_back() {
             let label = format!("{case:?} {formulation}");
             // Hertz: m v^2 / 2 = 0.4 K d^2.5 with K = 200 m / 0.001^1.5.
             let most = (0.125 / (0.4 * 200.0) * 1e-3_f64.powf(1.5)).powf(0.4);
-            assert!(
-                deepest.0 - 0.05 < most + 1e-9 && deepest.1 <= 0.0,
-                "{label}: {deepest:?}"
-            );
+            assert!(deepest.0 - 0.05 < most + 1e-9 && deepest.1 <= 0.0, "{label}: {deepest:?}");
             let [q, rate] = case.coordinate(&at(&mut simulation, 0.25));
             assert!((rate + 0.5).abs() < 1e-6, "{label}: {rate}");
             assert!(q < 0.05, "{label}: {q}");
@@ -258,8 +227,7 @@ fn a_stop_turns_one_coordinate_back() {
     }
 }
 
-const DRIVEN: &str =
-    "law = \"harmonic\", mean = \"0.1 UNIT\", amplitude = \"0.2 UNIT\", frequency = \"1.5 Hz\"";
+const DRIVEN: &str = "law = \"harmonic\", mean = \"0.1 UNIT\", amplitude = \"0.2 UNIT\", frequency = \"1.5 Hz\"";
 
 /// The law of that at 0.13 s.
 fn driven() -> [f64; 3] {
@@ -275,16 +243,11 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants(
         let text = case.text([0.0, 0.0], "");
         let start = text.find("start = ").expect("start values");
         let (before, after) = text.split_at(start);
-        let other = OF_TWO
-            .iter()
-            .find(|c| c.kind == case.kind && c.part != case.part);
+        let other = OF_TWO.iter().find(|c| c.kind == case.kind && c.part != case.part);
         let [_, unit, ..] = other.expect("another").units();
         let rate = other.expect("another").rate_key();
         let law = DRIVEN.replace("UNIT", length);
-        let drive = format!(
-            "start = {{ {rate} = \"3 {unit}\" }}\ndrive = {{ {} = {{ {law} }} }}\n",
-            case.coordinate
-        );
+        let drive = format!("start = {{ {rate} = \"3 {unit}\" }}\ndrive = {{ {} = {{ {law} }} }}\n", case.coordinate);
         let text = before.to_owned() + &drive + after.split_once('\n').expect("a line").1;
         for method in METHODS {
             for formulation in FORMULATIONS {
@@ -300,10 +263,7 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants(
                 let label = format!("{case:?} {method} {formulation}");
                 let [q, rate, acceleration] = driven();
                 let [own, speed] = case.coordinate(&frame);
-                assert!(
-                    (own - q).abs() < bound && (speed - rate).abs() < 20.0 * bound,
-                    "{label}: {own} {speed}"
-                );
+                assert!((own - q).abs() < bound && (speed - rate).abs() < 20.0 * bound, "{label}: {own} {speed}");
                 let [other, speed] = frame.coordinates[1 - case.part];
                 assert!(
                     differ(other, 0.39) < 20.0 * bound && (speed - 3.0).abs() < 20.0 * bound,
@@ -311,10 +271,7 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants(
                 );
                 let needed = case.inertia() * acceleration;
                 let off = (frame.actuators[0] - needed).abs() / needed.abs();
-                assert!(
-                    frame.actuators.len() == 1 && off < 1e4 * bound,
-                    "{label}: {off:e}"
-                );
+                assert!(frame.actuators.len() == 1 && off < 1e4 * bound, "{label}: {off:e}");
                 let ledger = simulation.ledger().unwrap();
                 let residual = ledger.relative_residual();
                 assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
@@ -341,36 +298,19 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
         let more = "[[body]]\nname = \"bob\"\nmass = \"0.2 kg\"\ninertia = \"1e-4 2e-4 3e-4 kg m^2\"\n\
                     [[joint]]\nname = \"h\"\nkind = \"revolute\"\nparent = \"mass\"\nchild = \"bob\"\naxis = [1, 0, 0]\n\
                     parent_point = \"40 0 0 mm\"\nchild_point = \"0 20 60 mm\"\nstart = { velocity = \"1 rad/s\" }\n";
-        let driven = format!(
-            "drive = {{ {}, {} }}\n",
-            drive(first, "0.7"),
-            drive(second, "-2")
-        );
+        let driven = format!("drive = {{ {}, {} }}\n", drive(first, "0.7"), drive(second, "-2"));
         let text = text[..start].to_owned() + &driven + more;
         let mut ends = Vec::new();
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
             let mut simulation = started(&text, &changes);
             let summary = simulation.mechanism().summary();
-            assert_eq!(
-                (
-                    summary.drives,
-                    summary.driven_bodies,
-                    summary.degrees_of_freedom
-                ),
-                (2, 1, 1)
-            );
+            assert_eq!((summary.drives, summary.driven_bodies, summary.degrees_of_freedom), (2, 1, 1));
             let frame = at(&mut simulation, 0.2);
             let label = format!("{} {formulation}", first.kind);
             let [own, other] = [0, 1].map(|part| frame.coordinates[part]);
-            assert!(
-                (own[0] - 0.14).abs() < 1e-9 && (own[1] - 0.7).abs() < 1e-9,
-                "{label}: {own:?}"
-            );
-            assert!(
-                (other[0] + 0.4).abs() < 1e-9 && (other[1] + 2.0).abs() < 1e-9,
-                "{label}: {other:?}"
-            );
+            assert!((own[0] - 0.14).abs() < 1e-9 && (own[1] - 0.7).abs() < 1e-9, "{label}: {own:?}");
+            assert!((other[0] + 0.4).abs() < 1e-9 && (other[1] + 2.0).abs() < 1e-9, "{label}: {other:?}");
             let residual = simulation.ledger().unwrap().relative_residual();
             assert!(residual.abs() < 1e-7, "{label}: {residual:e}");
             ends.push(frame);
@@ -379,17 +319,10 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
             panic!("two forms");
         };
         let [a, b] = [tree, lagrange].map(|frame| frame.coordinates[2]);
-        assert!(
-            (a[0] - b[0]).abs() < 1e-8 && (a[1] - b[1]).abs() < 1e-7,
-            "{a:?} {b:?}"
-        );
+        assert!((a[0] - b[0]).abs() < 1e-8 && (a[1] - b[1]).abs() < 1e-7, "{a:?} {b:?}");
         assert_eq!(tree.actuators.len(), 2);
         for (a, b) in tree.actuators.iter().zip(&lagrange.actuators) {
-            assert!(
-                (a - b).abs() < 1e-7 * a.abs().max(0.1),
-                "{}: {a} {b}",
-                first.kind
-            );
+            assert!((a - b).abs() < 1e-7 * a.abs().max(0.1), "{}: {a} {b}", first.kind);
         }
         let (name, kind) = (first.kind, first.coordinate);
         let scene = crate::common::parse(&text, &[]);
@@ -398,10 +331,7 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
             "cylindrical" => &["j_actuator_N", "j_angle_actuator_Nm"],
             _ => &["j_angle_actuator_Nm", "j_child_angle_actuator_Nm"],
         };
-        let found: Vec<&String> = columns
-            .iter()
-            .filter(|column| column.contains("actuator"))
-            .collect();
+        let found: Vec<&String> = columns.iter().filter(|column| column.contains("actuator")).collect();
         assert_eq!(found, own, "{kind}");
     }
 }
@@ -428,17 +358,10 @@ const TUMBLING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
 #[test]
 fn what_acts_on_coordinates_of_two_keeps_momentum_and_its_energy_balance_closes() {
     let mut ends = Vec::new();
-    for (formulation, method) in [
-        ("tree", "dopri5"),
-        ("lagrange", "dopri5"),
-        ("tree", "radau5"),
-        ("lagrange", "rosenbrock"),
-    ] {
-        let changes = [
-            ("solver.method", method),
-            ("solver.tolerance", "1e-10"),
-            ("formulation", formulation),
-        ];
+    for (formulation, method) in
+        [("tree", "dopri5"), ("lagrange", "dopri5"), ("tree", "radau5"), ("lagrange", "rosenbrock")]
+    {
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
         let mut simulation = started(TUMBLING, &changes);
         let scene = simulation.scene().clone();
         let before = at(&mut simulation, 0.0);
@@ -456,10 +379,7 @@ fn what_acts_on_coordinates_of_two_keeps_momentum_and_its_energy_balance_closes(
     let (first, others) = ends.split_first().expect("four runs");
     for other in others {
         for (a, b) in first.coordinates.iter().zip(&other.coordinates) {
-            assert!(
-                differ(a[0], b[0]) < 1e-5 && (a[1] - b[1]).abs() < 1e-3,
-                "{a:?} {b:?}"
-            );
+            assert!(differ(a[0], b[0]) < 1e-5 && (a[1] - b[1]).abs() < 1e-3, "{a:?} {b:?}");
         }
     }
 }
@@ -469,9 +389,7 @@ fn what_acts_on_coordinates_of_two_keeps_momentum_and_its_energy_balance_closes(
 fn a_spring_on_a_closing_hinge_loads_the_drive_of_its_loop() {
     // A parallelogram: the closing hinge between coupler and rocker turns as the crank does, the other way round.
     let body = |name: &str, inertia: f64| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nmass = \"0.1 kg\"\ninertia = \"1e-5 {inertia:e} {inertia:e} kg m^2\"\n"
-        )
+        format!("[[body]]\nname = \"{name}\"\nmass = \"0.1 kg\"\ninertia = \"1e-5 {inertia:e} {inertia:e} kg m^2\"\n")
     };
     let hinge = |name: &str, parent: &str, at: &str, more: &str| {
         format!(
@@ -489,18 +407,8 @@ fn a_spring_on_a_closing_hinge_loads_the_drive_of_its_loop() {
             "0",
             "drive = { law = \"constant\", position = \"1 rad\", velocity = \"0.2 rad/s\" }",
         )
-        + &hinge(
-            "coupler",
-            "crank",
-            "0.1",
-            "start = { position = \"-1 rad\", velocity = \"-0.2 rad/s\" }",
-        )
-        + &hinge(
-            "rocker",
-            "world",
-            "0.3",
-            "start = { position = \"1 rad\", velocity = \"0.2 rad/s\" }",
-        )
+        + &hinge("coupler", "crank", "0.1", "start = { position = \"-1 rad\", velocity = \"-0.2 rad/s\" }")
+        + &hinge("rocker", "world", "0.3", "start = { position = \"1 rad\", velocity = \"0.2 rad/s\" }")
         + "[[joint]]\nname = \"B\"\nkind = \"revolute\"\nparent = \"coupler\"\nchild = \"rocker\"\ncloses_loop = true\n\
            parent_point = \"0.3 0 0 m\"\nchild_point = \"0.1 0 0 m\"\naxis = [0, 1, 0]\n";
     let spring = "[[joint_spring]]\nname = \"s\"\njoint = \"B\"\nposition = \"0.4 rad\"\nstiffness = \"2 N m/rad\"\n";
@@ -508,10 +416,7 @@ fn a_spring_on_a_closing_hinge_loads_the_drive_of_its_loop() {
         let torque = |text: &str| {
             let mut simulation = started(text, &[("formulation", formulation)]);
             let frame = at(&mut simulation, 0.1);
-            (
-                frame.actuators[0],
-                frame.coordinates.last().copied().expect("one")[0],
-            )
+            (frame.actuators[0], frame.coordinates.last().copied().expect("one")[0])
         };
         let (loaded, angle) = torque(&(text.clone() + spring));
         // Rocker against coupler: the coupler does not turn.

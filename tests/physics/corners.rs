@@ -6,10 +6,7 @@ use jointplay::contact::FrictionPiece;
 #[test]
 fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
     for method in ["radau5", "automatic"] {
-        let mut simulation = simulation(
-            "spcmm",
-            &[("solver.method", method), ("solver.tolerance", "1e-5")],
-        );
+        let mut simulation = simulation("spcmm", &[("solver.method", method), ("solver.tolerance", "1e-5")]);
         // Joints slide about slip_speed_high between 1.1 s and 1.3 s.
         simulation.advance_to(1.1).unwrap();
         let before = simulation.statistics().clone();
@@ -18,10 +15,7 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
                 let memory = simulation.contact_memory(j);
-                assert!(
-                    memory.active && memory.friction_piece != FrictionPiece::Unsplit,
-                    "{method}"
-                );
+                assert!(memory.active && memory.friction_piece != FrictionPiece::Unsplit, "{method}");
                 let c = simulation.mechanism().contacts.coefficients(j);
                 let beyond = c.beyond(memory.friction_piece, joint.slip_speed);
                 assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
@@ -44,10 +38,7 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
 fn a_largest_rate_is_found_wherever_in_a_step_it_lies() {
     // An impact that the spring goes on pushing: its rate rises at first. Steps of many tolerances have its maximum in many places.
     let rate_in_memory = |tolerance: f64| {
-        let solver = [
-            ("solver.method", "dopri5"),
-            ("solver.tolerance", &tolerance.to_string()),
-        ];
+        let solver = [("solver.method", "dopri5"), ("solver.tolerance", &tolerance.to_string())];
         let mut simulation = simulation("suspension", &solver);
         let (mut largest, mut found) = (0.0_f64, Vec::new());
         while simulation.time() < 0.015 {
@@ -81,12 +72,7 @@ fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
     let run = |method: &str, tolerance: &str, formulation: &str| {
         let mut simulation = simulation(
             "spcmm",
-            &[
-                printed,
-                ("solver.method", method),
-                ("solver.tolerance", tolerance),
-                ("formulation", formulation),
-            ],
+            &[printed, ("solver.method", method), ("solver.tolerance", tolerance), ("formulation", formulation)],
         );
         while simulation.time() < end {
             simulation.step_until(end).unwrap();
@@ -94,10 +80,7 @@ fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
             for (j, joint) in frame.joints.iter().enumerate() {
                 let memory = simulation.contact_memory(j);
                 let c = simulation.mechanism().contacts.coefficients(j);
-                if memory.active
-                    && memory.friction_piece != FrictionPiece::Unsplit
-                    && joint.slip_speed > 0.0
-                {
+                if memory.active && memory.friction_piece != FrictionPiece::Unsplit && joint.slip_speed > 0.0 {
                     let beyond = c.beyond(memory.friction_piece, joint.slip_speed);
                     assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
                 }

@@ -97,15 +97,8 @@ fn a_restored_state_goes_on_with_the_same_bits() {
                 let first = go_on(&mut simulation, 150);
                 simulation.restore(&snapshot);
                 assert_eq!(simulation.state_hash(), hash);
-                assert_eq!(
-                    format!("{:?}", frame_now(&mut simulation)),
-                    format!("{here:?}")
-                );
-                assert_eq!(
-                    go_on(&mut simulation, 150),
-                    first,
-                    "{name}, {method}, {form}"
-                );
+                assert_eq!(format!("{:?}", frame_now(&mut simulation)), format!("{here:?}"));
+                assert_eq!(go_on(&mut simulation, 150), first, "{name}, {method}, {form}");
                 // Into one that never saw the run and has other settings.
                 let mut fresh = Simulation::new(&scene(name, &[])).unwrap();
                 fresh.restore(&snapshot);
@@ -200,18 +193,8 @@ fn eccentric() -> [(&'static str, String); 2] {
     };
     let slider = "position = \"200 mm\", velocity";
     [
-        (
-            "C",
-            text("slider-crank", slider, "position = \"200.2 mm\", velocity"),
-        ),
-        (
-            "S1",
-            text(
-                "pendulum",
-                "position = [0, 0, 0]",
-                "position = \"0.2 0 0 mm\"",
-            ),
-        ),
+        ("C", text("slider-crank", slider, "position = \"200.2 mm\", velocity")),
+        ("S1", text("pendulum", "position = [0, 0, 0]", "position = \"0.2 0 0 mm\"")),
     ]
 }
 
@@ -227,10 +210,7 @@ fn a_state_is_restored_where_no_start_would_be_accepted() {
                 simulation.advance_to(1e-3).unwrap();
                 let key = format!("joint.{joint}.clearance");
                 simulation.set(&key, "0.05 mm").unwrap();
-                assert!(
-                    Simulation::new(simulation.running_scene()).is_err(),
-                    "{case}"
-                );
+                assert!(Simulation::new(simulation.running_scene()).is_err(), "{case}");
                 simulation.advance_to(4e-3).unwrap();
                 let snapshot = simulation.snapshot();
                 let (mut peaks, mut again) = (Vec::new(), Vec::new());

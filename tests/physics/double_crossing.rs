@@ -11,11 +11,7 @@ use jointplay::simulate::Frame;
 fn no_ball_passes_through_its_wall_unnoticed() {
     let mut simulation = simulation(
         "pendulum",
-        &[
-            ("contact.friction", "0"),
-            ("contact.restitution", "1"),
-            ("solver.tolerance", "1e-9"),
-        ],
+        &[("contact.friction", "0"), ("contact.restitution", "1"), ("solver.tolerance", "1e-9")],
     );
     let mut frame = Frame::default();
     for n in 0..=14_800_u32 {

@@ -49,7 +49,8 @@ fn energy_that_is_wrong_is_marked() {
     let energy = |doubt: &Doubt| matches!(doubt, Doubt::Energy { share, .. } if *share > 5e-3);
     let short = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { steps: 40, .. });
     let held = |doubt: &Doubt| matches!(doubt, Doubt::Held { share, .. } if *share > 0.1);
-    let work = |doubt: &Doubt| matches!(doubt, Doubt::Work { value, residual, .. } if residual.abs() > 0.1 * value.abs());
+    let work =
+        |doubt: &Doubt| matches!(doubt, Doubt::Work { value, residual, .. } if residual.abs() > 0.1 * value.abs());
     let looser = [("solver.method", "dopri5"), ("solver.tolerance", "4e-4")];
     let cases: [Case; 7] = [
         ("pendulum", &imex, 0.01, energy),
@@ -72,78 +73,41 @@ fn energy_that_is_wrong_is_marked() {
     // Without a ledger the energy says nothing; what the steps say stays.
     let off = [imex[0], ("solver.energy_ledger", "off")];
     let doubts = ran("pendulum", &off, 0.01).doubts();
-    assert!(
-        doubts.iter().any(short) && !doubts.iter().any(energy),
-        "{doubts:?}"
-    );
+    assert!(doubts.iter().any(short) && !doubts.iter().any(energy), "{doubts:?}");
 }
 
 #[test]
 fn damping_beyond_its_domain_names_joint_and_instant() {
-    let changes = [
-        ("chain.links", "12"),
-        ("contact.approach_speed", "start"),
-        ("solver.tolerance", "1e-4"),
-    ];
+    let changes = [("chain.links", "12"), ("contact.approach_speed", "start"), ("solver.tolerance", "1e-4")];
     let simulation = ran("chain", &changes, 0.06);
     let doubts = simulation.doubts();
     let found = doubts.iter().find_map(|doubt| match doubt {
-        Doubt::Damping {
-            joints,
-            time,
-            ratio,
-            usual,
-        } => Some((joints, *time, *ratio, *usual)),
+        Doubt::Damping { joints, time, ratio, usual } => Some((joints, *time, *ratio, *usual)),
         _ => None,
     });
     let (joints, time, ratio, usual) = found.expect("a doubt about damping");
-    assert!(
-        joints.worst.starts_with('J') && (0.0..0.06).contains(&time),
-        "{doubts:?}"
-    );
-    assert!(
-        ratio > usual + 1.0 && (usual - 0.1425).abs() < 1e-6,
-        "{doubts:?}"
-    );
+    assert!(joints.worst.starts_with('J') && (0.0..0.06).contains(&time), "{doubts:?}");
+    assert!(ratio > usual + 1.0 && (usual - 0.1425).abs() < 1e-6, "{doubts:?}");
 }
 
 #[test]
 fn each_doubt_is_told_once_and_names_its_joint() {
     let rk4 = ("solver.method", "rk4");
     let cases: [(&str, &Changes, &str); 6] = [
-        (
-            "pendulum",
-            &[rk4, ("solver.step", "40 us")],
-            "lasted fewer than 5 steps",
-        ),
+        ("pendulum", &[rk4, ("solver.step", "40 us")], "lasted fewer than 5 steps"),
         (
             "pendulum",
             &[("contact.impact_speed_floor", "10 m/s")],
             "S1: 4 of 4 contacts began slower than impact_speed_floor",
         ),
+        ("spcmm", &[("contact.youngs_modulus", "10 MPa")], "(and 2 more): the contact patch reached"),
         (
             "spcmm",
-            &[("contact.youngs_modulus", "10 MPa")],
-            "(and 2 more): the contact patch reached",
-        ),
-        (
-            "spcmm",
-            &[
-                ("contact.restitution", "0"),
-                ("contact.normal_law", "hunt-crossley"),
-            ],
+            &[("contact.restitution", "0"), ("contact.normal_law", "hunt-crossley")],
             "restitution 0 with hunt-crossley, which is right only near 1",
         ),
-        (
-            "spcmm",
-            &[("solver.tolerance", "1e-2")],
-            "solver.tolerance 1e-2",
-        ),
-        (
-            "spcmm",
-            &[("joint.S2.clearance", "5 um")],
-            "S2: clearance 0.005 mm is so small",
-        ),
+        ("spcmm", &[("solver.tolerance", "1e-2")], "solver.tolerance 1e-2"),
+        ("spcmm", &[("joint.S2.clearance", "5 um")], "S2: clearance 0.005 mm is so small"),
     ];
     for (scene, changes, expected) in cases {
         let doubts = words(&ran(scene, changes, 0.03));
@@ -169,34 +133,19 @@ fn a_reset_forgets_what_the_run_met_and_a_snapshot_keeps_it() {
 fn the_summary_of_a_run_marks_it() {
     let run = |form: &str, floor: &str| {
         let output = std::process::Command::new(env!("CARGO_BIN_EXE_jointplay"))
-            .args([
-                "run",
-                "pendulum",
-                "--duration",
-                "20ms",
-                "--quiet",
-                "--summary",
-                form,
-            ])
+            .args(["run", "pendulum", "--duration", "20ms", "--quiet", "--summary", form])
             .args(["--set", floor])
             .output()
             .unwrap();
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stdout).unwrap()
     };
-    let (odd, usual) = (
-        "contact.impact_speed_floor=10m/s",
-        "contact.impact_speed_floor=1mm/s",
-    );
+    let (odd, usual) = ("contact.impact_speed_floor=10m/s", "contact.impact_speed_floor=1mm/s");
     let json: serde_json::Value = serde_json::from_str(&run("json", odd)).unwrap();
     assert_eq!(json["doubts"].as_array().unwrap().len(), 1, "{json}");
     assert_eq!(json["slower_than_asked"], false);
     let json: serde_json::Value = serde_json::from_str(&run("json", usual)).unwrap();
     assert!(json["doubts"].as_array().unwrap().is_empty(), "{json}");
-    assert!(
-        run("text", odd).contains("Not trusted       S1: "),
-        "{}",
-        run("text", odd)
-    );
+    assert!(run("text", odd).contains("Not trusted       S1: "), "{}", run("text", odd));
     assert!(!run("text", usual).contains("Not trusted"));
 }

@@ -19,11 +19,8 @@ fn hanging(drive: &str, changes: &Changes) -> Simulation {
 
 /// A slider-crank whose crank has this drive, without play: its motion is a function of time alone.
 fn kinematic(drive: &str, changes: &Changes) -> Simulation {
-    let body = |name: &str| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n"
-        )
-    };
+    let body =
+        |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n");
     let bodies: String = ["crank", "knuckle", "rod", "slider"].map(body).concat();
     let text = format!(
         "start = \"ideal\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[contact]\nclearance = 0\n{bodies}\
@@ -59,20 +56,13 @@ fn the_ledger_closes_under_every_law() {
             for clearance in ["0", "0.3 mm"] {
                 let mut simulation = hanging(
                     law,
-                    &[
-                        ("formulation", formulation),
-                        ("contact.clearance", clearance),
-                        ("solver.preset", "accurate"),
-                    ],
+                    &[("formulation", formulation), ("contact.clearance", clearance), ("solver.preset", "accurate")],
                 );
                 run_until(&mut simulation, 0.3);
                 let ledger = simulation.ledger().unwrap();
                 let residual = ledger.relative_residual();
                 println!("{law} {formulation} {clearance}: {residual:.1e}");
-                assert!(
-                    residual.abs() < 1e-4,
-                    "{law} {formulation} {clearance}: {ledger:?}"
-                );
+                assert!(residual.abs() < 1e-4, "{law} {formulation} {clearance}: {ledger:?}");
                 assert!(ledger.drive_work.abs() > 1e-6, "{law}: {ledger:?}");
             }
         }
@@ -82,10 +72,7 @@ fn the_ledger_closes_under_every_law() {
 #[test]
 fn the_ledger_closes_where_the_motion_is_a_function_of_time_alone() {
     for law in LAWS {
-        let law = law
-            .replace("mm/s", "rad/s")
-            .replace("5 mm", "1 rad")
-            .replace("mm", "deg");
+        let law = law.replace("mm/s", "rad/s").replace("5 mm", "1 rad").replace("mm", "deg");
         for formulation in ["tree", "lagrange"] {
             let mut simulation = kinematic(&law, &[("formulation", formulation)]);
             assert_eq!(simulation.mechanism().is_kinematic(), formulation == "tree");
@@ -102,9 +89,7 @@ fn the_ledger_closes_where_the_motion_is_a_function_of_time_alone() {
 #[test]
 fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
     for (height, duration) in [("2 mm", "5 ms"), ("0.2 mm", "0.5 ms")] {
-        let law = format!(
-            "law = \"pulse\", height = \"{height}\", start = \"1.0037 s\", duration = \"{duration}\""
-        );
+        let law = format!("law = \"pulse\", height = \"{height}\", start = \"1.0037 s\", duration = \"{duration}\"");
         let after = |method: &str, formulation: &str| {
             let changes = [
                 ("contact.clearance", "0"),
@@ -119,10 +104,7 @@ fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
             run_until(&mut simulation, 1.05);
             let ledger = *simulation.ledger().unwrap();
             let residual = ledger.relative_residual();
-            assert!(
-                residual.abs() < 1e-5,
-                "{method} {formulation}: {residual:e}"
-            );
+            assert!(residual.abs() < 1e-5, "{method} {formulation}: {residual:e}");
             ledger.exchanged
         };
         let fixed = after("rk4", "tree");
@@ -131,10 +113,7 @@ fn no_step_passes_over_a_pulse_after_a_second_of_rest() {
             for formulation in ["tree", "lagrange"] {
                 let ratio = after(method, formulation) / fixed;
                 // What goes there and back within one step is not seen.
-                assert!(
-                    (ratio - 1.0).abs() < 0.02,
-                    "{method} {formulation}: {ratio}"
-                );
+                assert!((ratio - 1.0).abs() < 0.02, "{method} {formulation}: {ratio}");
             }
         }
     }
@@ -166,11 +145,7 @@ fn formula_table_and_sum_move_a_machine_as_the_harmonic_law_does() {
     let points: Vec<String> = (0..=200)
         .map(|n| {
             let t = f64::from(n) / 800.0;
-            let x = if n == 200 {
-                0.0
-            } else {
-                5e-3 * libm_sin(8.0 * std::f64::consts::PI * t)
-            };
+            let x = if n == 200 { 0.0 } else { 5e-3 * libm_sin(8.0 * std::f64::consts::PI * t) };
             format!("[\"{t} s\", \"{x:e} m\"]")
         })
         .collect();
@@ -178,18 +153,11 @@ fn formula_table_and_sum_move_a_machine_as_the_harmonic_law_does() {
         "law = \"harmonics\", terms = [{ amplitude = \"5 mm\", frequency = \"4 Hz\" }]".to_owned(),
         "law = \"formula\", formula = \"0.005 * sin(2*pi*4*t)\"".to_owned(),
         "law = \"formula\", formula = \"5*sin(8*pi*t)\", unit = \"mm\"".to_owned(),
-        format!(
-            "law = \"table\", repeat = true, points = [{}]",
-            points.join(", ")
-        ),
+        format!("law = \"table\", repeat = true, points = [{}]", points.join(", ")),
     ];
     for formulation in ["tree", "lagrange"] {
         let end = |law: &str| {
-            let changes = [
-                ("contact.clearance", "0"),
-                ("solver.tolerance", "1e-10"),
-                ("formulation", formulation),
-            ];
+            let changes = [("contact.clearance", "0"), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = hanging(law, &changes);
             run_until(&mut simulation, 0.6);
             let frame = frame_now(&mut simulation);
@@ -198,10 +166,7 @@ fn formula_table_and_sum_move_a_machine_as_the_harmonic_law_does() {
         let [slider, rod] = end("law = \"harmonic\", amplitude = \"5 mm\", frequency = \"4 Hz\"");
         for law in &same {
             let [s, r] = end(law);
-            assert!(
-                (s - slider).norm() < 1e-8,
-                "{formulation} {law}: {s} {slider}"
-            );
+            assert!((s - slider).norm() < 1e-8, "{formulation} {law}: {s} {slider}");
             assert!((r - rod).norm() < 1e-7, "{formulation} {law}: {r} {rod}");
         }
     }
@@ -228,10 +193,8 @@ fn a_hinge_turns_by_a_ramp_to_where_it_should() {
 
 #[test]
 fn a_formula_that_ends_stops_the_run_without_a_panic() {
-    let mut simulation = hanging(
-        "law = \"formula\", formula = \"0.01 * sqrt(0.1 - t)\"",
-        &[("contact.clearance", "0")],
-    );
+    let mut simulation =
+        hanging("law = \"formula\", formula = \"0.01 * sqrt(0.1 - t)\"", &[("contact.clearance", "0")]);
     let stopped = loop {
         if let Err(stopped) = simulation.step() {
             break stopped;

@@ -63,15 +63,10 @@ fn a_mass_on_a_spring_swings_as_it_should_in_every_method_and_formulation() {
             assert!(off < bound, "{method} {formulation}: {off:e}");
             let tension = 200.0 * (expected - 0.1);
             assert!((frame.elements[0].force.x + tension).abs() < 2e3 * bound);
-            assert!(
-                (frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound
-            );
+            assert!((frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound);
             let ledger = simulation.ledger().unwrap();
             assert!(ledger.exchanged > 0.1, "{ledger:?}");
-            assert!(
-                ledger.relative_residual().abs() < 1e-4,
-                "{method} {formulation}"
-            );
+            assert!(ledger.relative_residual().abs() < 1e-4, "{method} {formulation}");
         }
     }
 }
@@ -85,11 +80,9 @@ fn the_error_falls_with_the_order_of_the_method() {
         let frame = at(&mut floating(SPRING, &changes), 0.2);
         (frame.bodies[0].position.x - 0.1 - 0.03 * (omega * 0.2).cos()).abs()
     };
-    for (method, steps, order) in [
-        ("semi-implicit-euler", [1e-4, 5e-5], 1.0),
-        ("imex-euler", [1e-4, 5e-5], 1.0),
-        ("rk4", [4e-3, 2e-3], 4.0),
-    ] {
+    for (method, steps, order) in
+        [("semi-implicit-euler", [1e-4, 5e-5], 1.0), ("imex-euler", [1e-4, 5e-5], 1.0), ("rk4", [4e-3, 2e-3], 4.0)]
+    {
         let [coarse, fine] = steps.map(|step| error(method, step));
         let found = (coarse / fine).log2();
         println!("{method}: {coarse:e}, {fine:e}, order {found}");
@@ -107,11 +100,7 @@ fn a_damper_takes_what_the_closed_solution_says() {
         for formulation in ["tree", "lagrange"] {
             let mut simulation = floating(
                 &format!("{SPRING}damping = \"4 N s/m\"\n"),
-                &[
-                    ("solver.method", method),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ],
+                &[("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)],
             );
             let time = 0.25;
             let frame = at(&mut simulation, time);
@@ -124,10 +113,7 @@ fn a_damper_takes_what_the_closed_solution_says() {
             let left = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
             let lost = simulation.ledger().unwrap().damping_loss;
             let expected = 0.5 * k * 0.03 * 0.03 - left;
-            assert!(
-                (lost / expected - 1.0).abs() < 1e-5,
-                "{method} {formulation}: {lost} {expected}"
-            );
+            assert!((lost / expected - 1.0).abs() < 1e-5, "{method} {formulation}: {lost} {expected}");
         }
     }
 }
@@ -138,10 +124,7 @@ fn a_stiff_damped_spring_does_not_hold_an_implicit_method_back() {
     let stiff = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\n\
                  length = \"100 mm\"\nstiffness = \"80 kN/mm\"\ndamping = \"10 kN s/m\"\n";
     let evaluations = |method: &str| {
-        let mut simulation = floating(
-            stiff,
-            &[("solver.method", method), ("solver.tolerance", "1e-6")],
-        );
+        let mut simulation = floating(stiff, &[("solver.method", method), ("solver.tolerance", "1e-6")]);
         let frame = at(&mut simulation, 0.2);
         let length = frame.bodies[0].position.norm();
         assert!((length - 0.1).abs() < 1e-6, "{method}: {length}");
@@ -190,8 +173,7 @@ fn loads_move_a_body_as_newton_and_euler_say() {
             let moved = body.position - Vec3::new(0.13, 0.5 * 3.0 / MASS * time * time, 0.0);
             assert!(moved.norm() < 1e-9, "{method} {formulation}: {moved}");
             assert!((body.angular_velocity.z - spin_up * time).abs() < 1e-8);
-            let kinetic =
-                0.5 * MASS * body.velocity.norm_squared() + 0.5 * 4e-4 * (spin_up * time).powi(2);
+            let kinetic = 0.5 * MASS * body.velocity.norm_squared() + 0.5 * 4e-4 * (spin_up * time).powi(2);
             let work = simulation.ledger().unwrap().external_work;
             assert!((work / kinetic - 1.0).abs() < 1e-6, "{work} {kinetic}");
             // In body axes the force turns by spin_up t^2 / 2: its impulse is Fresnel's integral.
@@ -216,17 +198,11 @@ fn elements_are_fixed_to_links_of_a_chain() {
     let text = jointplay::scene::built_in_text("chain").unwrap();
     let with = |element: &str| Scene::parse(&format!("{text}\n{element}"), None, &[]);
     // Strong beside gravity: long before a ball has crossed its play the link moves as if it were alone.
-    let scene =
-        with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");
+    let scene = with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");
     let mut simulation = Simulation::new(&scene.unwrap()).unwrap();
     let before = at(&mut simulation, 0.0).bodies[2].position;
     let frame = at(&mut simulation, 1e-3);
-    assert!(
-        frame
-            .joints
-            .iter()
-            .all(|joint| joint.normal_force.norm() == 0.0)
-    );
+    assert!(frame.joints.iter().all(|joint| joint.normal_force.norm() == 0.0));
     let moved = frame.bodies[2].position - before;
     let expected = Vec3::new(0.0, 40.0 / 0.384, -9.81) * 0.5e-6;
     assert!((moved - expected).norm() < 1e-12, "{moved} {expected}");
@@ -236,9 +212,7 @@ fn elements_are_fixed_to_links_of_a_chain() {
         ("free2", "link3", "already a joint or force element"),
         ("push", "link9", "link8"),
     ] {
-        let load = format!(
-            "[[load]]\nname = \"{name}\"\non = {{ body = \"{body}\" }}\nforce = \"1 0 0 N\"\n"
-        );
+        let load = format!("[[load]]\nname = \"{name}\"\non = {{ body = \"{body}\" }}\nforce = \"1 0 0 N\"\n");
         let error = with(&load).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
@@ -272,19 +246,10 @@ fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
         let mut simulation = Simulation::new(&Scene::parse(text, None, &changes).unwrap()).unwrap();
         let frame = at(&mut simulation, 0.2);
         let stored = 0.5 * 300.0 * 0.01 * 0.01;
-        assert!(
-            (frame.elastic - stored).abs() < 1e-6 * stored,
-            "{formulation}"
-        );
+        assert!((frame.elastic - stored).abs() < 1e-6 * stored, "{formulation}");
         let ledger = simulation.ledger().unwrap();
-        assert!(
-            (ledger.drive_work / stored - 1.0).abs() < 1e-5,
-            "{formulation}: {ledger:?}"
-        );
-        assert!(
-            (frame.actuators[0] - 300.0 * 0.01).abs() < 1e-5,
-            "{formulation}"
-        );
+        assert!((ledger.drive_work / stored - 1.0).abs() < 1e-5, "{formulation}: {ledger:?}");
+        assert!((frame.actuators[0] - 300.0 * 0.01).abs() < 1e-5, "{formulation}");
     }
 }
 
@@ -329,9 +294,7 @@ fn bad_elements_are_refused_where_they_stand() {
         let text = format!(
             "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = [0, 0, 0] }}\n{more}"
         );
-        Scene::parse(&text, Some("mine.toml"), &[])
-            .unwrap_err()
-            .to_string()
+        Scene::parse(&text, Some("mine.toml"), &[]).unwrap_err().to_string()
     };
     for (more, said) in [
         ("[[spring]]\nname = \"s\"\n", ["spring.s.from", "missing"]),
@@ -347,10 +310,7 @@ fn bad_elements_are_refused_where_they_stand() {
             "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\nstifness = \"1 N/m\"\n",
             ["stifness", "stiffness"],
         ),
-        (
-            "[[load]]\nname = \"f\"\non = { body = \"world\" }\nforce = \"1 0 0 N\"\n",
-            ["load.f.on", "not on the world"],
-        ),
+        ("[[load]]\nname = \"f\"\non = { body = \"world\" }\nforce = \"1 0 0 N\"\n", ["load.f.on", "not on the world"]),
         (
             "[[load]]\nname = \"f\"\non = { body = \"mass\" }\nfrequency = \"2 Hz\"\n",
             ["load.f", "does nothing: force, torque are 0"],
@@ -359,10 +319,7 @@ fn bad_elements_are_refused_where_they_stand() {
             "[[load]]\nname = \"free\"\non = { body = \"mass\" }\nforce = \"1 0 0 N\"\n",
             ["load.free.name", "already a joint or force element"],
         ),
-        (
-            "[[load]]\nname = \"f\"\non = { body = \"mass\" }\naxes = \"bodies\"\n",
-            ["axes", "world, body"],
-        ),
+        ("[[load]]\nname = \"f\"\non = { body = \"mass\" }\naxes = \"bodies\"\n", ["axes", "world, body"]),
     ] {
         let message = error(more);
         for said in said {
@@ -400,11 +357,7 @@ stiffness = \"2 kN/m\"
 side = \"push\"
 ";
     for (method, formulation) in FOUR_WAYS {
-        let changes = [
-            ("solver.method", method),
-            ("solver.tolerance", "1e-9"),
-            ("formulation", formulation),
-        ];
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = Simulation::new(&parse(text, &changes)).unwrap();
         // Where it leaves the spring: half k 0.04^2 - m g 0.04 = half m v^2.
         let speed = (2000.0 * 0.04_f64.powi(2) / 0.5 - 2.0 * 9.81 * 0.04).sqrt();
@@ -420,23 +373,15 @@ side = \"push\"
         }
         assert!((highest - top).abs() < 1e-4, "{method}: {highest} {top}");
         let ledger = simulation.ledger().unwrap();
-        assert!(
-            ledger.relative_residual().abs() < 1e-6,
-            "{method} {ledger:?}"
-        );
+        assert!(ledger.relative_residual().abs() < 1e-6, "{method} {ledger:?}");
     }
     // Preloaded and damped: energy balances though the spring goes slack.
-    let damped = text.replace(
-        "stiffness = \"2 kN/m\"",
-        "stiffness = \"2 kN/m\"\ndamping = \"5 N s/m\"\npreload = \"-10 N\"",
-    );
+    let damped =
+        text.replace("stiffness = \"2 kN/m\"", "stiffness = \"2 kN/m\"\ndamping = \"5 N s/m\"\npreload = \"-10 N\"");
     let mut simulation = Simulation::new(&parse(&damped, &[("solver.tolerance", "1e-9")])).unwrap();
     simulation.advance_to(1.0).unwrap();
     let ledger = simulation.ledger().unwrap();
     // What is left in the spring as it lets go is lost in its damper, while the mass is in free flight and steps are long.
     let residual = ledger.relative_residual().abs();
-    assert!(
-        ledger.damping_loss > 0.1 && residual < 1e-3,
-        "{residual:e} {ledger:?}"
-    );
+    assert!(ledger.damping_loss > 0.1 && residual < 1e-3, "{residual:e} {ledger:?}");
 }

@@ -35,10 +35,7 @@ fn change(numbers: &mut Numbers, simulation: &Simulation) -> (String, String) {
     let x = numbers.next();
     match numbers.below(3) {
         // 0.01 mm to 3 mm.
-        0 => (
-            format!("{of}.clearance"),
-            format!("{:e} mm", 0.01 * 300_f64.powf(x)),
-        ),
+        0 => (format!("{of}.clearance"), format!("{:e} mm", 0.01 * 300_f64.powf(x))),
         1 => (format!("{of}.friction"), format!("{:e}", 1.5 * x)),
         _ => (format!("{of}.restitution"), format!("{x:e}")),
     }
@@ -81,9 +78,7 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
                 let play = |simulation: &mut Simulation, way: &[(String, String)]| {
                     for (n, (key, value)) in way.iter().enumerate() {
                         simulation.set(key, value).unwrap();
-                        simulation
-                            .advance_to(shown + (n + 1) as f64 * pace / 60.0)
-                            .unwrap();
+                        simulation.advance_to(shown + (n + 1) as f64 * pace / 60.0).unwrap();
                     }
                     simulation.state_hash()
                 };
@@ -92,18 +87,10 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
                 }
                 let first = play(&mut simulation, &way);
                 simulation.restore(&snapshot);
-                assert_eq!(
-                    play(&mut simulation, &way),
-                    first,
-                    "seed {seed}, t = {shown}"
-                );
+                assert_eq!(play(&mut simulation, &way), first, "seed {seed}, t = {shown}");
                 let mut other = Simulation::new(&scene(name, &[])).unwrap();
                 other.restore(&snapshot);
-                assert_eq!(
-                    play(&mut other, &way),
-                    first,
-                    "elsewhere, seed {seed}, t = {shown}"
-                );
+                assert_eq!(play(&mut other, &way), first, "elsewhere, seed {seed}, t = {shown}");
                 simulation.restore(&snapshot);
                 restored += 1;
             }
@@ -206,14 +193,7 @@ fn long(
     period: f64,
     limits: [Option<f64>; 2],
 ) -> Long {
-    Long {
-        scene,
-        what,
-        changes,
-        period,
-        limits,
-        presets: FAST.len(),
-    }
+    Long { scene, what, changes, period, limits, presets: FAST.len() }
 }
 
 /// Cheap enough for every run of the tests, with the preset that is asked for settled motion.
@@ -221,46 +201,19 @@ fn short_list() -> [Long; 3] {
     [
         long("spcmm", "as it is", &[], SPCMM_PERIOD, SETTLED),
         long("spcmm", "ideal", &[IDEAL], SPCMM_PERIOD, ROUNDING),
-        long(
-            "slider-crank-driven",
-            "ideal",
-            &[IDEAL],
-            CRANK_PERIOD,
-            ROUNDING,
-        ),
+        long("slider-crank-driven", "ideal", &[IDEAL], CRANK_PERIOD, ROUNDING),
     ]
 }
 
 fn long_list() -> Vec<Long> {
     let one_ideal = &[("joint.S1.clearance", "0")];
     let mut list = Vec::from(short_list());
-    list.push(long(
-        "spcmm",
-        "one joint ideal",
-        one_ideal,
-        SPCMM_PERIOD,
-        SETTLED,
-    ));
-    list.push(long(
-        "slider-crank-driven",
-        "as it is",
-        &[],
-        CRANK_PERIOD,
-        [None; 2],
-    ));
+    list.push(long("spcmm", "one joint ideal", one_ideal, SPCMM_PERIOD, SETTLED));
+    list.push(long("slider-crank-driven", "as it is", &[], CRANK_PERIOD, [None; 2]));
     list.push(long("pendulum", "as it is", &[], 1.0, [None; 2]));
-    list.push(long(
-        "slider-crank",
-        "free, ideal",
-        &[IDEAL],
-        1.0,
-        [None; 2],
-    ));
+    list.push(long("slider-crank", "free, ideal", &[IDEAL], 1.0, [None; 2]));
     // Many loose balls take long: with the fastest preset alone.
-    let many = |scene, what, changes| Long {
-        presets: 1,
-        ..long(scene, what, changes, 1.0, [None; 2])
-    };
+    let many = |scene, what, changes| Long { presets: 1, ..long(scene, what, changes, 1.0, [None; 2]) };
     list.push(many("hexapod", "as it is", &[]));
     list.push(many("chain", "16 links", &[("chain.links", "16")]));
     list
@@ -326,23 +279,11 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
 fn holds(of: &Long, preset: usize, drift: &Drift) {
     let what = format!("{} {}, {}", of.scene, of.what, FAST[preset]);
     assert!(drift.open < 1e-12, "{what}: open by {:e} m", drift.open);
-    assert!(
-        drift.skew < 1e-12,
-        "{what}: orientation off by {:e}",
-        drift.skew
-    );
-    assert!(
-        drift.residual < RESIDUAL[preset],
-        "{what}: residual {:e}",
-        drift.residual
-    );
+    assert!(drift.skew < 1e-12, "{what}: orientation off by {:e}", drift.skew);
+    assert!(drift.residual < RESIDUAL[preset], "{what}: residual {:e}", drift.residual);
     if let Some(limit) = of.limits[preset] {
         assert!(drift.energy < limit, "{what}: energy {:e}", drift.energy);
-        assert!(
-            drift.force < 10.0 * limit,
-            "{what}: force {:e}",
-            drift.force
-        );
+        assert!(drift.force < 10.0 * limit, "{what}: force {:e}", drift.force);
     }
 }
 
@@ -368,9 +309,7 @@ fn write_a_thousand_seconds_of_every_kind() {
          |---|---|---|---|---|---|---|---|---|\n",
     );
     let list = long_list();
-    let runs = list
-        .iter()
-        .flat_map(|of| (0..of.presets).map(move |preset| (of, preset)));
+    let runs = list.iter().flat_map(|of| (0..of.presets).map(move |preset| (of, preset)));
     let runs: Vec<(&Long, usize)> = runs.collect();
     // The longest runs are the last.
     let left = Mutex::new(runs.clone());
@@ -401,22 +340,12 @@ fn write_a_thousand_seconds_of_every_kind() {
         let _ = writeln!(
             page,
             "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
-            of.scene,
-            of.what,
-            FAST[preset],
-            d.steps,
-            d.contacts,
-            d.open,
-            d.skew,
-            d.energy,
-            d.residual
+            of.scene, of.what, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy, d.residual
         );
         holds(of, preset, &d);
     }
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
     let kept = std::fs::read_to_string(&path).unwrap();
-    let at = kept
-        .find("\n## 1000 simulated seconds\n")
-        .unwrap_or(kept.len());
+    let at = kept.find("\n## 1000 simulated seconds\n").unwrap_or(kept.len());
     std::fs::write(path, kept[..at].to_owned() + &page).unwrap();
 }

@@ -5,17 +5,11 @@ use jointplay::scene::built_in_text;
 use jointplay::simulate::{Frame, Simulation};
 
 /// Elastic and frictionless contacts; the tolerance at which 1 s of impacts keeps its energy to 1e-6.
-const ELASTIC: [(&str, &str); 3] = [
-    ("contact.normal_law", "hertz"),
-    ("contact.friction_law", "none"),
-    ("solver.tolerance", "1e-11"),
-];
+const ELASTIC: [(&str, &str); 3] =
+    [("contact.normal_law", "hertz"), ("contact.friction_law", "none"), ("solver.tolerance", "1e-11")];
 /// Restitution 1 makes every damped law elastic too.
-const RESTITUTION_ONE: [(&str, &str); 3] = [
-    ("contact.restitution", "1"),
-    ("contact.friction", "0"),
-    ("solver.tolerance", "1e-11"),
-];
+const RESTITUTION_ONE: [(&str, &str); 3] =
+    [("contact.restitution", "1"), ("contact.friction", "0"), ("solver.tolerance", "1e-11")];
 
 /// Largest change of the total energy over `duration`, relative to the largest kinetic plus elastic energy; and impacts.
 fn drift(simulation: &mut Simulation, duration: f64) -> (f64, u64) {
@@ -29,10 +23,7 @@ fn drift(simulation: &mut Simulation, duration: f64) -> (f64, u64) {
         worst = worst.max((frame.kinetic + frame.potential - start).abs());
         largest = largest.max(frame.kinetic + frame.elastic);
     }
-    (
-        worst / largest,
-        simulation.statistics().impacts.iter().sum(),
-    )
+    (worst / largest, simulation.statistics().impacts.iter().sum())
 }
 
 #[test]
@@ -49,10 +40,7 @@ fn elastic_impacts_keep_the_total_energy_for_a_second() {
         let changes = [changes, elastic].concat();
         let mut simulation = simulation(name, &changes);
         let (drift, impacts) = drift(&mut simulation, 1.0);
-        println!(
-            "{name} {}: {drift:.2e} over {impacts} impacts",
-            elastic[0].0
-        );
+        println!("{name} {}: {drift:.2e} over {impacts} impacts", elastic[0].0);
         assert!(impacts > 10, "{name}: only {impacts} impacts");
         assert!(drift < 1e-6, "{name} {changes:?}: {drift:e}");
     }
@@ -65,9 +53,7 @@ fn ideal_pendulum(angle: &str, angular_velocity: &str) -> Simulation {
     assert!(text.contains(start));
     let text = text.replace(
         start,
-        &format!(
-            "rotation = {{ axis = [0, 1, 0], angle = \"{angle}\" }}\nangular_velocity = \"{angular_velocity}\""
-        ),
+        &format!("rotation = {{ axis = [0, 1, 0], angle = \"{angle}\" }}\nangular_velocity = \"{angular_velocity}\""),
     );
     let changes = [("contact.clearance", "0"), ("solver.tolerance", "1e-12")];
     Simulation::new(&parse(&text, &changes)).unwrap()
@@ -93,9 +79,7 @@ fn ideal_pendulum_keeps_energy_and_vertical_angular_momentum() {
         energy_error = energy_error.max((frame.kinetic + frame.potential - energy).abs());
         momentum_error = momentum_error.max((momentum(&frame) - vertical).abs());
     }
-    println!(
-        "energy {energy_error:.2e} J, vertical angular momentum {momentum_error:.2e} kg m^2/s"
-    );
+    println!("energy {energy_error:.2e} J, vertical angular momentum {momentum_error:.2e} kg m^2/s");
     // Tolerance 1e-12 per step, a few thousand steps.
     assert!(energy_error < 1e-9 * energy.abs());
     assert!(momentum_error < 1e-9 * vertical.abs());
@@ -109,9 +93,8 @@ fn small_swings_have_the_period_of_the_compound_pendulum() {
     let (mass, arm) = (body.mass, 0.1);
     let about_pivot = body.inertia[(1, 1)] + mass * arm * arm;
     // First term of the series in the amplitude; the next is 1e-14.
-    let expected = std::f64::consts::TAU
-        * (about_pivot / (mass * 9.81 * arm)).sqrt()
-        * (1.0 + amplitude * amplitude / 16.0);
+    let expected =
+        std::f64::consts::TAU * (about_pivot / (mass * 9.81 * arm)).sqrt() * (1.0 + amplitude * amplitude / 16.0);
     let mut frame = Frame::default();
     let mut crossings = Vec::new();
     simulation.sample(0.0, &mut frame);
@@ -137,20 +120,13 @@ fn small_swings_have_the_period_of_the_compound_pendulum() {
     }
     let period = crossings[2] - crossings[0];
     println!("period {period:.9} s, expected {expected:.9} s");
-    assert!(
-        (period / expected - 1.0).abs() < 1e-8,
-        "{period} {expected}"
-    );
+    assert!((period / expected - 1.0).abs() < 1e-8, "{period} {expected}");
 }
 
 /// Gauss-Legendre nodes and weights on 0..1: exact up to degree 5.
 fn gauss() -> [(f64, f64); 3] {
     let d = 0.5 * 0.6_f64.sqrt();
-    [
-        (0.5 - d, 5.0 / 18.0),
-        (0.5, 8.0 / 18.0),
-        (0.5 + d, 5.0 / 18.0),
-    ]
+    [(0.5 - d, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + d, 5.0 / 18.0)]
 }
 
 /// Work of the actuators minus change of energy, J, at its worst over `duration`; the largest |work|; impacts.
@@ -215,8 +191,7 @@ fn actuators_do_the_work_that_the_energy_gains() {
             changes.retain(|c| c.0 != "solver.tolerance");
             changes.push(("solver.tolerance", "1e-9"));
         }
-        let all_ideal = changes.contains(&ideal("contact.clearance"))
-            || changes.contains(&ideal("joint.C.clearance"));
+        let all_ideal = changes.contains(&ideal("contact.clearance")) || changes.contains(&ideal("joint.C.clearance"));
         let duration = if all_ideal { 0.4 } else { 0.05 };
         let mut simulation = simulation(name, &changes);
         let (worst, work, impacts) = power_balance(&mut simulation, duration);
@@ -226,10 +201,7 @@ fn actuators_do_the_work_that_the_energy_gains() {
         );
         assert_eq!(impacts == 0, all_ideal);
         assert!(work > 1e-3, "{name}: {work}");
-        assert!(
-            worst < bound * work,
-            "{name} {changes:?}: {worst:e} of {work:e}"
-        );
+        assert!(worst < bound * work, "{name} {changes:?}: {worst:e} of {work:e}");
     }
 }
 
@@ -249,11 +221,7 @@ fn friction_and_damping_only_take_energy() {
             simulation.sample(simulation.time(), &mut frame);
             // Free of the elastic part's exchange with the damper: total energy never rises.
             let energy = frame.kinetic + frame.potential;
-            assert!(
-                energy < lowest + 1e-8,
-                "{name}, {}: {energy} after {lowest}",
-                frame.time
-            );
+            assert!(energy < lowest + 1e-8, "{name}, {}: {energy} after {lowest}", frame.time);
             lowest = lowest.min(energy);
             highest = highest.max(energy);
         }

@@ -10,8 +10,7 @@ const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e
 fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
     let joints = &simulation.scene().ball_joints;
     joints.iter().zip(&frame.joints).any(|(joint, report)| {
-        (joint.ball.body == Some(b) || joint.socket.body == Some(b))
-            && report.state != ContactState::Free
+        (joint.ball.body == Some(b) || joint.socket.body == Some(b)) && report.state != ContactState::Free
     })
 }
 
@@ -31,9 +30,7 @@ fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
             simulation.sample(time, &mut inside);
             let s = time - before.time;
             for (b, body) in inside.bodies.iter().enumerate() {
-                let free = [&before, &inside, &after]
-                    .iter()
-                    .all(|frame| !touches(&simulation, frame, b));
+                let free = [&before, &inside, &after].iter().all(|frame| !touches(&simulation, frame, b));
                 if !free {
                     stood += 1;
                     continue;
@@ -44,10 +41,7 @@ fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
                 let position = start.position + (start.velocity + gravity * (0.5 * s)) * s;
                 assert!((body.position - position).norm() < 1e-14, "{b} at {time}");
                 assert!((body.velocity - velocity).norm() < 1e-13, "{b} at {time}");
-                assert!(
-                    (body.acceleration - gravity).norm() < 1e-12,
-                    "{b} at {time}"
-                );
+                assert!((body.acceleration - gravity).norm() < 1e-12, "{b} at {time}");
             }
         }
     }
@@ -58,14 +52,7 @@ fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
 fn bodies_in_flight_cost_no_evaluation_and_the_rest_is_as_with_all() {
     // Dormand-Prince evaluates every body at every stage.
     let peaks = |method: &str| {
-        let mut simulation = simulation(
-            "chain",
-            &[
-                CHAIN[0],
-                ("solver.tolerance", "1e-8"),
-                ("solver.method", method),
-            ],
-        );
+        let mut simulation = simulation("chain", &[CHAIN[0], ("solver.tolerance", "1e-8"), ("solver.method", method)]);
         while simulation.time() < 14e-3 {
             simulation.step_until(14e-3).expect("runs");
         }

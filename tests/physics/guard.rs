@@ -43,34 +43,18 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
         for method in ["semi-implicit-euler", "rk4"] {
             let mut simulation = simulation(
                 name,
-                &[
-                    ("solver.method", method),
-                    ("solver.step", "10 ms"),
-                    ("contact.youngs_modulus", "1000 GPa"),
-                ],
+                &[("solver.method", method), ("solver.step", "10 ms"), ("contact.youngs_modulus", "1000 GPa")],
             );
             let stopped = run_to_stop(&mut simulation);
             println!("{name}, {method}: {stopped}");
             let text = stopped.to_string();
             let scene = simulation.scene();
-            let joints = scene
-                .ball_joints
-                .iter()
-                .map(|j| format!("ball joint {}", j.name));
+            let joints = scene.ball_joints.iter().map(|j| format!("ball joint {}", j.name));
             let bodies = scene.bodies.iter().map(|b| format!("body {}", b.name));
-            assert!(
-                joints.chain(bodies).any(|named| text.contains(&named)),
-                "{text}"
-            );
+            assert!(joints.chain(bodies).any(|named| text.contains(&named)), "{text}");
             assert!(text.contains(&format!("{:.6e} s", stopped.time)), "{text}");
             assert!(stopped.advice.to_string().contains("solver.step"), "{text}");
-            assert!(
-                stopped
-                    .advice
-                    .to_string()
-                    .contains("solver.method = automatic"),
-                "{text}"
-            );
+            assert!(stopped.advice.to_string().contains("solver.method = automatic"), "{text}");
             still_good(&mut simulation, &stopped);
             // The advice helps from a reset.
             simulation.set("solver.method", "automatic").unwrap();
@@ -82,10 +66,7 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
 
 #[test]
 fn advice_taken_in_mid_run_lets_it_go_on() {
-    let mut simulation = simulation(
-        "pendulum",
-        &[("solver.method", "rk4"), ("solver.step", "10 ms")],
-    );
+    let mut simulation = simulation("pendulum", &[("solver.method", "rk4"), ("solver.step", "10 ms")]);
     let stopped = run_to_stop(&mut simulation);
     simulation.set("solver.step", "1 us").unwrap();
     for _ in 0..100 {
@@ -109,17 +90,11 @@ fn ideal_ball_joints_that_do_not_close_are_named() {
     let ideal = parse(&moved, &[("contact.clearance", "0")]);
     let error = start_error(&ideal);
     println!("{error}");
-    assert!(
-        error.contains("ball joint C") && error.contains("5 mm apart as given"),
-        "{error}"
-    );
+    assert!(error.contains("ball joint C") && error.contains("5 mm apart as given"), "{error}");
     // With play it is outside its socket all the same.
     let error = start_error(&parse(&moved, &[]));
     println!("{error}");
-    assert!(
-        error.contains("ball joint C") && error.contains("clearance"),
-        "{error}"
-    );
+    assert!(error.contains("ball joint C") && error.contains("clearance"), "{error}");
 }
 
 #[test]
@@ -130,10 +105,7 @@ fn a_trajectory_that_the_rods_cannot_reach_names_slider_and_time() {
         println!("{error}");
         assert!(error.starts_with("slider "), "{error}");
         assert!(error.contains(": rod too short at t = "), "{error}");
-        assert!(
-            error.contains("needs 0.2") && error.contains("has 0.2000 m"),
-            "{error}"
-        );
+        assert!(error.contains("needs 0.2") && error.contains("has 0.2000 m"), "{error}");
     }
     // A live change of it waits, and a reset that cannot start leaves the run as it is.
     let mut simulation = simulation("spcmm", &[]);
@@ -175,10 +147,7 @@ fn a_start_in_a_singular_pose_is_refused() {
     // The slider plane level with the hinges: the rods cannot hold the platform.
     for plane in ["175 mm", "174.9999999 mm", "175.000000001 mm"] {
         for clearance in ["0", "0.3 mm"] {
-            let changes = [
-                ("spcmm.slider_plane", plane),
-                ("contact.clearance", clearance),
-            ];
+            let changes = [("spcmm.slider_plane", plane), ("contact.clearance", clearance)];
             let error = start_error(&scene("spcmm", &changes));
             assert!(error.contains("singular pose"), "{error}");
         }
@@ -195,14 +164,8 @@ fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
     let text = stopped.to_string();
-    assert!(
-        text.contains("body crank") || text.contains("ball joint C"),
-        "{text}"
-    );
-    assert!(
-        stopped.advice.to_string().contains("slower drives"),
-        "{text}"
-    );
+    assert!(text.contains("body crank") || text.contains("ball joint C"), "{text}");
+    assert!(stopped.advice.to_string().contains("slower drives"), "{text}");
     still_good(&mut simulation, &stopped);
 }
 
@@ -214,18 +177,12 @@ fn loops_that_pass_a_singular_pose_say_so() {
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
     assert!(stopped.fault.to_string().contains("loops"), "{stopped}");
-    assert!(
-        stopped.advice.to_string().contains("clearance"),
-        "{stopped}"
-    );
+    assert!(stopped.advice.to_string().contains("clearance"), "{stopped}");
     assert!((stopped.time - 0.074).abs() < 2e-3);
     // Deeper in the range a step may jump over the pose onto another branch: its sign gives it away.
     let deeper = [("contact.clearance", "0"), ("spcmm.slider_plane", "170 mm")];
     let stopped = run_to_stop(&mut self::simulation("spcmm", &deeper));
-    assert!(
-        stopped.fault.to_string().contains("singular pose"),
-        "{stopped}"
-    );
+    assert!(stopped.fault.to_string().contains("singular pose"), "{stopped}");
     let hash = simulation.state_hash();
     assert!(simulation.step().is_err());
     assert_eq!(simulation.state_hash(), hash);
@@ -242,14 +199,8 @@ fn the_other_form_stops_before_a_singular_pose_too() {
     let mut simulation = simulation("spcmm", &changes);
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
-    assert!(
-        stopped.fault.to_string().contains("singular pose"),
-        "{stopped}"
-    );
-    assert!(
-        stopped.advice.to_string().contains("clearance"),
-        "{stopped}"
-    );
+    assert!(stopped.fault.to_string().contains("singular pose"), "{stopped}");
+    assert!(stopped.advice.to_string().contains("clearance"), "{stopped}");
     // Where the tree form stops, and not by creeping closer until no number is left.
     assert!((stopped.time - 1.066e-3).abs() < 2e-6, "{stopped}");
     assert!(simulation.statistics().steps < 1000);

@@ -39,10 +39,7 @@ fn settled_forces_are_right_within_a_per_cent_at_steps_far_beyond_the_contacts_p
 #[test]
 fn a_step_costs_one_evaluation_and_one_more_for_reactions() {
     for name in crate::common::SCENES {
-        let mut simulation = simulation(
-            name,
-            &[("solver.method", "imex-euler"), ("solver.step", "200 us")],
-        );
+        let mut simulation = simulation(name, &[("solver.method", "imex-euler"), ("solver.step", "200 us")]);
         simulation.advance_to(0.05).unwrap();
         let statistics = simulation.statistics();
         let reactions = simulation.mechanism().has_reactions();
@@ -65,34 +62,23 @@ fn the_peak_of_an_ideal_joint_is_that_of_its_rows() {
         }
     }
     let found = simulation.statistics().peak_normal[0];
-    assert!(
-        rows > 200.0 && (found / rows - 1.0).abs() < 1e-2,
-        "{found} {rows}"
-    );
+    assert!(rows > 200.0 && (found / rows - 1.0).abs() < 1e-2, "{found} {rows}");
     assert!(simulation.peak(0).0 >= rows);
 }
 
 #[test]
 fn no_step_creates_energy() {
     for step in ["1 us", "10 us", "50 us", "200 us", "1 ms"] {
-        for (name, friction) in [
-            ("pendulum", "0"),
-            ("pendulum", "0.15"),
-            ("pendulum", "10"),
-            ("chain", "0.15"),
-            ("slider-crank", "0.15"),
-        ] {
+        for (name, friction) in
+            [("pendulum", "0"), ("pendulum", "0.15"), ("pendulum", "10"), ("chain", "0.15"), ("slider-crank", "0.15")]
+        {
             if friction == "10" && step == "1 ms" {
                 // Friction and normal force of such a step need not have a common solution.
                 continue;
             }
             let mut simulation = simulation(
                 name,
-                &[
-                    ("solver.method", "imex-euler"),
-                    ("solver.step", step),
-                    ("contact.friction", friction),
-                ],
+                &[("solver.method", "imex-euler"), ("solver.step", step), ("contact.friction", friction)],
             );
             let start = frame_now(&mut simulation);
             let energy = start.kinetic + start.potential;
@@ -107,10 +93,7 @@ fn no_step_creates_energy() {
                 exchanged = exchanged.max(frame.kinetic);
             }
             println!("{name}, {friction}, {step}: {:.2e}", most / exchanged);
-            assert!(
-                most <= 0.01 * exchanged,
-                "{name}, friction {friction}, {step}: {most:e} of {exchanged:e} J"
-            );
+            assert!(most <= 0.01 * exchanged, "{name}, friction {friction}, {step}: {most:e} of {exchanged:e} J");
         }
     }
 }
@@ -127,18 +110,11 @@ fn on_settled_contacts_the_error_shrinks_with_the_step() {
         let mut simulation = Simulation::new(&scene("spcmm", &[])).unwrap();
         simulation.restore(&start);
         simulation.set("solver.method", "imex-euler").unwrap();
-        simulation
-            .set("solver.step", &format!("{step} us"))
-            .unwrap();
+        simulation.set("solver.step", &format!("{step} us")).unwrap();
         crate::common::run_until(&mut simulation, end);
         let scale = simulation.mechanism().scale();
-        let error = simulation
-            .state()
-            .iter()
-            .zip(&exact)
-            .zip(scale)
-            .map(|((a, b), s)| (a - b).abs() / s)
-            .fold(0.0, f64::max);
+        let error =
+            simulation.state().iter().zip(&exact).zip(scale).map(|((a, b), s)| (a - b).abs() / s).fold(0.0, f64::max);
         (step, error)
     });
     let found = slope(&points);
@@ -148,15 +124,6 @@ fn on_settled_contacts_the_error_shrinks_with_the_step() {
 
 #[test]
 fn too_long_a_step_is_announced_as_what_it_costs() {
-    let warnings = scene(
-        "spcmm",
-        &[("solver.method", "imex-euler"), ("solver.step", "100 us")],
-    )
-    .warnings();
-    assert!(
-        warnings
-            .iter()
-            .any(|w| w.to_string().contains("stays stable")),
-        "{warnings:?}"
-    );
+    let warnings = scene("spcmm", &[("solver.method", "imex-euler"), ("solver.step", "100 us")]).warnings();
+    assert!(warnings.iter().any(|w| w.to_string().contains("stays stable")), "{warnings:?}");
 }

@@ -1,9 +1,7 @@
 //! One ball and one socket: restitution of every law, friction, contacts that exist at the start.
 
 use crate::common::{frame_now, parse};
-use jointplay::contact::{
-    NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
-};
+use jointplay::contact::{NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution};
 use jointplay::scene::Vec3;
 use jointplay::simulate::{ContactState, Frame, Simulation};
 
@@ -13,13 +11,7 @@ const RADIUS: f64 = 0.010;
 const CLEARANCE: f64 = 0.3e-3;
 
 /// A ball of 10 mm, free in a socket fixed to the world, gravity `gravity` along x: m, m/s, rad/s.
-fn ball(
-    position: Vec3,
-    velocity: Vec3,
-    spin: Vec3,
-    gravity: f64,
-    changes: &[(&str, &str)],
-) -> Simulation {
+fn ball(position: Vec3, velocity: Vec3, spin: Vec3, gravity: f64, changes: &[(&str, &str)]) -> Simulation {
     let vector = |v: Vec3, unit: &str| format!("\"{:e} {:e} {:e} {unit}\"", v.x, v.y, v.z);
     let text = format!(
         r#"
@@ -74,11 +66,7 @@ fn restitution_by_quadrature(chi: f64) -> f64 {
             i if i % 2 == 1 => 4.0,
             _ => 2.0,
         };
-        (0..=n)
-            .map(|i| weight(i) * f(f64::from(i) * h))
-            .sum::<f64>()
-            * h
-            / 3.0
+        (0..=n).map(|i| weight(i) * f(f64::from(i) * h)).sum::<f64>() * h / 3.0
     };
     let compression = simpson(1.0, &|u| u / (1.0 + chi * u));
     let (mut low, mut high) = (0.0, 1.0_f64.min(0.999 / chi));
@@ -95,13 +83,7 @@ fn restitution_by_quadrature(chi: f64) -> f64 {
 
 /// Speed after over speed before the first impact of a ball flung along x.
 fn rebound(speed: f64, changes: &[(&str, &str)]) -> (f64, Simulation) {
-    let mut simulation = ball(
-        Vec3::zeros(),
-        Vec3::x() * speed,
-        Vec3::zeros(),
-        0.0,
-        changes,
-    );
+    let mut simulation = ball(Vec3::zeros(), Vec3::x() * speed, Vec3::zeros(), 0.0, changes);
     while simulation.statistics().last_separation[0].is_none() {
         simulation.step().unwrap();
         assert!(simulation.time() < 1.0);
@@ -131,19 +113,13 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
             let expected = undisturbed_restitution(chi);
             if chi > 0.0 {
                 let quadrature = restitution_by_quadrature(chi);
-                assert!(
-                    (quadrature - expected).abs() < 1e-5,
-                    "{name} {ce}: {quadrature}"
-                );
+                assert!((quadrature - expected).abs() < 1e-5, "{name} {ce}: {quadrature}");
             }
             let changes = [("contact.normal_law", name), ("contact.restitution", ce)];
             for speed in [0.02, 0.5] {
                 let (got, _) = rebound(speed, &changes);
                 worst = worst.max((got - expected).abs());
-                assert!(
-                    (got - expected).abs() < 1e-7,
-                    "{name}, {ce}, {speed} m/s: {got} against {expected}"
-                );
+                assert!((got - expected).abs() < 1e-7, "{name}, {ce}, {speed} m/s: {got} against {expected}");
             }
         }
     }
@@ -215,12 +191,7 @@ fn contacts_that_exist_at_the_start_take_the_floor() {
 fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
     let load = MASS * 9.81;
     // (slip speed, share of cf): full above v_theta = 1e-4 m/s, linear above v_a = 1e-6 m/s, none below.
-    for (speed, share) in [
-        (0.05, 1.0),
-        (2e-4, 1.0),
-        (0.4e-4, (0.4e-4 - 1e-6) / (1e-4 - 1e-6)),
-        (0.9e-6, 0.0),
-    ] {
+    for (speed, share) in [(0.05, 1.0), (2e-4, 1.0), (0.4e-4, (0.4e-4 - 1e-6) / (1e-4 - 1e-6)), (0.9e-6, 0.0)] {
         for reading in ["centres", "surface"] {
             let slip = Vec3::new(0.0, 0.6, -0.8) * speed;
             let changes = [("contact.friction_velocity", reading)];
@@ -228,17 +199,9 @@ fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
             let joint = &frame.joints[0];
             let expected = slip * (-0.2 * share * load / speed);
             let off = (joint.friction_force - expected).norm();
-            assert!(
-                off < 1e-8 * load,
-                "{reading} {speed}: {}",
-                joint.friction_force
-            );
+            assert!(off < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
             assert!((joint.slip_speed - speed).abs() < 1e-12);
-            let state = if speed < 1e-4 {
-                ContactState::Stick
-            } else {
-                ContactState::Slip
-            };
+            let state = if speed < 1e-4 { ContactState::Stick } else { ContactState::Slip };
             assert_eq!(joint.state, state);
             // Newton and Euler about the centroid, the force at r n.
             let body = &frame.bodies[0];

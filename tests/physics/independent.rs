@@ -49,14 +49,10 @@ fn integrate(equations: &impl Equations, solver: Solver, tolerance: f64, end: f6
     let mut y = equations.start();
     let mut t = 0.0;
     let mut active: Vec<Option<f64>> = vec![None; equations.gaps(t, &y).len()];
-    let mut run = Run {
-        y: Vec::new(),
-        contacts: Vec::new(),
-    };
+    let mut run = Run { y: Vec::new(), contacts: Vec::new() };
     equations.remember(&active);
     while t < end {
-        let (t_next, y_next, root) =
-            segment(equations, solver, tolerance, t, end, &y, &active, &mut run);
+        let (t_next, y_next, root) = segment(equations, solver, tolerance, t, end, &y, &active, &mut run);
         (t, y) = (t_next, y_next);
         if let Some(j) = root {
             active[j] = match active[j] {
@@ -103,11 +99,7 @@ fn segment(
     };
     let roots = |x: &[f64], _: &[f64], t: f64, out: &mut [f64]| {
         for (j, (out, gap)) in out.iter_mut().zip(equations.gaps(t, x)).enumerate() {
-            let shift = if active[j].is_some() {
-                HYSTERESIS
-            } else {
-                -HYSTERESIS
-            };
+            let shift = if active[j].is_some() { HYSTERESIS } else { -HYSTERESIS };
             *out = gap.0 + shift;
         }
     };
@@ -195,8 +187,7 @@ impl Equations for Borrowed {
         let mut mechanism = self.mechanism.borrow_mut();
         mechanism.measure(t, y);
         let gaps = mechanism.contacts.gaps();
-        gaps.map(|gap| (gap.separation.penetration, gap.separation.rate))
-            .collect()
+        gaps.map(|gap| (gap.separation.penetration, gap.separation.rate)).collect()
     }
 
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {
@@ -241,11 +232,7 @@ impl Pendulum {
         let e = [y[0] + arm[0], y[1] + arm[1]];
         let rate = [y[3] + y[5] * arm[1], y[4] - y[5] * arm[0]];
         let size = e[0].hypot(e[1]);
-        let n = if size > 0.0 {
-            [e[0] / size, e[1] / size]
-        } else {
-            [0.0; 2]
-        };
+        let n = if size > 0.0 { [e[0] / size, e[1] / size] } else { [0.0; 2] };
         (e, rate, n, arm)
     }
 
@@ -271,14 +258,7 @@ impl Pendulum {
 impl Equations for Pendulum {
     fn start(&self) -> Vec<f64> {
         let angle = -30.0_f64.to_radians();
-        vec![
-            -Self::ARM * angle.sin(),
-            -Self::ARM * angle.cos(),
-            angle,
-            0.0,
-            0.0,
-            0.0,
-        ]
+        vec![-Self::ARM * angle.sin(), -Self::ARM * angle.cos(), angle, 0.0, 0.0, 0.0]
     }
 
     fn derivative(&self, _: f64, y: &[f64], dy: &mut [f64]) {
@@ -292,15 +272,8 @@ impl Equations for Pendulum {
         let speed = slip[0].hypot(slip[1]);
         let (low, high) = (1e-6, 1e-4);
         let correction = ((speed - low) / (high - low)).clamp(0.0, 1.0);
-        let friction = if speed > 0.0 {
-            -0.15 * correction * normal / speed
-        } else {
-            0.0
-        };
-        let force = [
-            -normal * n[0] + friction * slip[0],
-            -normal * n[1] + friction * slip[1],
-        ];
+        let friction = if speed > 0.0 { -0.15 * correction * normal / speed } else { 0.0 };
+        let force = [-normal * n[0] + friction * slip[0], -normal * n[1] + friction * slip[1]];
         let at = [arm[0] + r * n[0], arm[1] + r * n[1]];
         dy[..3].copy_from_slice(&y[3..]);
         dy[3] = force[0] / Self::MASS;
@@ -310,10 +283,7 @@ impl Equations for Pendulum {
 
     fn gaps(&self, _: f64, y: &[f64]) -> Vec<(f64, f64)> {
         let (e, rate, n, _) = Self::ball(y);
-        vec![(
-            e[0].hypot(e[1]) - Self::CLEARANCE,
-            n[0] * rate[0] + n[1] * rate[1],
-        )]
+        vec![(e[0].hypot(e[1]) - Self::CLEARANCE, n[0] * rate[0] + n[1] * rate[1])]
     }
 
     fn forces(&self, _: f64, y: &[f64]) -> Vec<f64> {
@@ -385,13 +355,7 @@ impl Machine {
             start.extend(body.velocity.iter());
             start.extend(body.angular_velocity.iter());
         }
-        Self {
-            clearance,
-            friction,
-            printed,
-            start,
-            approach: RefCell::new(vec![None; 3]),
-        }
+        Self { clearance, friction, printed, start, approach: RefCell::new(vec![None; 3]) }
     }
 
     fn bodies(y: &[f64]) -> Vec<Moving> {
@@ -399,9 +363,7 @@ impl Machine {
             let q = nalgebra::Quaternion::new(s[3], s[4], s[5], s[6]);
             Moving {
                 position: Vec3::new(s[0], s[1], s[2]),
-                axes: *nalgebra::UnitQuaternion::from_quaternion(q)
-                    .to_rotation_matrix()
-                    .matrix(),
+                axes: *nalgebra::UnitQuaternion::from_quaternion(q).to_rotation_matrix().matrix(),
                 velocity: Vec3::new(s[7], s[8], s[9]),
                 spin: Vec3::new(s[10], s[11], s[12]),
             }
@@ -413,11 +375,7 @@ impl Machine {
     fn sockets(t: f64) -> [Vec3; 3] {
         let (b, rod, plane) = (0.052, 0.2, 0.060);
         let phase = (std::f64::consts::PI * t).sin();
-        let (xr, beta, gamma) = (
-            0.203 + 0.025 * phase - plane,
-            0.025 * phase,
-            std::f64::consts::PI / 12.0,
-        );
+        let (xr, beta, gamma) = (0.203 + 0.025 * phase - plane, 0.025 * phase, std::f64::consts::PI / 12.0);
         let y = xr * beta.tan();
         let sag = beta.sin() * gamma.tan();
         let level = -(y * sag + xr * beta.cos() * gamma.tan());
@@ -428,19 +386,11 @@ impl Machine {
         let rest = side * side - reach + level * level;
         let f3 = (-half + (half * half - lead * rest).sqrt()) / lead;
         let z = (f3 - y) * sag - xr * beta.cos() * gamma.tan();
-        let w = Vec3::new(
-            beta.cos() * gamma.sin(),
-            beta.sin() * gamma.sin(),
-            gamma.cos(),
-        );
+        let w = Vec3::new(beta.cos() * gamma.sin(), beta.sin() * gamma.sin(), gamma.cos());
         let left = |x: f64, y: f64| (rod * rod - x * x - y * y).sqrt();
         let f1 = b * w.z + z + left(xr + b * w.x, y + b * w.y);
         let f2 = b * w.z - z + left(xr - b * w.x, y - b * w.y);
-        [
-            Vec3::new(plane, 0.0, f1),
-            Vec3::new(plane, 0.0, -f2),
-            Vec3::new(plane, f3, 0.0),
-        ]
+        [Vec3::new(plane, 0.0, f1), Vec3::new(plane, 0.0, -f2), Vec3::new(plane, f3, 0.0)]
     }
 
     /// Their velocities, by central differences of order 8.
@@ -449,10 +399,7 @@ impl Machine {
         let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
         let mut rates = [Vec3::zeros(); 3];
         for (k, weight) in (1..).zip(weights) {
-            let (after, before) = (
-                Self::sockets(t + f64::from(k) * h),
-                Self::sockets(t - f64::from(k) * h),
-            );
+            let (after, before) = (Self::sockets(t + f64::from(k) * h), Self::sockets(t - f64::from(k) * h));
             for j in 0..3 {
                 rates[j] += (after[j] - before[j]) * (weight / h);
             }
@@ -475,13 +422,8 @@ impl Machine {
             let size = e.norm();
             let n = if size > 0.0 { e / size } else { e };
             let (depth, rate) = (size - self.clearance, n.dot(&moving));
-            let mut touch = Touch {
-                force: Vec3::zeros(),
-                at: rod.position + arm + n * Self::RADIUS,
-                depth,
-                rate,
-                normal: 0.0,
-            };
+            let mut touch =
+                Touch { force: Vec3::zeros(), at: rod.position + arm + n * Self::RADIUS, depth, rate, normal: 0.0 };
             let Some(began) = approach[j].filter(|_| depth > 0.0) else {
                 return touch;
             };
@@ -522,9 +464,7 @@ impl Equations for Machine {
             for i in 0..3 {
                 matrix[(6 * b + i, 6 * b + i)] = Self::MASSES[b];
             }
-            matrix
-                .view_mut((6 * b + 3, 6 * b + 3), (3, 3))
-                .copy_from(&inertia);
+            matrix.view_mut((6 * b + 3, 6 * b + 3), (3, 3)).copy_from(&inertia);
             right[6 * b] = 9.81 * Self::MASSES[b];
             let turning = -body.spin.cross(&(inertia * body.spin));
             right.rows_mut(6 * b + 3, 3).copy_from(&turning);
@@ -539,21 +479,9 @@ impl Equations for Machine {
         }
         let platform = &bodies[0];
         let pins = [
-            (
-                Vec3::new(0.0, 0.0, 0.052),
-                Vec3::y(),
-                [Vec3::x(), Vec3::z()],
-            ),
-            (
-                Vec3::new(0.0, 0.0, -0.052),
-                Vec3::y(),
-                [Vec3::x(), Vec3::z()],
-            ),
-            (
-                Vec3::new(0.0, 0.052, 0.0),
-                Vec3::z(),
-                [Vec3::x(), Vec3::y()],
-            ),
+            (Vec3::new(0.0, 0.0, 0.052), Vec3::y(), [Vec3::x(), Vec3::z()]),
+            (Vec3::new(0.0, 0.0, -0.052), Vec3::y(), [Vec3::x(), Vec3::z()]),
+            (Vec3::new(0.0, 0.052, 0.0), Vec3::z(), [Vec3::x(), Vec3::y()]),
         ];
         let mut row = 24;
         let mut set = |row: usize, column: usize, value: f64| {
@@ -564,8 +492,7 @@ impl Equations for Machine {
             let (b, rod) = (j + 1, &bodies[j + 1]);
             let arm = rod.axes * Vec3::new(0.1, 0.0, 0.0);
             let seat = platform.axes * point;
-            let bias = platform.spin.cross(&platform.spin.cross(&seat))
-                - rod.spin.cross(&rod.spin.cross(&arm));
+            let bias = platform.spin.cross(&platform.spin.cross(&seat)) - rod.spin.cross(&rod.spin.cross(&arm));
             for i in 0..3 {
                 let unit = Vec3::ith(i, 1.0);
                 set(row, 6 * b + i, 1.0);
@@ -581,8 +508,7 @@ impl Equations for Machine {
             let along = rod.axes * axis;
             for s in across.map(|s| platform.axes * s) {
                 let lever = along.cross(&s);
-                let turned =
-                    rod.spin.cross(&along).cross(&s) + along.cross(&platform.spin.cross(&s));
+                let turned = rod.spin.cross(&along).cross(&s) + along.cross(&platform.spin.cross(&s));
                 for k in 0..3 {
                     set(row, 6 * b + 3 + k, lever[k]);
                     set(row, 3 + k, -lever[k]);
@@ -606,10 +532,7 @@ impl Equations for Machine {
 
     fn gaps(&self, t: f64, y: &[f64]) -> Vec<(f64, f64)> {
         let touches = self.touches(t, &Self::bodies(y));
-        touches
-            .iter()
-            .map(|touch| (touch.depth, touch.rate))
-            .collect()
+        touches.iter().map(|touch| (touch.depth, touch.rate)).collect()
     }
 
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {
@@ -662,14 +585,8 @@ fn same_contacts(what: &str, ours: &[(usize, f64, f64, f64)], theirs: &[(usize, 
         );
         assert_eq!(a.0, b.0, "{what}");
         assert!((a.1 - b.1).abs() < 1e-9, "{what}: time of contact {n}");
-        assert!(
-            (a.2 / b.2 - 1.0).abs() < 1e-6,
-            "{what}: approach speed of contact {n}"
-        );
-        assert!(
-            (a.3 / b.3 - 1.0).abs() < 1e-5,
-            "{what}: peak of contact {n}"
-        );
+        assert!((a.2 / b.2 - 1.0).abs() < 1e-6, "{what}: approach speed of contact {n}");
+        assert!((a.3 / b.3 - 1.0).abs() < 1e-5, "{what}: peak of contact {n}");
     }
 }
 
@@ -678,9 +595,7 @@ const TIGHT: (&str, &str) = ("solver.tolerance", "1e-11");
 #[test]
 fn the_pendulum_is_that_of_other_equations_and_another_solver() {
     let end = 0.03;
-    let equations = Pendulum {
-        approach: RefCell::new(None),
-    };
+    let equations = Pendulum { approach: RefCell::new(None) };
     for (solver, tolerance) in [(Solver::Tsitouras, 1e-12), (Solver::Bdf, 1e-11)] {
         let theirs = integrate(&equations, solver, tolerance, end);
         for method in ["dopri5", "automatic"] {
@@ -691,12 +606,8 @@ fn the_pendulum_is_that_of_other_equations_and_another_solver() {
             assert!(contacts.len() > 3, "only {} contacts", contacts.len());
             let body = crate::common::frame_now(&mut simulation).bodies[0];
             let angle = body.rotation[(0, 2)].atan2(body.rotation[(2, 2)]);
-            let off = [
-                body.position.x - theirs.y[0],
-                body.position.y,
-                body.position.z - theirs.y[1],
-                angle - theirs.y[2],
-            ];
+            let off =
+                [body.position.x - theirs.y[0], body.position.y, body.position.z - theirs.y[1], angle - theirs.y[2]];
             println!("{what}: off by {off:?} m, m, m, rad");
             assert!(off.iter().all(|off| off.abs() < 1e-9), "{what}: {off:?}");
         }
@@ -758,10 +669,7 @@ pub fn moves_the_same(name: &str, changes: &Changes, end: f64) -> (usize, f64) {
     let positions = equations.mechanism.borrow().positions();
     let pairs = simulation.state()[..positions].iter().zip(&theirs.y);
     let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    println!(
-        "{name}: off by {off:.1e} m or rad, {} contacts",
-        theirs.contacts.len()
-    );
+    println!("{name}: off by {off:.1e} m or rad, {} contacts", theirs.contacts.len());
     (theirs.contacts.len(), off)
 }
 

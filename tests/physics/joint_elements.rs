@@ -102,10 +102,7 @@ fn swing([m, c, k]: [f64; 3], [x, v]: [f64; 2], t: f64) -> [f64; 2] {
     let (sin, cos) = (w * t).sin_cos();
     let (a, b) = (x, (v + d * x) / w);
     let fall = (-d * t).exp();
-    [
-        fall * (a * cos + b * sin),
-        fall * ((b * w - d * a) * cos - (a * w + d * b) * sin),
-    ]
+    [fall * (a * cos + b * sin), fall * ((b * w - d * a) * cos - (a * w + d * b) * sin)]
 }
 
 #[test]
@@ -130,10 +127,7 @@ fn a_joint_spring_swings_as_it_should_in_every_method_and_formulation() {
                 assert!(wrong < bound, "{label}: {wrong:e}");
                 assert!((on.rate(&frame) - rate).abs() < 20.0 * bound, "{label}");
                 let force = on.force(&frame, 0);
-                assert!(
-                    (force + k * off).abs() < 2.0 * k * bound,
-                    "{label}: {force}"
-                );
+                assert!((force + k * off).abs() < 2.0 * k * bound, "{label}: {force}");
                 let elastic = frame.elastic - 0.5 * k * off * off;
                 assert!(elastic.abs() < 0.1 * k * bound, "{label}: {elastic:e}");
                 let residual = simulation.ledger().unwrap().relative_residual();
@@ -151,11 +145,7 @@ fn damping_and_preload_of_a_joint_spring_are_those_of_the_closed_solution() {
         let spring = on.spring(k, c) + &format!("preload = \"{preload:e} {}\"\n", on.units()[2]);
         for method in ["dopri5", "radau5", "rosenbrock", "automatic", "rk4"] {
             for formulation in FORMULATIONS {
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ];
+                let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
                 let mut simulation = on.starts([0.13, 0.0], &spring, &changes);
                 let frame = at(&mut simulation, 0.25);
                 // About the place where the force vanishes.
@@ -167,10 +157,7 @@ fn damping_and_preload_of_a_joint_spring_are_those_of_the_closed_solution() {
                 let energy = |x: f64, v: f64| 0.5 * (m * v * v + k * x * x);
                 let lost = energy(0.03 - rest, 0.0) - energy(off, rate);
                 let ledger = simulation.ledger().unwrap();
-                assert!(
-                    (ledger.damping_loss / lost - 1.0).abs() < 1e-5,
-                    "{label}: {ledger:?}"
-                );
+                assert!((ledger.damping_loss / lost - 1.0).abs() < 1e-5, "{label}: {ledger:?}");
                 let off = on.coordinate(&frame) - 0.1;
                 let stored = off * (preload + 0.5 * k * off);
                 assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
@@ -185,32 +172,23 @@ fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
     let k = 400.0 * m;
     let error = |method: &str, formulation: &str, key: &str, value: f64| {
         let value = format!("{value:e}{}", if key == "solver.step" { " s" } else { "" });
-        let changes = [
-            ("solver.method", method),
-            ("formulation", formulation),
-            (key, &*value),
-        ];
+        let changes = [("solver.method", method), ("formulation", formulation), (key, &*value)];
         let mut simulation = Hinge.starts([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
         let frame = at(&mut simulation, 0.2);
         let [off, _] = swing([m, 4.0 * m, k], [0.03, 0.0], 0.2);
         (Hinge.coordinate(&frame) - 0.1 - off).abs()
     };
     for formulation in FORMULATIONS {
-        for (method, steps, order) in [
-            ("semi-implicit-euler", [1e-4, 5e-5], 1.0),
-            ("imex-euler", [1e-4, 5e-5], 1.0),
-            ("rk4", [4e-3, 2e-3], 4.0),
-        ] {
+        for (method, steps, order) in
+            [("semi-implicit-euler", [1e-4, 5e-5], 1.0), ("imex-euler", [1e-4, 5e-5], 1.0), ("rk4", [4e-3, 2e-3], 4.0)]
+        {
             let [coarse, fine] = steps.map(|step| error(method, formulation, "solver.step", step));
             let found = (coarse / fine).log2();
-            assert!(
-                (found - order).abs() < 0.2,
-                "{method} {formulation}: {found}"
-            );
+            assert!((found - order).abs() < 0.2, "{method} {formulation}: {found}");
         }
         for method in ["dopri5", "rosenbrock", "radau5", "automatic"] {
-            let [loose, tight] = [1e-4, 1e-8]
-                .map(|tolerance| error(method, formulation, "solver.tolerance", tolerance));
+            let [loose, tight] =
+                [1e-4, 1e-8].map(|tolerance| error(method, formulation, "solver.tolerance", tolerance));
             let label = format!("{method} {formulation}: {loose:e} {tight:e}");
             assert!(loose < 1e-4 && tight < 1e-8 && tight < loose, "{label}");
         }
@@ -224,11 +202,7 @@ fn stiff_elements_on_joints_do_not_hold_implicit_methods_back() {
         let stiff = on.spring(1.6e8 * m, 2e4 * m);
         for formulation in FORMULATIONS {
             let evaluations = |method: &str| {
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.tolerance", "1e-6"),
-                    ("formulation", formulation),
-                ];
+                let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
                 let mut simulation = on.starts([0.13, 0.0], &stiff, &changes);
                 let frame = at(&mut simulation, 1.0);
                 let off = on.coordinate(&frame) - 0.1;
@@ -239,10 +213,7 @@ fn stiff_elements_on_joints_do_not_hold_implicit_methods_back() {
             for method in ["radau5", "rosenbrock", "automatic"] {
                 let implicit = evaluations(method);
                 println!("{on:?} {formulation} {method} {implicit}, dopri5 {explicit}");
-                assert!(
-                    4 * implicit < explicit,
-                    "{on:?} {method}: {implicit} {explicit}"
-                );
+                assert!(4 * implicit < explicit, "{on:?} {method}: {implicit} {explicit}");
             }
         }
     }
@@ -290,17 +261,10 @@ fn what_acts_on_joints_keeps_momentum_and_its_energy_balance_closes() {
         let springs = springs.replace("DT", turning).replace("DS", sliding);
         let text = TUMBLING.to_owned() + &springs.replace('R', restitution);
         let mut ends = Vec::new();
-        for (formulation, method) in [
-            ("tree", "dopri5"),
-            ("lagrange", "dopri5"),
-            ("tree", "radau5"),
-            ("lagrange", "rosenbrock"),
-        ] {
-            let changes = [
-                ("solver.method", method),
-                ("solver.tolerance", "1e-10"),
-                ("formulation", formulation),
-            ];
+        for (formulation, method) in
+            [("tree", "dopri5"), ("lagrange", "dopri5"), ("tree", "radau5"), ("lagrange", "rosenbrock")]
+        {
+            let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = started(&text, &changes);
             let scene = simulation.scene().clone();
             let before = at(&mut simulation, 0.0);
@@ -360,32 +324,20 @@ fn a_joint_spring_on_a_drive_loads_it() {
             let mut simulation = started(&text, &[("formulation", formulation)]);
             let frame = at(&mut simulation, 0.2);
             let stored = 0.5 * 300.0 * 0.01 * 0.01;
-            assert!(
-                (frame.elastic / stored - 1.0).abs() < 1e-6,
-                "{on:?} {formulation}"
-            );
+            assert!((frame.elastic / stored - 1.0).abs() < 1e-6, "{on:?} {formulation}");
             let work = simulation.ledger().unwrap().drive_work;
-            assert!(
-                (work / stored - 1.0).abs() < 1e-5,
-                "{on:?} {formulation}: {work}"
-            );
+            assert!((work / stored - 1.0).abs() < 1e-5, "{on:?} {formulation}: {work}");
             let force = frame.actuators[0];
-            assert!(
-                (force - 300.0 * 0.01).abs() < 1e-5,
-                "{on:?} {formulation}: {force}"
-            );
+            assert!((force - 300.0 * 0.01).abs() < 1e-5, "{on:?} {formulation}: {force}");
         }
     }
 }
 
 #[test]
 fn a_hinge_is_taken_within_half_a_turn_of_the_position() {
-    for (start, position, expected) in [
-        (350.0_f64, 0.0, -10.0_f64),
-        (-190.0, 0.0, 170.0),
-        (20.0, 700.0, 40.0),
-        (725.0, 1.0, 4.0),
-    ] {
+    for (start, position, expected) in
+        [(350.0_f64, 0.0, -10.0_f64), (-190.0, 0.0, 170.0), (20.0, 700.0, 40.0), (725.0, 1.0, 4.0)]
+    {
         let spring = format!(
             "[[joint_spring]]\nname = \"s\"\njoint = \"j\"\nposition = \"{position} deg\"\nstiffness = \"2 N m/rad\"\n"
         );
@@ -450,19 +402,13 @@ fn a_stop_rebounds_as_its_law_says_at_any_speed() {
                     let frame = at(&mut simulation, 0.08);
                     let label = format!("{on:?} {method} {formulation} {v}");
                     let found = -on.rate(&frame) / v;
-                    assert!(
-                        (found - expected).abs() < bound,
-                        "{label}: {found} {expected}"
-                    );
+                    assert!((found - expected).abs() < bound, "{label}: {found} {expected}");
                     assert_eq!((frame.elastic, on.force(&frame, 0)), (0.0, 0.0), "{label}");
                     let lost = 0.5 * m * v * v * (1.0 - expected * expected);
                     let ledger = simulation.ledger().unwrap();
                     let off = ledger.damping_loss / lost - 1.0;
                     assert!(off.abs() < 1e4 * bound.min(1e-6), "{label}: {off:e}");
-                    assert!(
-                        ledger.relative_residual().abs() < 2e-3,
-                        "{label}: {ledger:?}"
-                    );
+                    assert!(ledger.relative_residual().abs() < 2e-3, "{label}: {ledger:?}");
                 }
             }
         }
@@ -473,9 +419,7 @@ fn a_stop_rebounds_as_its_law_says_at_any_speed() {
 fn a_weight_settles_on_a_stop_as_deep_as_hertz_says() {
     let stop = "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"-5 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n\
                 restitution = 0.2\nspeed = \"0.1 m/s\"\n";
-    let text = Slide
-        .text([0.0, 0.0], stop)
-        .replace("x = 0\n", "x = \"-9.81 m/s^2\"\n");
+    let text = Slide.text([0.0, 0.0], stop).replace("x = 0\n", "x = \"-9.81 m/s^2\"\n");
     for method in ["radau5", "automatic", "dopri5"] {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-8")];
         let mut simulation = started(&text, &changes);
@@ -484,10 +428,7 @@ fn a_weight_settles_on_a_stop_as_deep_as_hertz_says() {
         let depth = -5e-3 - Slide.coordinate(&frame);
         let weight: f64 = 0.5 * 9.81;
         let expected = 1e-3 * (weight / 100.0).powf(2.0 / 3.0);
-        assert!(
-            (depth / expected - 1.0).abs() < 0.02,
-            "{method}: {depth:e} {expected:e}"
-        );
+        assert!((depth / expected - 1.0).abs() < 0.02, "{method}: {depth:e} {expected:e}");
     }
 }
 
@@ -526,16 +467,10 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_is_the_drives() {
                 let wrong = (on.coordinate(&frame) - (0.1 + 0.3 * t) - off).abs();
                 assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
                 let force = on.force(&frame, 0);
-                assert!(
-                    (force + k * off + d * rate).abs() < 60.0 * k * bound,
-                    "{label}"
-                );
+                assert!((force + k * off + d * rate).abs() < 60.0 * k * bound, "{label}");
                 let kinetic = 0.5 * m * on.rate(&frame).powi(2);
                 let ledger = simulation.ledger().unwrap();
-                assert!(
-                    (ledger.drive_work - kinetic).abs() < 1e-4 * ledger.exchanged,
-                    "{label}: {ledger:?}"
-                );
+                assert!((ledger.drive_work - kinetic).abs() < 1e-4 * ledger.exchanged, "{label}: {ledger:?}");
                 assert_eq!(ledger.damping_loss, 0.0);
                 // m q'' + d q' + k q = Re (k + i w d) T e^(i w t), T = 0.1 e^(i phase) / i: forced and free.
                 let mut simulation = on.starts([0.0, 0.0], &shaken, &changes);
@@ -544,12 +479,7 @@ fn a_motor_follows_its_target_like_a_spring_and_its_work_is_the_drives() {
                 let (re, im) = (k - m * w * w, d * w);
                 let size = 0.1 * (k * k + im * im).sqrt() / (re * re + im * im).sqrt();
                 let phase = 30_f64.to_radians() + (im / k).atan() - im.atan2(re);
-                let forced = |t: f64| {
-                    [
-                        size * (w * t + phase).sin(),
-                        size * w * (w * t + phase).cos(),
-                    ]
-                };
+                let forced = |t: f64| [size * (w * t + phase).sin(), size * w * (w * t + phase).cos()];
                 let [x, v] = forced(0.0);
                 let free = swing([m, d, k], [-x, -v], t)[0];
                 let wrong = (on.coordinate(&frame) - forced(t)[0] - free).abs();
@@ -573,20 +503,13 @@ fn a_motor_gives_no_more_than_its_limit() {
         let leaves = (2.0 * 0.8 / 20.0_f64).sqrt();
         for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
             for formulation in FORMULATIONS {
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ];
+                let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
                 let label = format!("{on:?} {method} {formulation}");
                 let mut simulation = on.starts([0.0, 0.0], &motor, &changes);
                 let t = 0.99 * leaves;
                 let frame = at(&mut simulation, t);
                 assert!((on.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
-                assert!(
-                    (on.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8,
-                    "{label}"
-                );
+                assert!((on.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8, "{label}");
                 let t = leaves + 0.05;
                 let frame = at(&mut simulation, t);
                 let [off, _] = swing([m, 0.0, k], [-0.2, 20.0 * leaves], 0.05);
@@ -595,18 +518,12 @@ fn a_motor_gives_no_more_than_its_limit() {
             }
         }
         // A constant force alone.
-        let push = format!(
-            "[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n",
-            on.force_key()
-        );
+        let push = format!("[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n", on.force_key());
         let mut simulation = on.starts([0.0, 0.0], &push, &[]);
         let frame = at(&mut simulation, 0.3);
         assert!((on.rate(&frame) - 6.0).abs() < 1e-9, "{on:?}");
         let work = simulation.ledger().unwrap().drive_work;
-        assert!(
-            (work / (0.5 * m * 36.0) - 1.0).abs() < 1e-9,
-            "{on:?}: {work}"
-        );
+        assert!((work / (0.5 * m * 36.0) - 1.0).abs() < 1e-9, "{on:?}: {work}");
     }
 }
 
@@ -629,10 +546,7 @@ fn a_motor_does_not_sleep_through_a_pulse_of_its_target() {
     assert!(expected.abs() > 1e-4, "{expected:e}");
     for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
         let found = end(method);
-        assert!(
-            (found - expected).abs() < 1e-7,
-            "{method}: {found:e} {expected:e}"
-        );
+        assert!((found - expected).abs() < 1e-7, "{method}: {found:e} {expected:e}");
     }
 }
 
@@ -646,9 +560,7 @@ fn columns_and_pictures_follow_what_the_joint_is() {
     };
     let (slide, hinge) = (columns(Slide), columns(Hinge));
     assert!(slide.contains("s_force_x_N,s_force_y_N,s_force_z_N") && !slide.contains("s_torque"));
-    assert!(
-        hinge.contains("s_torque_x_Nm,s_torque_y_Nm,s_torque_z_Nm") && !hinge.contains("s_force")
-    );
+    assert!(hinge.contains("s_torque_x_Nm,s_torque_y_Nm,s_torque_z_Nm") && !hinge.contains("s_force"));
 }
 
 #[test]
@@ -658,24 +570,12 @@ fn bad_elements_on_joints_are_refused_where_they_stand() {
            [[joint]]\nname = \"crank\"\nkind = \"revolute\"\nchild = \"wheel\"\naxis = [0, 0, 1]\n\
            drive = { law = \"constant\", velocity = \"60 rpm\" }\n";
     for (more, said) in [
-        (
-            "[[joint_spring]]\nname = \"s\"\n",
-            ["joint_spring.s.joint", "missing"],
-        ),
-        (
-            "[[joint_spring]]\nname = \"s\"\njoint = \"elbwo\"\n",
-            ["did you mean `elbow`", "allowed "],
-        ),
-        (
-            "[[joint_spring]]\nname = \"s\"\njoint = \"free\"\n",
-            ["a free joint is neither", "elbow, slide"],
-        ),
+        ("[[joint_spring]]\nname = \"s\"\n", ["joint_spring.s.joint", "missing"]),
+        ("[[joint_spring]]\nname = \"s\"\njoint = \"elbwo\"\n", ["did you mean `elbow`", "allowed "]),
+        ("[[joint_spring]]\nname = \"s\"\njoint = \"free\"\n", ["a free joint is neither", "elbow, slide"]),
         (
             "[[joint_spring]]\nname = \"s\"\njoint = \"elbow\"\n",
-            [
-                "joint_spring.s",
-                "does nothing: stiffness, damping, preload",
-            ],
+            ["joint_spring.s", "does nothing: stiffness, damping, preload"],
         ),
         (
             "[[joint_spring]]\nname = \"s\"\njoint = \"elbow\"\nstiffness = \"10 N/m\"\n",
@@ -687,10 +587,7 @@ fn bad_elements_on_joints_are_refused_where_they_stand() {
         ),
         (
             "[[stop]]\nname = \"s\"\njoint = \"elbow\"\nforce = \"1 N\"\ndepth = \"1 deg\"\nupper = 0\n",
-            [
-                "stop.s.force",
-                "the joint is a hinge, where `torque` belongs",
-            ],
+            ["stop.s.force", "the joint is a hinge, where `torque` belongs"],
         ),
         (
             "[[stop]]\nname = \"s\"\njoint = \"elbow\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n",
@@ -716,18 +613,12 @@ fn bad_elements_on_joints_are_refused_where_they_stand() {
             "[[stop]]\nname = \"s\"\njoint = \"slide\"\nforce = \"1 N\"\ndepth = 0\nupper = 0\n",
             ["stop.s.depth", "allowed 1e-9 m to 1000 m"],
         ),
-        (
-            "[[motor]]\nname = \"m\"\njoint = \"crank\"\ntorque = \"1 N m\"\n",
-            ["motor.m.joint", "has a drive"],
-        ),
+        ("[[motor]]\nname = \"m\"\njoint = \"crank\"\ntorque = \"1 N m\"\n", ["motor.m.joint", "has a drive"]),
         (
             "[[motor]]\nname = \"m\"\njoint = \"elbow\"\nlimit = \"1 N m\"\n",
             ["motor.m", "does nothing: torque, stiffness, damping"],
         ),
-        (
-            "[[motor]]\nname = \"m\"\njoint = \"elbow\"\nstiffness = \"1 N m/rad\"\n",
-            ["motor.m.target", "missing"],
-        ),
+        ("[[motor]]\nname = \"m\"\njoint = \"elbow\"\nstiffness = \"1 N m/rad\"\n", ["motor.m.target", "missing"]),
         (
             "[[motor]]\nname = \"m\"\njoint = \"elbow\"\ntorque = \"1 N m\"\ntarget = { law = \"constant\", velocity = 0 }\n",
             ["motor.m.target", "has no effect"],

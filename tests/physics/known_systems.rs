@@ -112,10 +112,7 @@ impl<F: Fn(f64, f64, f64) -> f64 + Clone> Orbit for Oscillator<F> {
         loop {
             let cut = self.t + self.h >= end;
             let h = if cut { end - self.t } else { self.h };
-            let error =
-                self.stepper
-                    .attempt(&mut self.force, self.t, h, &self.y, &k, &mut y, &mut k_end)
-                    / TOLERANCE;
+            let error = self.stepper.attempt(&mut self.force, self.t, h, &self.y, &k, &mut y, &mut k_end) / TOLERANCE;
             if error > 1.0 {
                 self.h = h * self.controller.after_reject(error);
                 continue;
@@ -134,11 +131,7 @@ impl<F: Fn(f64, f64, f64) -> f64 + Clone> Orbit for Oscillator<F> {
         &[1.0, 1.0]
     }
     fn twin(&self) -> Self {
-        Self {
-            force: self.force.clone(),
-            stepper: DormandPrince::new(2),
-            ..*self
-        }
+        Self { force: self.force.clone(), stepper: DormandPrince::new(2), ..*self }
     }
     fn displace(&mut self, offset: &[f64]) {
         self.y[0] += offset[0];
@@ -148,11 +141,7 @@ impl<F: Fn(f64, f64, f64) -> f64 + Clone> Orbit for Oscillator<F> {
         3
     }
     fn observe(&mut self, out: &mut [f64]) {
-        let (sine, cosine) = if self.angle {
-            self.y[0].sin_cos()
-        } else {
-            (self.y[0], 0.0)
-        };
+        let (sine, cosine) = if self.angle { self.y[0].sin_cos() } else { (self.y[0], 0.0) };
         out.copy_from_slice(&[sine, cosine, self.y[1]]);
     }
 }
@@ -169,24 +158,14 @@ where
     O::Stop: std::fmt::Debug,
 {
     let width = orbit.observables();
-    let schedule = Schedule {
-        first: interval,
-        interval,
-        sections,
-        discard,
-    };
+    let schedule = Schedule { first: interval, interval, sections, discard };
     let mut watch = SectionRun::new(orbit, schedule, Some(separation));
     while !watch.is_done() {
         watch.step().unwrap();
     }
     assert_eq!(watch.sections().len(), (sections - discard) * width);
     let exponent = watch.exponent().and_then(|benettin| benettin.result());
-    classify(
-        watch.sections(),
-        &vec![resolution; width],
-        interval,
-        exponent,
-    )
+    classify(watch.sections(), &vec![resolution; width], interval, exponent)
 }
 
 fn exponent(evidence: &Evidence) -> &Exponent {
@@ -203,11 +182,7 @@ fn brief(evidence: &Evidence) -> String {
 }
 
 fn map(f: impl Fn(f64) -> f64 + Clone, sections: usize) -> (Regime, Evidence) {
-    let map = Map {
-        f,
-        n: 0.0,
-        x: [0.3],
-    };
+    let map = Map { f, n: 0.0, x: [0.3] };
     watch(map, 1.0, sections, sections / 2, 1e-9, 1e-6)
 }
 
@@ -232,12 +207,7 @@ fn the_logistic_map_doubles_its_period_where_it_is_known_to() {
         (3.845, 6),
     ] {
         let (regime, evidence) = logistic(r, 6000);
-        assert_eq!(
-            regime,
-            Regime::Periodic(period),
-            "r = {r}: {}",
-            brief(&evidence)
-        );
+        assert_eq!(regime, Regime::Periodic(period), "r = {r}: {}", brief(&evidence));
         assert_eq!(evidence.distinct, period, "r = {r}");
         assert!(exponent(&evidence).value < 0.0, "r = {r}");
     }
@@ -286,13 +256,8 @@ fn a_fixed_point_has_the_exponent_of_its_slope() {
 fn the_circle_map_is_quasi_periodic_outside_its_tongues() {
     let golden = 0.618_033_988_749_894_9;
     let turn = |omega: f64, k: f64| {
-        let map =
-            move |x: f64| x + omega - k / std::f64::consts::TAU * (std::f64::consts::TAU * x).sin();
-        let orbit = Circle(Map {
-            f: map,
-            n: 0.0,
-            x: [0.2],
-        });
+        let map = move |x: f64| x + omega - k / std::f64::consts::TAU * (std::f64::consts::TAU * x).sin();
+        let orbit = Circle(Map { f: map, n: 0.0, x: [0.2] });
         watch(orbit, 1.0, 400, 200, 1e-9, 1e-6)
     };
     let (regime, evidence) = turn(golden, 0.5);
@@ -343,15 +308,9 @@ impl<F: Fn(f64) -> f64 + Clone> Orbit for Circle<F> {
 #[test]
 fn the_driven_pendulum_is_periodic_and_chaotic_where_it_is_known_to_be() {
     let drive = 2.0 / 3.0;
-    for (g, expected) in [
-        (0.9, Some(1)),
-        (1.07, Some(2)),
-        (1.15, None),
-        (1.35, Some(1)),
-        (1.45, Some(2)),
-        (1.47, Some(4)),
-        (1.5, None),
-    ] {
+    for (g, expected) in
+        [(0.9, Some(1)), (1.07, Some(2)), (1.15, None), (1.35, Some(1)), (1.45, Some(2)), (1.47, Some(4)), (1.5, None)]
+    {
         let force = move |t: f64, x: f64, v: f64| -0.5 * v - x.sin() + g * (drive * t).cos();
         let orbit = Oscillator::new(force, [0.2, 0.0], true);
         let period = std::f64::consts::TAU / drive;
@@ -360,11 +319,7 @@ fn the_driven_pendulum_is_periodic_and_chaotic_where_it_is_known_to_be() {
         match expected {
             Some(n) => {
                 assert_eq!(regime, Regime::Periodic(n), "g = {g}: {}", brief(&evidence));
-                assert!(
-                    e.value + 2.0 * e.standard_error < 0.0,
-                    "g = {g}: {}",
-                    e.value
-                );
+                assert!(e.value + 2.0 * e.standard_error < 0.0, "g = {g}: {}", e.value);
                 // Volume shrinks at the rate 1/q, so no motion can lose its neighbours faster than that in both directions.
                 assert!(e.value > -0.5, "g = {g}: {}", e.value);
             }
@@ -383,16 +338,8 @@ fn exponents_of_driven_oscillators_are_the_published_ones() {
     let pendulum = |t: f64, x: f64, v: f64| -0.05 * v - x.sin() + 0.6 * (0.7 * t).sin();
     let ueda = |t: f64, x: f64, v: f64| -0.05 * v - x * x * x + 7.5 * t.sin();
     let known = [
-        (
-            Oscillator::new(pendulum as fn(f64, f64, f64) -> f64, [0.0, 0.0], true),
-            0.7,
-            0.1400,
-        ),
-        (
-            Oscillator::new(ueda as fn(f64, f64, f64) -> f64, [2.5, 0.0], false),
-            1.0,
-            0.1034,
-        ),
+        (Oscillator::new(pendulum as fn(f64, f64, f64) -> f64, [0.0, 0.0], true), 0.7, 0.1400),
+        (Oscillator::new(ueda as fn(f64, f64, f64) -> f64, [2.5, 0.0], false), 1.0, 0.1034),
     ];
     for (orbit, drive, published) in known {
         let period = std::f64::consts::TAU / drive;
@@ -401,12 +348,7 @@ fn exponents_of_driven_oscillators_are_the_published_ones() {
         assert_eq!(regime, Regime::Chaotic);
         let miss = (e.value - published).abs();
         // Three standard errors, and these are to be small against the exponent.
-        assert!(
-            miss < 3.0 * e.standard_error,
-            "{} +- {}: {published}",
-            e.value,
-            e.standard_error
-        );
+        assert!(miss < 3.0 * e.standard_error, "{} +- {}: {published}", e.value, e.standard_error);
         assert!(e.standard_error < 0.05 * published, "{}", e.standard_error);
     }
 }
@@ -444,12 +386,7 @@ fn a_motion_that_stops_keeps_its_sections() {
             out[0] = self.0;
         }
     }
-    let schedule = Schedule {
-        first: 1.0,
-        interval: 1.0,
-        sections: 10,
-        discard: 2,
-    };
+    let schedule = Schedule { first: 1.0, interval: 1.0, sections: 10, discard: 2 };
     let mut watch = SectionRun::new(Wall(0.0), schedule, None);
     let stop = loop {
         if let Err(stop) = watch.step() {

@@ -116,11 +116,7 @@ fn every_law_friction_and_formulation_balances() {
         ("chain", &[law("gonthier"), weak], lossy),
     ];
     for (name, changes, terms) in cases {
-        let duration = if changes.contains(&lagrange) {
-            0.05
-        } else {
-            0.2
-        };
+        let duration = if changes.contains(&lagrange) { 0.05 } else { 0.2 };
         let ledger = after(name, changes, duration);
         balances(&format!("{name} {changes:?}"), &ledger, PROMISE, terms);
         if changes.contains(&law("hertz")) {
@@ -143,28 +139,16 @@ fn ideal_and_partly_ideal_mechanisms_balance() {
         ("spcmm", &[ideal, fast], 1e-6),
         ("spcmm", &[ideal, lagrange], PROMISE),
         ("spcmm", &[("joint.S2.clearance", "0")], PROMISE),
-        (
-            "spcmm",
-            &[("joint.S1.clearance", "0"), ("joint.S3.clearance", "0")],
-            PROMISE,
-        ),
+        ("spcmm", &[("joint.S1.clearance", "0"), ("joint.S3.clearance", "0")], PROMISE),
         ("slider-crank", &[ideal], PROMISE),
         ("slider-crank", &[ideal, lagrange], PROMISE),
-        (
-            "slider-crank-driven",
-            &[("joint.C.clearance", "0")],
-            PROMISE,
-        ),
+        ("slider-crank-driven", &[("joint.C.clearance", "0")], PROMISE),
         ("pendulum", &[ideal], PROMISE),
     ];
     for (name, changes, bound) in cases {
         // A third of a drive's period: the works do not come back to zero.
         let ledger = after(name, changes, 0.31);
-        let terms: &[&str] = if name == "spcmm" {
-            &["drive", "gravity"]
-        } else {
-            &["gravity", "kinetic"]
-        };
+        let terms: &[&str] = if name == "spcmm" { &["drive", "gravity"] } else { &["gravity", "kinetic"] };
         balances(&format!("{name} {changes:?}"), &ledger, bound, terms);
     }
 }
@@ -260,11 +244,7 @@ fn keeping_it_changes_no_bit() {
     let off = ("solver.energy_ledger", "off");
     for name in SCENES {
         for method in METHODS {
-            for more in [
-                vec![],
-                vec![("contact.clearance", "0")],
-                vec![("formulation", "lagrange")],
-            ] {
+            for more in [vec![], vec![("contact.clearance", "0")], vec![("formulation", "lagrange")]] {
                 let mut changes = vec![("solver.method", method)];
                 changes.extend(more);
                 let mut with = simulation(name, &changes);
@@ -278,17 +258,9 @@ fn keeping_it_changes_no_bit() {
                     simulation.set("contact.clearance", "0.28 mm").unwrap();
                     run_until(simulation, end);
                 }
-                assert_eq!(
-                    with.state_hash(),
-                    without.state_hash(),
-                    "{name} {changes:?}"
-                );
+                assert_eq!(with.state_hash(), without.state_hash(), "{name} {changes:?}");
                 assert_eq!(with.state(), without.state());
-                assert_eq!(
-                    with.statistics(),
-                    without.statistics(),
-                    "{name} {changes:?}"
-                );
+                assert_eq!(with.statistics(), without.statistics(), "{name} {changes:?}");
             }
         }
     }
@@ -296,11 +268,9 @@ fn keeping_it_changes_no_bit() {
 
 #[test]
 fn it_is_part_of_snapshots_and_starts_anew_at_a_reset() {
-    for (name, changes) in [
-        ("spcmm", vec![]),
-        ("spcmm", vec![("contact.clearance", "0")]),
-        ("pendulum", vec![("solver.method", "rk4")]),
-    ] {
+    for (name, changes) in
+        [("spcmm", vec![]), ("spcmm", vec![("contact.clearance", "0")]), ("pendulum", vec![("solver.method", "rk4")])]
+    {
         let mut simulation = simulation(name, &changes);
         assert_eq!(ledger(&simulation), Ledger::default());
         simulation.advance_to(0.05).unwrap();
@@ -335,11 +305,7 @@ fn frames_inside_a_step_balance_too() {
         ("spcmm", vec![("solver.method", "dopri5")], 0.02),
         ("pendulum", vec![("solver.method", "rk4")], 0.02),
     ] {
-        let bound = if changes == [("solver.method", "rk4")] {
-            1e-3
-        } else {
-            PROMISE
-        };
+        let bound = if changes == [("solver.method", "rk4")] { 1e-3 } else { PROMISE };
         let mut simulation = simulation(name, &changes);
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
@@ -352,8 +318,8 @@ fn frames_inside_a_step_balance_too() {
                 simulation.sample(from + part * (to - from), &mut frame);
                 let ledger = frame.ledger.unwrap();
                 // What the row says of the energies is what its ledger says.
-                let off = ledger.kinetic_change + ledger.elastic_change
-                    - (frame.kinetic - kinetic + frame.elastic - elastic);
+                let off =
+                    ledger.kinetic_change + ledger.elastic_change - (frame.kinetic - kinetic + frame.elastic - elastic);
                 assert!(off.abs() < 1e-12, "{name}: {off:e}");
                 worst = worst.max(ledger.residual().abs());
             }
@@ -361,9 +327,6 @@ fn frames_inside_a_step_balance_too() {
         }
         let exchanged = ledger(&simulation).exchanged;
         println!("{name} {changes:?}: {:.1e}", worst / exchanged);
-        assert!(
-            worst < bound * exchanged,
-            "{name} {changes:?}: {worst:e} of {exchanged:e}"
-        );
+        assert!(worst < bound * exchanged, "{name} {changes:?}: {worst:e} of {exchanged:e}");
     }
 }

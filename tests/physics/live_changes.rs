@@ -63,11 +63,7 @@ fn watch(simulation: &mut Simulation, end: f64) -> Watched {
 }
 
 fn clearances(simulation: &mut Simulation) -> Vec<f64> {
-    frame_now(simulation)
-        .joints
-        .iter()
-        .map(|j| j.clearance)
-        .collect()
+    frame_now(simulation).joints.iter().map(|j| j.clearance).collect()
 }
 
 #[test]
@@ -76,10 +72,7 @@ fn a_clearance_that_closes_on_a_ball_moves_at_a_bounded_rate_and_arrives() {
     println!("unchanged: {usual:?}");
     let mut simulation = settled();
     let start = simulation.time();
-    assert_eq!(
-        simulation.set("contact.clearance", "0.1 mm"),
-        Ok(Effect::Now)
-    );
+    assert_eq!(simulation.set("contact.clearance", "0.1 mm"), Ok(Effect::Now));
     // Nothing has moved at the instant itself.
     assert_eq!(clearances(&mut simulation), [0.3e-3; 3]);
     let travel = 0.2e-3 / CLEARANCE_SPEED;
@@ -91,17 +84,9 @@ fn a_clearance_that_closes_on_a_ball_moves_at_a_bounded_rate_and_arrives() {
     let arriving = watch(&mut simulation, start + travel + 0.05);
     assert_eq!(clearances(&mut simulation), [0.1e-3; 3]);
     let after = watch(&mut simulation, start + travel + 0.2);
-    for (name, seen) in [
-        ("closing", &closing),
-        ("arriving", &arriving),
-        ("after", &after),
-    ] {
+    for (name, seen) in [("closing", &closing), ("arriving", &arriving), ("after", &after)] {
         println!("{name}: {seen:?}");
-        assert!(
-            seen.speed < CLEARANCE_SPEED * 1.001,
-            "{name}: {}",
-            seen.speed
-        );
+        assert!(seen.speed < CLEARANCE_SPEED * 1.001, "{name}: {}", seen.speed);
         // The walls push the balls at 2 mm/s: three times the settled force (7.9 N) and 2 % more kinetic energy were
         // measured. A jump would have put the balls 0.2 mm into the wall: 250 kN and 20 J in each joint.
         assert!(seen.force < 5.0 * usual.force, "{name}: {} N", seen.force);
@@ -143,10 +128,7 @@ fn a_clearance_under_way_can_change_its_mind() {
 fn a_clearance_that_grows_lets_the_balls_fall_no_more() {
     let mut simulation = settled();
     let before = frame_now(&mut simulation);
-    assert_eq!(
-        simulation.set("contact.clearance", "0.4 mm"),
-        Ok(Effect::Now)
-    );
+    assert_eq!(simulation.set("contact.clearance", "0.4 mm"), Ok(Effect::Now));
     assert_eq!(clearances(&mut simulation), [0.4e-3; 3]);
     let after = frame_now(&mut simulation);
     assert_eq!(after.kinetic, before.kinetic);
@@ -158,12 +140,7 @@ fn a_clearance_that_grows_lets_the_balls_fall_no_more() {
     assert!(seen.impacts >= 3);
     // Settled again.
     let distance = |joint: &jointplay::simulate::JointReport| joint.eccentricity.norm();
-    assert!(
-        frame_now(&mut simulation)
-            .joints
-            .iter()
-            .all(|j| (distance(j) - 0.4e-3).abs() < 5e-6)
-    );
+    assert!(frame_now(&mut simulation).joints.iter().all(|j| (distance(j) - 0.4e-3).abs() < 5e-6));
 }
 
 #[test]
@@ -194,11 +171,7 @@ fn changes_act_from_the_next_step_on() {
         assert_eq!(changed.state_hash(), hash, "{key}");
         plain.advance_to(0.016).unwrap();
         changed.advance_to(0.016).unwrap();
-        assert_ne!(
-            changed.state_hash(),
-            plain.state_hash(),
-            "{key} did nothing"
-        );
+        assert_ne!(changed.state_hash(), plain.state_hash(), "{key} did nothing");
         let ratio = frame_now(&mut changed).kinetic / frame_now(&mut plain).kinetic;
         assert!(ratio > 0.2 && ratio < 5.0, "{key}: {ratio}");
     }
@@ -237,57 +210,30 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     let mut simulation = simulation("spcmm", &[]);
     simulation.advance_to(0.02).unwrap();
     let hash = simulation.state_hash();
-    assert_eq!(
-        simulation.set("joint.S1.clearance", "0"),
-        Ok(Effect::AtReset)
-    );
+    assert_eq!(simulation.set("joint.S1.clearance", "0"), Ok(Effect::AtReset));
     assert_eq!(simulation.state_hash(), hash);
-    assert_eq!(
-        simulation.running_scene().ball_joints[0].contact.clearance,
-        0.3e-3
-    );
+    assert_eq!(simulation.running_scene().ball_joints[0].contact.clearance, 0.3e-3);
     assert_eq!(simulation.scene().ball_joints[0].contact.clearance, 0.0);
     simulation.advance_to(0.025).unwrap();
     // Other changes still act now while that one waits.
     assert_eq!(simulation.set("contact.friction", "0.4"), Ok(Effect::Now));
-    assert_eq!(
-        simulation.running_scene().ball_joints[0].contact.friction,
-        0.4
-    );
-    assert_eq!(
-        simulation.set("joint.S2.clearance", "0.4 mm"),
-        Ok(Effect::Now)
-    );
+    assert_eq!(simulation.running_scene().ball_joints[0].contact.friction, 0.4);
+    assert_eq!(simulation.set("joint.S2.clearance", "0.4 mm"), Ok(Effect::Now));
     assert_eq!(clearances(&mut simulation), [0.3e-3, 0.4e-3, 0.3e-3]);
     simulation.reset().unwrap();
     assert_eq!(simulation.mechanism().summary().ideal_joints, 1);
     let frame = frame_now(&mut simulation);
-    assert_eq!(
-        frame.joints[0].state,
-        jointplay::simulate::ContactState::Ideal
-    );
-    assert_eq!(
-        simulation.running_scene().ball_joints[1].contact.friction,
-        0.4
-    );
+    assert_eq!(frame.joints[0].state, jointplay::simulate::ContactState::Ideal);
+    assert_eq!(simulation.running_scene().ball_joints[1].contact.friction, 0.4);
     // And back.
-    assert_eq!(
-        simulation.set("joint.S1.clearance", "0.2 mm"),
-        Ok(Effect::AtReset)
-    );
+    assert_eq!(simulation.set("joint.S1.clearance", "0.2 mm"), Ok(Effect::AtReset));
     simulation.advance_to(0.01).unwrap();
     assert!(frame_now(&mut simulation).joints[0].eccentricity.norm() < 1e-12);
     simulation.reset().unwrap();
     assert_eq!(clearances(&mut simulation), [0.2e-3, 0.4e-3, 0.3e-3]);
     // Taken back before the reset, nothing is left waiting.
-    assert_eq!(
-        simulation.set("joint.S1.clearance", "0"),
-        Ok(Effect::AtReset)
-    );
-    assert_eq!(
-        simulation.set("joint.S1.clearance", "0.25 mm"),
-        Ok(Effect::Now)
-    );
+    assert_eq!(simulation.set("joint.S1.clearance", "0"), Ok(Effect::AtReset));
+    assert_eq!(simulation.set("joint.S1.clearance", "0.25 mm"), Ok(Effect::Now));
     assert_eq!(clearances(&mut simulation)[0], 0.25e-3);
 }
 
@@ -338,11 +284,7 @@ fn refused_values_change_nothing() {
     ] {
         assert!(simulation.set(key, value).is_err(), "{key} = {value}");
         assert_eq!(simulation.state_hash(), hash, "{key} = {value}");
-        assert_eq!(
-            format!("{:?}", frame_now(&mut simulation)),
-            frame,
-            "{key} = {value}"
-        );
+        assert_eq!(format!("{:?}", frame_now(&mut simulation)), frame, "{key} = {value}");
     }
     assert!(simulation.scene().changes.is_empty());
     simulation.advance_to(0.015).unwrap();
@@ -357,10 +299,7 @@ struct Dice(u64);
 
 impl Dice {
     fn below(&mut self, n: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 33) as usize) % n
     }
 }
@@ -368,23 +307,11 @@ impl Dice {
 #[test]
 fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
     const CHOICES: [(&str, &[&str]); 12] = [
-        (
-            "contact.clearance",
-            &["0.02 mm", "0.1 mm", "0.3 mm", "0.7 mm"],
-        ),
+        ("contact.clearance", &["0.02 mm", "0.1 mm", "0.3 mm", "0.7 mm"]),
         ("joint.S1.clearance", &["0.05 mm", "0.3 mm", "0.5 mm"]),
         ("contact.friction", &["0", "0.05", "0.15", "0.8"]),
         ("contact.restitution", &["0.01", "0.3", "0.9", "1"]),
-        (
-            "contact.normal_law",
-            &[
-                "lankarani-nikravesh",
-                "hertz",
-                "hunt-crossley",
-                "flores",
-                "gonthier",
-            ],
-        ),
+        ("contact.normal_law", &["lankarani-nikravesh", "hertz", "hunt-crossley", "flores", "gonthier"]),
         ("contact.friction_velocity", &["centres", "surface"]),
         ("contact.friction_law", &["none", "modified-coulomb"]),
         ("contact.youngs_modulus", &["20 GPa", "206 GPa", "400 GPa"]),
@@ -401,28 +328,17 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
         for i in 1..=200 {
             let (key, values) = CHOICES[dice.below(CHOICES.len())];
             let value = values[dice.below(values.len())];
-            assert_eq!(
-                simulation.set(key, value),
-                Ok(Effect::Now),
-                "{key} = {value}"
-            );
+            assert_eq!(simulation.set(key, value), Ok(Effect::Now), "{key} = {value}");
             let end = f64::from(i) * 2.5e-3;
             while simulation.time() < end {
                 let step = simulation.step();
-                assert!(
-                    step.is_ok(),
-                    "{step:?} after {:?}",
-                    simulation.scene().changes
-                );
+                assert!(step.is_ok(), "{step:?} after {:?}", simulation.scene().changes);
                 simulation.take_peaks(&mut peaks);
                 force = peaks.iter().map(|p| p.normal).fold(force, f64::max);
             }
             simulation.sample(simulation.time(), &mut frame);
             let text = format!("{frame:?}");
-            assert!(
-                !text.contains("NaN") && !text.contains("inf"),
-                "{key} = {value}: {text}"
-            );
+            assert!(!text.contains("NaN") && !text.contains("inf"), "{key} = {value}: {text}");
             kinetic = kinetic.max(frame.kinetic);
             for joint in &frame.joints {
                 // A tenth of a millimetre would be some 90 kN.
@@ -492,25 +408,16 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
     // The bits of the same change without a parameter.
     let mut by_parameter = run("0.384 kg");
     let mut by_key = run("0.384 kg");
-    for (own, key, value) in [
-        ("0.2 mm", "contact.clearance", "0.4 mm"),
-        ("0.15 mm", "contact.clearance", "0.3 mm"),
-    ] {
+    for (own, key, value) in [("0.2 mm", "contact.clearance", "0.4 mm"), ("0.15 mm", "contact.clearance", "0.3 mm")] {
         assert_eq!(by_parameter.set("parameter.gap", own), Ok(Effect::Now));
         assert_eq!(by_key.set(key, value), Ok(Effect::Now));
         for simulation in [&mut by_parameter, &mut by_key] {
             simulation.advance_to(simulation.time() + 5e-3).unwrap();
         }
         assert_eq!(by_parameter.state_hash(), by_key.state_hash());
-        assert_eq!(
-            clearance(by_parameter.running_scene()),
-            clearance(by_key.running_scene())
-        );
+        assert_eq!(clearance(by_parameter.running_scene()), clearance(by_key.running_scene()));
     }
-    assert_eq!(
-        by_parameter.set("parameter.weight", "1.62"),
-        Ok(Effect::Now)
-    );
+    assert_eq!(by_parameter.set("parameter.weight", "1.62"), Ok(Effect::Now));
     assert_eq!(by_parameter.running_scene().gravity.z, -1.62);
     by_parameter.advance_to(20e-3).unwrap();
     // What else follows it waits, and the contact with it.
@@ -524,8 +431,5 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
     waiting.reset().unwrap();
     assert_eq!(clearance(waiting.running_scene()), 0.4e-3);
     // And an ideal joint is another machine.
-    assert_eq!(
-        by_parameter.set("parameter.gap", "0 mm"),
-        Ok(Effect::AtReset)
-    );
+    assert_eq!(by_parameter.set("parameter.gap", "0 mm"), Ok(Effect::AtReset));
 }

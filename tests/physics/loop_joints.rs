@@ -15,10 +15,7 @@ fn turn(axis: Vec3, angle: f64) -> Quat {
 }
 
 fn quaternion(of: &Quat) -> String {
-    format!(
-        "{{ quaternion = [{:e}, {:e}, {:e}, {:e}] }}",
-        of.w, of.i, of.j, of.k
-    )
+    format!("{{ quaternion = [{:e}, {:e}, {:e}, {:e}] }}", of.w, of.i, of.j, of.k)
 }
 
 fn pure(v: Vec3) -> String {
@@ -41,31 +38,14 @@ fn pairs() -> [Pair; 5] {
     let rest = turn(Vec3::new(1.0, 0.0, 1.0), 0.4);
     let axis = Vec3::new(1.0, 2.0, 2.0) / 3.0;
     let second = rest.inverse() * axis.cross(&Vec3::z()).normalize();
-    let points = format!(
-        "parent_point = \"120 0 10 mm\"\nchild_point = \"-50 5 0 mm\"\nrotation = {}\n",
-        quaternion(&rest)
-    );
+    let points =
+        format!("parent_point = \"120 0 10 mm\"\nchild_point = \"-50 5 0 mm\"\nrotation = {}\n", quaternion(&rest));
     let along = format!("{points}axis = {}\n", pure(axis));
-    let pair = |kind, keys: &str, start, freedoms| Pair {
-        kind,
-        keys: keys.to_owned(),
-        start,
-        freedoms,
-    };
+    let pair = |kind, keys: &str, start, freedoms| Pair { kind, keys: keys.to_owned(), start, freedoms };
     [
         pair("fixed", &points, "", 0),
-        pair(
-            "revolute",
-            &along,
-            "start = { position = \"20 deg\", velocity = \"-4 rad/s\" }\n",
-            1,
-        ),
-        pair(
-            "prismatic",
-            &along,
-            "start = { position = \"6 mm\", velocity = \"0.2 m/s\" }\n",
-            1,
-        ),
+        pair("revolute", &along, "start = { position = \"20 deg\", velocity = \"-4 rad/s\" }\n", 1),
+        pair("prismatic", &along, "start = { position = \"6 mm\", velocity = \"0.2 m/s\" }\n", 1),
         pair(
             "cylindrical",
             &along,
@@ -102,8 +82,7 @@ fn held(rod: &BodyMotion) -> [Vec3; 2] {
     let (spin, rate) = (rod.angular_velocity, rod.angular_acceleration);
     let acceleration = rod.acceleration + rate.cross(&centre) + spin.cross(&spin.cross(&centre));
     let force = 0.3 * (acceleration + Vec3::new(0.0, 0.0, G));
-    let inertia =
-        rod.rotation * Mat3::from_diagonal(&Vec3::new(2e-4, 5e-4, 6e-4)) * rod.rotation.transpose();
+    let inertia = rod.rotation * Mat3::from_diagonal(&Vec3::new(2e-4, 5e-4, 6e-4)) * rod.rotation.transpose();
     let arm = rod.rotation * Vec3::new(-0.05, 0.005, 0.0) - centre;
     let turns = inertia * rate + spin.cross(&(inertia * spin));
     [force, turns - arm.cross(&force)]
@@ -124,9 +103,7 @@ fn a_body_held_by_a_closing_joint_moves_as_if_it_hung_on_it() {
                 "[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nstart = {{ position = {}, rotation = {}, velocity = {}, \
                  angular_velocity = {} }}\n[[joint]]\nname = \"j\"\nkind = \"{}\"\nparent = \"arm\"\nchild = \"rod\"\ncloses_loop = true\n{}",
                 vector(rod.position, "m"),
-                quaternion(&Quat::from_rotation_matrix(
-                    &nalgebra::Rotation3::from_matrix_unchecked(rod.rotation)
-                )),
+                quaternion(&Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(rod.rotation))),
                 vector(rod.velocity, "m/s"),
                 vector(rod.angular_velocity, "rad/s"),
                 pair.kind,
@@ -139,11 +116,7 @@ fn a_body_held_by_a_closing_joint_moves_as_if_it_hung_on_it() {
                 let summary = simulation.mechanism().summary();
                 let free = pair.freedoms + usize::from(!driven);
                 assert_eq!(summary.degrees_of_freedom, free, "{label}");
-                assert_eq!(
-                    (summary.closing_joints, summary.dependent_rows),
-                    (1, 0),
-                    "{label}"
-                );
+                assert_eq!((summary.closing_joints, summary.dependent_rows), (1, 0), "{label}");
                 assert_eq!(simulation.not_unique(), Default::default(), "{label}");
                 let frame = at(&mut simulation, 0.25);
                 for (a, b) in frame.bodies.iter().zip(&end.bodies) {
@@ -152,17 +125,11 @@ fn a_body_held_by_a_closing_joint_moves_as_if_it_hung_on_it() {
                     let off = (a.rotation - b.rotation).amax();
                     assert!(off < 2e-6, "{label}: {off:e}");
                     let off = (a.angular_acceleration - b.angular_acceleration).norm();
-                    assert!(
-                        off < 2e-4 * b.angular_acceleration.norm().max(1.0),
-                        "{label}: {off:e}"
-                    );
+                    assert!(off < 2e-4 * b.angular_acceleration.norm().max(1.0), "{label}: {off:e}");
                 }
                 assert_eq!(frame.coordinates.len(), end.coordinates.len());
                 for (a, b) in frame.coordinates.iter().zip(&end.coordinates) {
-                    assert!(
-                        differ(a[0], b[0]) < 2e-6 && (a[1] - b[1]).abs() < 2e-5,
-                        "{label}: {a:?} {b:?}"
-                    );
+                    assert!(differ(a[0], b[0]) < 2e-6 && (a[1] - b[1]).abs() < 2e-5, "{label}: {a:?} {b:?}");
                 }
                 for (a, b) in frame.actuators.iter().zip(&end.actuators) {
                     assert!((a - b).abs() < 1e-5, "{label}: {a} {b}");
@@ -188,10 +155,7 @@ fn four_bar_angles(crank: f64) -> [f64; 2] {
     let (dx, dy) = (GROUND - a * crank.cos(), -a * crank.sin());
     let reach = dx.hypot(dy);
     let coupler = dy.atan2(dx) + ((b * b + reach * reach - c * c) / (2.0 * b * reach)).acos();
-    [
-        coupler,
-        (b * coupler.sin() - dy).atan2(b * coupler.cos() - dx),
-    ]
+    [coupler, (b * coupler.sin() - dy).atan2(b * coupler.cos() - dx)]
 }
 
 /// What a planar four-bar may have besides.
@@ -210,13 +174,7 @@ const REVOLUTE: &str = "[[joint]]\nname = \"B\"\nkind = \"revolute\"\nparent = \
 const BALL: &str = "[[ball_joint]]\nname = \"B\"\nsocket = { body = \"coupler\", at = \"0.26 0 0 m\" }\n\
                     ball = { body = \"rocker\", at = \"0.21 0 0 m\" }\nclearance = 0\n";
 
-const PLAIN: Bar = Bar {
-    start: "as-given",
-    driven: [None; 2],
-    aside: 0.0,
-    off: 0.0,
-    closed_by: REVOLUTE,
-};
+const PLAIN: Bar = Bar { start: "as-given", driven: [None; 2], aside: 0.0, off: 0.0, closed_by: REVOLUTE };
 
 /// In the world's x and z; hinge axes are -y, so that angles count from x to z. The crank starts at 1 rad and 12 rad/s.
 fn four_bar(bar: &Bar) -> String {
@@ -224,10 +182,7 @@ fn four_bar(bar: &Bar) -> String {
     let crank = 1.0;
     let [coupler, rocker] = four_bar_angles(crank);
     let s = (coupler - rocker).sin();
-    let rates = [
-        12.0 * a * (rocker - crank).sin() / (b * s),
-        12.0 * a * (coupler - crank).sin() / (c * s),
-    ];
+    let rates = [12.0 * a * (rocker - crank).sin() / (b * s), 12.0 * a * (coupler - crank).sin() / (c * s)];
     let body = |i: usize, name: &str, mass: f64, inertia: f64| {
         format!(
             "[[body]]\nname = \"{name}\"\nmass = \"{mass} kg\"\ncentre = \"{} 0 0 m\"\ninertia = \"{} {inertia} {inertia} kg m^2\"\n",
@@ -236,9 +191,9 @@ fn four_bar(bar: &Bar) -> String {
         )
     };
     let start = |driven: Option<f64>, angle: f64, rate: f64| match driven {
-        Some(rate) => format!(
-            "drive = {{ law = \"constant\", position = \"{angle:e} rad\", velocity = \"{rate:e} rad/s\" }}\n"
-        ),
+        Some(rate) => {
+            format!("drive = {{ law = \"constant\", position = \"{angle:e} rad\", velocity = \"{rate:e} rad/s\" }}\n")
+        }
         None => {
             format!("start = {{ position = \"{angle:e} rad\", velocity = \"{rate:e} rad/s\" }}\n")
         }
@@ -249,19 +204,11 @@ fn four_bar(bar: &Bar) -> String {
         )
     };
     [
-        format!(
-            "start = \"{}\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-10\n",
-            bar.start
-        ),
+        format!("start = \"{}\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-10\n", bar.start),
         body(0, "crank", 0.3, 4e-4),
         body(1, "coupler", 0.5, 3e-3),
         body(2, "rocker", 0.4, 2e-3),
-        hinge(
-            "O",
-            "crank",
-            String::new(),
-            start(bar.driven[0], crank, 12.0),
-        ),
+        hinge("O", "crank", String::new(), start(bar.driven[0], crank, 12.0)),
         hinge(
             "A",
             "coupler",
@@ -291,10 +238,7 @@ fn open(frame: &Frame) -> f64 {
 
 #[test]
 fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball() {
-    let with_ball = Bar {
-        closed_by: BALL,
-        ..PLAIN
-    };
+    let with_ball = Bar { closed_by: BALL, ..PLAIN };
     let mut ball = started(&four_bar(&with_ball), &[]);
     let end = at(&mut ball, 0.3);
     let mut reactions = Vec::new();
@@ -320,10 +264,7 @@ fn a_planar_four_bar_closed_by_a_hinge_moves_as_one_closed_by_a_ball() {
         };
         assert!(differ(closing[0], rocker[0] - crank[0] - coupler[0]) < bound);
         let rate = rocker[1] - crank[1] - coupler[1];
-        assert!(
-            (closing[1] - rate).abs() < 100.0 * bound,
-            "{formulation}: {closing:?} {rate}"
-        );
+        assert!((closing[1] - rate).abs() < 100.0 * bound, "{formulation}: {closing:?} {rate}");
     }
     // Of those that give the motion, both forms take the least. In the plane that is what the ball carries.
     let [tree, lagrange] = reactions[..] else {
@@ -349,11 +290,7 @@ fn every_method_keeps_a_loop_closed_and_restores_it_to_the_bit() {
     for method in METHODS {
         for formulation in FORMULATIONS {
             let label = format!("{method} {formulation}");
-            let step = if method.ends_with("euler") {
-                "2 us"
-            } else {
-                "5 us"
-            };
+            let step = if method.ends_with("euler") { "2 us" } else { "5 us" };
             let changes = [
                 ("solver.method", method),
                 ("solver.step", step),
@@ -382,9 +319,7 @@ const YOKE: f64 = 0.08;
 
 fn scotch_yoke(crank: &str) -> String {
     let body = |name: &str, mass: f64| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nmass = \"{mass} kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n"
-        )
+        format!("[[body]]\nname = \"{name}\"\nmass = \"{mass} kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n")
     };
     [
         "[gravity]\nx = 0\ny = 0\nz = 0\n[solver]\ntolerance = 1e-11\n".to_owned(),
@@ -422,27 +357,17 @@ fn a_scotch_yoke_moves_as_its_closed_form() {
         };
         assert!((x - YOKE * angle.cos()).abs() < bound, "{formulation}: {x}");
         assert!((speed + YOKE * rate * angle.sin()).abs() < 100.0 * bound);
-        assert!(
-            (slot - YOKE * angle.sin()).abs() < bound,
-            "{formulation}: {slot}"
-        );
+        assert!((slot - YOKE * angle.sin()).abs() < bound, "{formulation}: {slot}");
         let expected = 9.0 * (inertia(0.5) / inertia(angle)).sqrt();
-        assert!(
-            (rate - expected).abs() < 1e-6,
-            "{formulation}: {rate} {expected}"
-        );
+        assert!((rate - expected).abs() < 1e-6, "{formulation}: {rate} {expected}");
         // Driven at a constant rate, the torque is that of the changing inertia.
-        let drive =
-            "drive = { law = \"constant\", position = \"0.5 rad\", velocity = \"9 rad/s\" }";
+        let drive = "drive = { law = \"constant\", position = \"0.5 rad\", velocity = \"9 rad/s\" }";
         let mut simulation = started(&scotch_yoke(drive), &change);
         let frame = at(&mut simulation, 0.3);
         let angle: f64 = 0.5 + 9.0 * 0.3;
         let torque = 1.5 * YOKE * YOKE * 81.0 * angle.sin() * angle.cos();
         let off = frame.actuators[0] - torque;
-        assert!(
-            off.abs() < 1e-5 * torque.abs().max(1.0),
-            "{formulation}: {off:e}"
-        );
+        assert!(off.abs() < 1e-5 * torque.abs().max(1.0), "{formulation}: {off:e}");
         assert_eq!(simulation.not_unique().actuators, [0; 0]);
     }
 }
@@ -468,16 +393,8 @@ fn a_universal_joint_turns_a_shaft_at_its_known_ratio() {
         for formulation in FORMULATIONS {
             let mut simulation = started(&text, &[("formulation", formulation)]);
             let summary = simulation.mechanism().summary();
-            assert_eq!(
-                (summary.dependent_rows, summary.degrees_of_freedom),
-                (dependent, 0),
-                "{bearing}"
-            );
-            let (near, fast) = if formulation == "tree" {
-                (1e-9, 1e-8)
-            } else {
-                (1e-5, 1e-3)
-            };
+            assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (dependent, 0), "{bearing}");
+            let (near, fast) = if formulation == "tree" { (1e-9, 1e-8) } else { (1e-5, 1e-3) };
             for k in 1..=20 {
                 let t = 0.04 * f64::from(k);
                 let frame = at(&mut simulation, t);
@@ -485,23 +402,14 @@ fn a_universal_joint_turns_a_shaft_at_its_known_ratio() {
                 let angle = sin.atan2(cos * bend.cos());
                 let ratio = bend.cos() / (1.0 - (bend.sin() * cos).powi(2));
                 let [own, rate] = frame.coordinates[frame.coordinates.len() - 1];
-                assert!(
-                    differ(own, angle) < near,
-                    "{bearing} {formulation} {t}: {own} {angle}"
-                );
-                assert!(
-                    (rate - 10.0 * ratio).abs() < 10.0 * fast,
-                    "{bearing} {formulation} {t}: {rate}"
-                );
+                assert!(differ(own, angle) < near, "{bearing} {formulation} {t}: {own} {angle}");
+                assert!((rate - 10.0 * ratio).abs() < 10.0 * fast, "{bearing} {formulation} {t}: {rate}");
                 // Nothing else takes power: the torque is what accelerates the second shaft.
-                let slope = -bend.cos() * 2.0 * bend.sin().powi(2) * cos * sin
-                    / (1.0 - (bend.sin() * cos).powi(2)).powi(2);
+                let slope =
+                    -bend.cos() * 2.0 * bend.sin().powi(2) * cos * sin / (1.0 - (bend.sin() * cos).powi(2)).powi(2);
                 let torque = 2e-3 * ratio * slope * 100.0;
                 let off = (frame.actuators[0] - torque).abs();
-                assert!(
-                    off < 2e-3 * fast.max(1e-6) * 100.0,
-                    "{bearing} {formulation} {t}: {off:e}"
-                );
+                assert!(off < 2e-3 * fast.max(1e-6) * 100.0, "{bearing} {formulation} {t}: {off:e}");
             }
         }
     }
@@ -533,11 +441,7 @@ fn a_bennett_linkage_turns_as_its_closed_form() {
         let rate = 3.0;
         // d(second)/d(first), from tan tan = factor.
         let slope = -second(first).sin() / first.sin();
-        let law = if driven {
-            "drive = { law = \"constant\", "
-        } else {
-            "start = { "
-        };
+        let law = if driven { "drive = { law = \"constant\", " } else { "start = { " };
         let text = [
             "[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-10\n".to_owned(),
             body("l1") + &body("l2") + &body("l3"),
@@ -574,11 +478,7 @@ fn a_bennett_linkage_turns_as_its_closed_form() {
             let mut simulation = started(&text, &[("formulation", formulation)]);
             let summary = simulation.mechanism().summary();
             let free = usize::from(!driven);
-            assert_eq!(
-                (summary.dependent_rows, summary.degrees_of_freedom),
-                (3, free),
-                "{label}"
-            );
+            assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (3, free), "{label}");
             let bound = if formulation == "tree" { 1e-9 } else { 1e-5 };
             for k in 1..=8 {
                 let frame = at(&mut simulation, 0.1 * f64::from(k));
@@ -600,32 +500,23 @@ fn a_bennett_linkage_turns_as_its_closed_form() {
 fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
     let degrees = |x: f64| x.to_radians();
     // Axes 1 (z of the world) and 2 (of the input), 2 and 3 (of the coupler), 3 and 4 (of the output), 4 and 1.
-    let [z12, z23, z34, z41] =
-        [30.0, 80.0, 70.0, 75.0].map(|x| turn(Vec3::x(), degrees(x)) * Vec3::z());
+    let [z12, z23, z34, z41] = [30.0, 80.0, 70.0, 75.0].map(|x| turn(Vec3::x(), degrees(x)) * Vec3::z());
     // At their angles of 0 the frames of input, coupler and output have axes 1, 2 and 4 along z.
     let of_coupler = turn(Vec3::x(), degrees(30.0));
     let of_output = turn(Vec3::x(), degrees(75.0));
     // The output sees the third axis where the coupler has it, whatever its angle.
     let closing = Quat::rotation_between(&z34, &z23).unwrap();
-    let (p12, p23, p34, p41) = (
-        Vec3::new(0.06, 0.0, 0.0),
-        Vec3::new(0.2, 0.02, 0.0),
-        Vec3::new(0.15, 0.0, 0.03),
-        Vec3::new(-0.12, 0.04, 0.0),
-    );
-    let body = |name: &str| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nmass = \"0.3 kg\"\ninertia = \"4e-4 4e-4 2e-4 kg m^2\"\n"
-        )
-    };
+    let (p12, p23, p34, p41) =
+        (Vec3::new(0.06, 0.0, 0.0), Vec3::new(0.2, 0.02, 0.0), Vec3::new(0.15, 0.0, 0.03), Vec3::new(-0.12, 0.04, 0.0));
+    let body =
+        |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"0.3 kg\"\ninertia = \"4e-4 4e-4 2e-4 kg m^2\"\n");
     let cylindrical = |name: &str, parent: &str, child: &str, more: String| {
         format!(
             "[[joint]]\nname = \"{name}\"\nkind = \"cylindrical\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{more}\n"
         )
     };
     let text = [
-        "start = \"ideal\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-10\n"
-            .to_owned(),
+        "start = \"ideal\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-10\n".to_owned(),
         body("input") + &body("coupler") + &body("output"),
         "[[joint]]\nname = \"input\"\nkind = \"revolute\"\nchild = \"input\"\naxis = [0, 0, 1]\n\
          drive = { law = \"constant\", position = \"0 deg\", velocity = \"6 rad/s\" }\n"
@@ -690,10 +581,7 @@ fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
             let distance = (p3 - p2).dot(&z2.cross(&z3));
             // In the coupler axis 2 is z through the origin.
             let own = p23.dot(&Vec3::z().cross(&z23));
-            assert!(
-                (distance - own).abs() < bound,
-                "{formulation} {t}: {distance} {own}"
-            );
+            assert!((distance - own).abs() < bound, "{formulation} {t}: {distance} {own}");
             most = most.max(slid.abs());
         }
         assert!(most > 1e-3, "it slides: {most}");
@@ -708,54 +596,31 @@ fn start_error(text: &str) -> String {
 
 #[test]
 fn a_loop_that_does_not_close_is_refused_by_joint_and_direction() {
-    let aside = Bar {
-        aside: 5e-3,
-        ..PLAIN
-    };
+    let aside = Bar { aside: 5e-3, ..PLAIN };
     let error = start_error(&four_bar(&aside));
     let words = "joint B: its bodies are 5 mm apart there and turned against it by 0 deg as given, and a joint that closes a loop may be \
                  open by at most 0.01 mm and 0.00573 deg";
     assert!(error.contains(words), "{error}");
-    let aside = Bar {
-        start: "ideal",
-        ..aside
-    };
+    let aside = Bar { start: "ideal", ..aside };
     let error = start_error(&four_bar(&aside));
     let words = "as given and cannot be closed: remaining gaps: B by 5 mm along y (no joint can move that way)";
     assert!(error.contains(words), "{error}");
     // Its axis the other way round satisfies every row, but is not what the file says.
     let flipped = REVOLUTE.to_owned() + "rotation = { axis = [1, 0, 0], angle = \"180 deg\" }\n";
     let error = start_error(&four_bar(&PLAIN).replace(REVOLUTE, &flipped));
-    assert!(
-        error.contains("turned against it by 180 deg as given"),
-        "{error}"
-    );
-    let ideal = Bar {
-        start: "ideal",
-        ..PLAIN
-    };
+    assert!(error.contains("turned against it by 180 deg as given"), "{error}");
+    let ideal = Bar { start: "ideal", ..PLAIN };
     let error = start_error(&four_bar(&ideal).replace(REVOLUTE, &flipped));
     assert!(error.contains("remaining gaps: B by 180 deg"), "{error}");
-    let against = Bar {
-        driven: [Some(12.0), Some(30.0)],
-        ..PLAIN
-    };
+    let against = Bar { driven: [Some(12.0), Some(30.0)], ..PLAIN };
     let error = start_error(&four_bar(&against));
-    assert!(
-        error.contains("joint B: the drives ask for speeds at which it opens at"),
-        "{error}"
-    );
+    assert!(error.contains("joint B: the drives ask for speeds at which it opens at"), "{error}");
 }
 
 #[test]
 fn a_guess_is_assembled_and_what_moved_is_known() {
     let off = 8_f64.to_radians();
-    let guess = Bar {
-        start: "ideal",
-        driven: [Some(12.0), None],
-        off,
-        ..PLAIN
-    };
+    let guess = Bar { start: "ideal", driven: [Some(12.0), None], off, ..PLAIN };
     for start in ["ideal", "settled"] {
         let text = four_bar(&Bar { start, ..guess });
         let mut simulation = Simulation::new(&parse(&text, &[])).unwrap();

@@ -60,10 +60,7 @@ fn cranks_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
     let (crank, leg) = (0.030, 0.280_f64);
     for (swing, rate) in [(30.0_f64, 1.0), (45.0, 2.0)] {
         let (swing_text, rate_text) = (format!("{swing} deg"), format!("{rate} Hz"));
-        let changes = [
-            ("parameter.swing", &*swing_text),
-            ("parameter.rate", &*rate_text),
-        ];
+        let changes = [("parameter.swing", &*swing_text), ("parameter.rate", &*rate_text)];
         ideally("hexapod", &changes, 1.0, |scene, frame| {
             let (centre, axes) = pose(scene, frame, "platform");
             for number in 1..=6 {
@@ -97,10 +94,7 @@ fn arms_of_the_delta_stand_where_inverse_kinematics_wants_them() {
     let (motor, socket) = (base / 12_f64.sqrt(), platform / 3_f64.sqrt());
     for (swing, lift) in [(0.25, 0.0), (0.5, 0.4)] {
         let (swing_text, lift_text) = (format!("{swing} rad"), format!("{lift} rad"));
-        let changes = [
-            ("parameter.swing", &*swing_text),
-            ("parameter.lift", &*lift_text),
-        ];
+        let changes = [("parameter.swing", &*swing_text), ("parameter.lift", &*lift_text)];
         ideally("delta", &changes, 1.0 / 1.5, |scene, frame| {
             let (centre, axes) = pose(scene, frame, "platform");
             let tilt = (axes - Mat3::identity()).amax();
@@ -136,10 +130,7 @@ fn the_springs_of_the_delta_quieten_its_rods() {
         simulation.statistics().impacts.iter().sum::<u64>() - before
     };
     let (held, free) = (knocks("50 N"), knocks("0.001 N"));
-    assert!(
-        2 * held < free,
-        "{held} impacts with springs, {free} without"
-    );
+    assert!(2 * held < free, "{held} impacts with springs, {free} without");
 }
 
 #[test]
@@ -148,10 +139,7 @@ fn the_rocker_of_the_four_bar_obeys_the_loop_equation() {
     const ROCKER: f64 = 0.120;
     for (crank, coupler) in [(0.050, 0.120), (0.060, 0.140)] {
         let (crank_text, coupler_text) = (format!("{crank} m"), format!("{coupler} m"));
-        let changes = [
-            ("parameter.crank", &*crank_text),
-            ("parameter.coupler", &*coupler_text),
-        ];
+        let changes = [("parameter.crank", &*crank_text), ("parameter.coupler", &*coupler_text)];
         ideally("four-bar", &changes, TAU / 10.0, |scene, frame| {
             let cos = (10.0 * frame.time).cos();
             // The rocker hangs by its angle about Y, with its ball on the side to which X points.
@@ -187,10 +175,7 @@ fn the_ram_of_the_press_follows_from_two_circles() {
             let off = pose(scene, frame, "ram").0.z + 2.0 * LINK * swing.cos();
             assert!(off.abs() < 1e-9, "{} s: {off:e} m", frame.time);
             // The hinge that closes the loop of both.
-            let (rod, link) = (
-                pose(scene, frame, "connecting-rod"),
-                pose(scene, frame, "upper-link"),
-            );
+            let (rod, link) = (pose(scene, frame, "connecting-rod"), pose(scene, frame, "upper-link"));
             let of_rod = rod.0 + rod.1 * Vec3::new(-ROD, 0.0, 0.0);
             let of_link = link.0 + link.1 * Vec3::new(0.0, 0.0, -LINK);
             let knee = Vec3::new(LINK * swing.sin(), 0.0, -LINK * swing.cos());
@@ -205,10 +190,7 @@ fn the_ram_of_the_press_follows_from_two_circles() {
 #[test]
 fn play_lifts_the_ram_of_the_press_at_the_bottom() {
     let bottom = |clearance: &str| {
-        let changes = [
-            ("contact.clearance", clearance),
-            ("parameter.speed", "20 rpm"),
-        ];
+        let changes = [("contact.clearance", clearance), ("parameter.speed", "20 rpm")];
         let mut simulation = simulation("press", &changes);
         // Half a turn; slowly, so that nothing rattles there.
         run_until(&mut simulation, 1.5);
@@ -242,10 +224,7 @@ fn until(distance: f64, other: Vec3, point: Vec3, on: Vec3, axis: Vec3) -> f64 {
     let along = axis * axis.dot(&arm);
     let (across, seat) = (arm - along, on + along - other);
     let c = distance * distance - seat.norm_squared() - across.norm_squared();
-    let (a, b) = (
-        2.0 * seat.dot(&across),
-        2.0 * seat.dot(&axis.cross(&across)),
-    );
+    let (a, b) = (2.0 * seat.dot(&across), 2.0 * seat.dot(&axis.cross(&across)));
     [1.0, -1.0]
         .map(|side| {
             let angle = on_circle(a, b, c, side);
@@ -299,27 +278,13 @@ impl Corner {
             let normal = (b - a).cross(&(c - a)).normalize();
             (Mat3::identity() + normal * normal.transpose()) * moment
         };
-        let of_lower_arm = plate(
-            0.4,
-            Self::LOWER_HINGE,
-            Self::LOWER_HINGE + Vec3::x(),
-            Self::LOWER_BALL,
-        );
-        let of_upper_arm = plate(
-            0.03,
-            Self::UPPER_HINGE,
-            Self::UPPER_HINGE + hinge,
-            Self::UPPER_BALL,
-        );
+        let of_lower_arm = plate(0.4, Self::LOWER_HINGE, Self::LOWER_HINGE + Vec3::x(), Self::LOWER_BALL);
+        let of_upper_arm = plate(0.03, Self::UPPER_HINGE, Self::UPPER_HINGE + hinge, Self::UPPER_BALL);
         // Upright; spindle, wheel and tyre 159 mm further out.
         let (knuckle, rolling) = (19.45, 14.705 + 18.8 + 37.6);
         let steiner = knuckle * rolling / (knuckle + rolling) * 0.159_f64.powi(2);
         let across = 0.04117 + 0.4634 + 3.84 + steiner;
-        let of_wheel = Vec3::new(
-            0.1656 + across,
-            0.1934 + 0.07352 + 0.6243 + 6.69,
-            0.04367 + across,
-        );
+        let of_wheel = Vec3::new(0.1656 + across, 0.1934 + 0.07352 + 0.6243 + 6.69, 0.04367 + across);
         let direction = along.normalize();
         let thin = Mat3::identity() - direction * direction.transpose();
         let of_rod = thin * (6.0 * length * length / 12.0 + 6.0 * 0.02_f64.powi(2) / 4.0)
@@ -329,10 +294,7 @@ impl Corner {
                 (Self::SPRUNG, up),
                 (23.965, up + of_lower(Vec3::new(0.0, 0.547, -0.059))),
                 (5.813, up + of_upper(Vec3::new(-0.106, 0.589, 0.218))),
-                (
-                    knuckle + rolling,
-                    of_upright(Self::WHEEL - Vec3::y() * (0.159 * knuckle / (knuckle + rolling))),
-                ),
+                (knuckle + rolling, of_upright(Self::WHEEL - Vec3::y() * (0.159 * knuckle / (knuckle + rolling)))),
                 (6.0, up + Self::INNER + 0.5 * rod),
             ],
             [
@@ -353,12 +315,7 @@ impl Corner {
 
     /// Length of the coil spring.
     fn coil(theta: f64) -> f64 {
-        let seat = turned(
-            Vec3::new(0.097, 0.543, -0.047),
-            Self::LOWER_HINGE,
-            Vec3::x(),
-            theta,
-        );
+        let seat = turned(Vec3::new(0.097, 0.543, -0.047), Self::LOWER_HINGE, Vec3::x(), theta);
         (seat - Vec3::new(0.104, 0.510, 0.197)).norm()
     }
 
@@ -369,20 +326,13 @@ impl Corner {
 
     fn potential(z: f64, theta: f64) -> f64 {
         // The tyre carries everything as designed; then virtual work says what the spring does.
-        let all: f64 = Self::parts(0.0, 0.0)
-            .0
-            .iter()
-            .map(|(mass, _)| mass * 9.81)
-            .sum();
+        let all: f64 = Self::parts(0.0, 0.0).0.iter().map(|(mass, _)| mass * 9.81).sum();
         let slope = |f: &dyn Fn(f64) -> f64| (f(1e-5) - f(-1e-5)) / 2e-5;
         let raised = slope(&|theta| Self::weight(0.0, theta) - all * Self::wheel(0.0, theta).z);
         let preload = -raised / slope(&Self::coil);
         let change = Self::coil(theta) - Self::coil(0.0);
         let pressed = all / TYRE - (Self::wheel(z, theta).z - Self::WHEEL.z);
-        Self::weight(z, theta)
-            + preload * change
-            + 0.5 * COIL * change * change
-            + 0.5 * TYRE * pressed * pressed
+        Self::weight(z, theta) + preload * change + 0.5 * COIL * change * change + 0.5 * TYRE * pressed * pressed
     }
 
     /// Masses and stiffnesses of small motion about the rest: (11, 12, 22) of each.
@@ -390,10 +340,7 @@ impl Corner {
         let h = 1e-5;
         // The rates of all positions and angles for a unit rate of each coordinate.
         let rates = |step: [f64; 2]| {
-            let (after, before) = (
-                Self::parts(step[0] * h, step[1] * h),
-                Self::parts(-step[0] * h, -step[1] * h),
-            );
+            let (after, before) = (Self::parts(step[0] * h, step[1] * h), Self::parts(-step[0] * h, -step[1] * h));
             let speeds = std::array::from_fn::<_, 5, _>(|n| {
                 let mass: f64 = after.0[n].0;
                 (after.0[n].1 - before.0[n].1) * (mass.sqrt() / (2.0 * h))
@@ -416,11 +363,7 @@ impl Corner {
         let corners = v(1.0, 1.0) - v(1.0, -1.0) - v(-1.0, 1.0) + v(-1.0, -1.0);
         (
             [product(&a, &a), product(&a, &b), product(&b, &b)],
-            [
-                v(1.0, 0.0) - 2.0 * middle + v(-1.0, 0.0),
-                0.25 * corners,
-                v(0.0, 1.0) - 2.0 * middle + v(0.0, -1.0),
-            ],
+            [v(1.0, 0.0) - 2.0 * middle + v(-1.0, 0.0), 0.25 * corners, v(0.0, 1.0) - 2.0 * middle + v(0.0, -1.0)],
         )
     }
 
@@ -468,17 +411,10 @@ fn the_suspension_swings_as_its_linear_model() {
         .collect();
     for (frequency, shape) in modes {
         // What is left of a sum of modes by the product with one, as they are orthogonal with the masses for weights.
-        let weights = [
-            m[0] * shape[0] + m[1] * shape[1],
-            m[1] * shape[0] + m[2] * shape[1],
-        ];
-        let mode = samples
-            .iter()
-            .map(|x| weights[0] * x[0] + weights[1] * x[1]);
+        let weights = [m[0] * shape[0] + m[1] * shape[1], m[1] * shape[0] + m[2] * shape[1]];
+        let mode = samples.iter().map(|x| weights[0] * x[0] + weights[1] * x[1]);
         let mode: Vec<f64> = mode.collect();
-        let (least, most) = mode
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
+        let (least, most) = mode.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
         let middle = 0.5 * (least + most);
         let ups: Vec<f64> = (1..mode.len())
             .filter(|&n| mode[n - 1] < middle && mode[n] >= middle)
@@ -488,16 +424,10 @@ fn the_suspension_swings_as_its_linear_model() {
         let found = periods as f64 / (0.5e-3 * (ups[periods] - ups[0]));
         println!("{found} Hz, linear model {frequency} Hz, {periods} periods");
         assert!(periods >= 6);
-        assert!(
-            (found / frequency - 1.0).abs() < 5e-3,
-            "{found} {frequency}"
-        );
+        assert!((found / frequency - 1.0).abs() < 5e-3, "{found} {frequency}");
     }
     // What its help says.
-    assert!(
-        (modes[0].0 - 1.1).abs() < 0.1 && (modes[1].0 - 9.3).abs() < 0.5,
-        "{modes:?}"
-    );
+    assert!((modes[0].0 - 1.1).abs() < 0.1 && (modes[1].0 - 9.3).abs() < 0.5, "{modes:?}");
 }
 
 #[test]
@@ -527,10 +457,7 @@ fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
     let (ideal, loose) = (toe(&[IDEAL]), toe(&[]));
     let worn = toe(&[("joint.outer.clearance", "1.5 mm")]);
     println!("toe moves by {ideal:e}, {loose:e}, {worn:e} rad");
-    assert!(
-        loose > 5.0 * ideal && worn > 1.2 * loose,
-        "{ideal:e} {loose:e} {worn:e}"
-    );
+    assert!(loose > 5.0 * ideal && worn > 1.2 * loose, "{ideal:e} {loose:e} {worn:e}");
 }
 
 /// The longer tie rod turns the front of the wheel inward, as its help says.
@@ -578,10 +505,7 @@ fn each_balances_its_energy_in_both_formulations_and_repeats_its_bits() {
             let ran = run();
             let ledger = ran.ledger().unwrap();
             let residual = ledger.relative_residual().abs();
-            assert!(
-                residual < PROMISE,
-                "{name}, {form}: {residual:e} {ledger:?}"
-            );
+            assert!(residual < PROMISE, "{name}, {form}: {residual:e} {ledger:?}");
             assert!(ledger.exchanged > 0.0 && ledger.drive_work != 0.0, "{name}");
             let impacts: u64 = ran.statistics().impacts.iter().sum();
             assert!(impacts > 0, "{name}, {form}");
@@ -621,8 +545,7 @@ fn each_assembles_at_the_ends_of_its_parameters() {
             let mut changes: Vec<(&str, &str)> = ends.iter().map(|(k, v)| (*k, &**v)).collect();
             changes.push(IDEAL);
             let scene = parse(&plain.source.text, &changes);
-            let mut simulation =
-                Simulation::new(&scene).unwrap_or_else(|error| panic!("{name} {ends:?}: {error}"));
+            let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{name} {ends:?}: {error}"));
             for joint in frame_now(&mut simulation).joints {
                 assert!(joint.eccentricity.norm() < 1e-9, "{name} {ends:?}");
             }
@@ -634,11 +557,7 @@ fn each_assembles_at_the_ends_of_its_parameters() {
 #[test]
 fn the_tool_point_of_the_hexapod_strays_by_twice_the_play() {
     let strays = |rate: &str| {
-        let loose = [
-            ("parameter.rate", rate),
-            ("solver.tolerance", "1e-4"),
-            ("contact.clearance", "0.1 mm"),
-        ];
+        let loose = [("parameter.rate", rate), ("solver.tolerance", "1e-4"), ("contact.clearance", "0.1 mm")];
         let ideal = [("parameter.rate", rate), IDEAL];
         let mut runs = [simulation("hexapod", &loose), simulation("hexapod", &ideal)];
         let (mut frame, mut most) = (Frame::default(), 0.0_f64);
@@ -664,9 +583,8 @@ fn the_tool_point_of_the_hexapod_strays_by_twice_the_play() {
 fn the_rocker_of_the_four_bar_stands_low_or_leads_and_lags() {
     let off = |speed: f64| {
         let text = format!("{speed} rad/s");
-        let mut runs = [&[][..], &[IDEAL]].map(|more: &Changes| {
-            simulation("four-bar", &[&[("parameter.speed", &*text)], more].concat())
-        });
+        let mut runs = [&[][..], &[IDEAL]]
+            .map(|more: &Changes| simulation("four-bar", &[&[("parameter.speed", &*text)], more].concat()));
         let (mut frame, mut least, mut most) = (Frame::default(), f64::MAX, f64::MIN);
         // From half a turn to one and a half.
         for n in 50..=150 {
@@ -682,9 +600,6 @@ fn the_rocker_of_the_four_bar_stands_low_or_leads_and_lags() {
         (least, most)
     };
     let (slow, fast) = (off(5.0), off(20.0));
-    assert!(
-        slow.0 > 2e-5 && slow.1 > 1e-4 && slow.1 < 1.5e-4,
-        "{slow:?}"
-    );
+    assert!(slow.0 > 2e-5 && slow.1 > 1e-4 && slow.1 < 1.5e-4, "{slow:?}");
     assert!(fast.0 < -2e-4 && fast.1 > 2e-4, "{fast:?}");
 }

@@ -40,12 +40,8 @@ fn off_at_first(found: &[Hit], reference: &[Hit]) -> (f64, f64) {
 
 #[test]
 fn impacts_are_resolved_at_a_loose_tolerance() {
-    let cases = [
-        ("chain", 25e-3, 2e-6),
-        ("four-bar", 20e-3, 2e-6),
-        ("pendulum", 60e-3, 1e-5),
-        ("slider-crank", 60e-3, 3e-5),
-    ];
+    let cases =
+        [("chain", 25e-3, 2e-6), ("four-bar", 20e-3, 2e-6), ("pendulum", 60e-3, 1e-5), ("slider-crank", 60e-3, 3e-5)];
     for (scene, end, allowed) in cases {
         let (reference, _) = run(scene, &[], "dopri5", "1e-9", end);
         let (found, _) = run(scene, &[], "automatic", "1e-3", end);
@@ -97,9 +93,6 @@ fn a_long_chain_at_rest_in_its_sockets_is_stepped_implicitly() {
             let joint = j + 1;
             assert!(off < 5e-4, "J{joint}: {force} N instead of {peak} N");
         }
-        assert!(
-            evaluations < most,
-            "{tolerance}: {evaluations} evaluations, {explicit} of dopri5"
-        );
+        assert!(evaluations < most, "{tolerance}: {evaluations} evaluations, {explicit} of dopri5");
     }
 }

@@ -1,17 +1,13 @@
 //! Each stepper shows its order on smooth motions of the mechanisms themselves.
 
 use crate::common::{run_until, scene, simulation, slope};
-use jointplay::integrate::{
-    DormandPrince, ImexEuler, RungeKutta4, SemiImplicitEuler, Stepper, System,
-};
+use jointplay::integrate::{DormandPrince, ImexEuler, RungeKutta4, SemiImplicitEuler, Stepper, System};
 use jointplay::mechanism::{Mechanism, Touching};
 
 /// Largest difference of two states relative to the scales of their components.
 fn distance(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
     let parts = a.iter().zip(b).zip(scale);
-    parts
-        .map(|((a, b), s)| (a - b).abs() / s)
-        .fold(0.0, f64::max)
+    parts.map(|((a, b), s)| (a - b).abs() / s).fold(0.0, f64::max)
 }
 
 /// State of `mechanism` after `steps` equal steps over `duration`.
@@ -58,29 +54,18 @@ fn slopes_of_the_error_are_the_orders() {
     let mut mechanism = Mechanism::new(&scene).unwrap();
     let mut start = mechanism.start().unwrap();
     let n = start.len();
-    for (rate, i) in start[mechanism.positions()..]
-        .iter_mut()
-        .zip([0, 0, 0, 6, -9, 5, 20, -15, 10])
-    {
+    for (rate, i) in start[mechanism.positions()..].iter_mut().zip([0, 0, 0, 6, -9, 5, 20, -15, 10]) {
         *rate += 0.25 * f64::from(i);
     }
     let scale = mechanism.scale().to_vec();
-    let exact = equal_steps(
-        &mut mechanism,
-        DormandPrince::new(n),
-        &start,
-        DURATION,
-        4000,
-    );
+    let exact = equal_steps(&mut mechanism, DormandPrince::new(n), &start, DURATION, 4000);
     let mut order = |name: &str, steps: [u32; 4], expected: f64, tolerance: f64| {
         let points: Vec<(f64, f64)> = steps
             .iter()
             .map(|&steps| {
                 let m = &mut mechanism;
                 let y = match name {
-                    "semi-implicit-euler" => {
-                        equal_steps(m, SemiImplicitEuler::new(n), &start, DURATION, steps)
-                    }
+                    "semi-implicit-euler" => equal_steps(m, SemiImplicitEuler::new(n), &start, DURATION, steps),
                     "imex-euler" => equal_imex_steps(m, &start, DURATION, steps),
                     "rk4" => equal_steps(m, RungeKutta4::new(n), &start, DURATION, steps),
                     _ => equal_steps(m, DormandPrince::new(n), &start, DURATION, steps),
@@ -115,19 +100,11 @@ fn projected(changes: &[(&str, &str)], exact: Option<&[f64]>) -> (f64, Vec<f64>,
 fn projection_keeps_the_order_of_fixed_steps() {
     let (_, exact, _) = projected(&[("solver.tolerance", "1e-13")], None);
     for (method, steps, expected, tolerance) in [
-        (
-            "semi-implicit-euler",
-            [2000.0, 1000.0, 500.0, 250.0],
-            1.0,
-            0.1,
-        ),
+        ("semi-implicit-euler", [2000.0, 1000.0, 500.0, 250.0], 1.0, 0.1),
         ("rk4", [8000.0, 4000.0, 2000.0, 1000.0], 4.0, 0.3),
     ] {
         let points = steps.map(|step| {
-            let changes = [
-                ("solver.method", method),
-                ("solver.step", &format!("{step} us")),
-            ];
+            let changes = [("solver.method", method), ("solver.step", &format!("{step} us"))];
             (step, projected(&changes, Some(&exact)).0)
         });
         let found = slope(&points);

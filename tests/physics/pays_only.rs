@@ -46,14 +46,7 @@ fn fully_driven_ideal_scenes_solve_no_differential_equation() {
     assert_eq!(statistics.evaluations, statistics.steps);
     assert_eq!(statistics.rejected, 0);
     // The result owes nothing to the stepper: any method and step reach the same state.
-    let mut other = simulation(
-        "spcmm",
-        &[
-            IDEAL,
-            ("solver.method", "semi-implicit-euler"),
-            ("solver.step", "10 ms"),
-        ],
-    );
+    let mut other = simulation("spcmm", &[IDEAL, ("solver.method", "semi-implicit-euler"), ("solver.step", "10 ms")]);
     other.advance_to(0.5).unwrap();
     assert_eq!(driven.state_hash(), other.state_hash());
     for (name, changes) in [
@@ -65,10 +58,7 @@ fn fully_driven_ideal_scenes_solve_no_differential_equation() {
         ("slider-crank-driven", vec![IDEAL]),
         ("pendulum", vec![IDEAL]),
     ] {
-        assert!(
-            self::summary(name, &changes).solves_differential_equation,
-            "{name} {changes:?}"
-        );
+        assert!(self::summary(name, &changes).solves_differential_equation, "{name} {changes:?}");
     }
 }
 
@@ -122,53 +112,25 @@ fn links_of_a_chain_are_blocks_of_their_own() {
 fn counts_of_the_built_in_scenes() {
     // (scene, changes, bodies, driven bodies, drives, contacts, ideal joints, degrees of freedom,
     //  tree: velocities, positions, rows; lagrange: rows)
-    type Row = (
-        &'static str,
-        Vec<(&'static str, &'static str)>,
-        [usize; 6],
-        [usize; 3],
-        usize,
-    );
+    type Row = (&'static str, Vec<(&'static str, &'static str)>, [usize; 6], [usize; 3], usize);
     let play = |joint| (joint, "0.3 mm");
     let rows: [Row; 10] = [
         // The platform's quaternion makes one position more than there are velocities.
         ("spcmm", vec![], [7, 3, 3, 3, 0, 9], [9, 10, 0], 33),
         (
             "spcmm",
-            vec![
-                IDEAL,
-                play("joint.S1.clearance"),
-                play("joint.S2.clearance"),
-            ],
+            vec![IDEAL, play("joint.S1.clearance"), play("joint.S2.clearance")],
             [7, 3, 3, 2, 1, 6],
             [9, 10, 3],
             36,
         ),
-        (
-            "spcmm",
-            vec![IDEAL, play("joint.S3.clearance")],
-            [7, 3, 3, 1, 2, 3],
-            [9, 10, 6],
-            39,
-        ),
+        ("spcmm", vec![IDEAL, play("joint.S3.clearance")], [7, 3, 3, 1, 2, 3], [9, 10, 6], 39),
         ("spcmm", vec![IDEAL], [7, 3, 3, 0, 3, 0], [9, 10, 9], 42),
         ("pendulum", vec![], [1, 0, 0, 1, 0, 6], [6, 7, 0], 0),
         ("pendulum", vec![IDEAL], [1, 0, 0, 0, 1, 3], [6, 7, 3], 3),
         ("slider-crank", vec![], [3, 0, 0, 1, 1, 5], [8, 9, 3], 13),
-        (
-            "slider-crank",
-            vec![IDEAL],
-            [3, 0, 0, 0, 2, 2],
-            [8, 9, 6],
-            16,
-        ),
-        (
-            "slider-crank-driven",
-            vec![],
-            [3, 1, 1, 1, 1, 4],
-            [7, 8, 3],
-            14,
-        ),
+        ("slider-crank", vec![IDEAL], [3, 0, 0, 0, 2, 2], [8, 9, 6], 16),
+        ("slider-crank-driven", vec![], [3, 1, 1, 1, 1, 4], [7, 8, 3], 14),
         ("chain", vec![], [8, 0, 0, 8, 0, 48], [48, 56, 0], 0),
     ];
     for (name, changes, [bodies, driven, drives, contacts, ideal, free], tree, rows) in rows {
@@ -176,28 +138,12 @@ fn counts_of_the_built_in_scenes() {
             let changes = [&changes[..], &[("formulation", form)]].concat();
             let got = summary(name, &changes);
             let case = format!("{name} {changes:?}: {got:?}");
-            assert_eq!(
-                (got.bodies, got.driven_bodies, got.drives),
-                (bodies, driven, drives),
-                "{case}"
-            );
-            assert_eq!(
-                (got.contacts, got.ideal_joints),
-                (contacts, ideal),
-                "{case}"
-            );
+            assert_eq!((got.bodies, got.driven_bodies, got.drives), (bodies, driven, drives), "{case}");
+            assert_eq!((got.contacts, got.ideal_joints), (contacts, ideal), "{case}");
             assert_eq!(got.frictional_contacts, contacts, "{case}");
             assert_eq!(got.degrees_of_freedom, free, "{case}");
-            let expected = if form == "tree" {
-                tree
-            } else {
-                [6 * bodies, 7 * bodies, rows]
-            };
-            let counts = [
-                got.velocity_coordinates,
-                got.position_coordinates,
-                got.constraint_rows,
-            ];
+            let expected = if form == "tree" { tree } else { [6 * bodies, 7 * bodies, rows] };
+            let counts = [got.velocity_coordinates, got.position_coordinates, got.constraint_rows];
             assert_eq!(counts, expected, "{case}");
         }
     }

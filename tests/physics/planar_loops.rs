@@ -22,12 +22,7 @@ const MASS: [f64; 3] = [0.3, 0.5, 0.4];
 const INERTIA: [f64; 3] = [4e-4, 3e-3, 2e-3];
 
 /// Grashof: 0.1 + 0.26 < 0.24 + 0.21.
-const GRASHOF: FourBar = FourBar {
-    lengths: [0.1, 0.26, 0.21],
-    ground: 0.24,
-    angle: 1.0,
-    rate: 12.0,
-};
+const GRASHOF: FourBar = FourBar { lengths: [0.1, 0.26, 0.21], ground: 0.24, angle: 1.0, rate: 12.0 };
 
 type Plane = [f64; 2];
 
@@ -55,11 +50,7 @@ impl FourBar {
         let [a, b, c] = self.lengths;
         let [_, coupler, rocker] = self.angles(crank);
         let s = (coupler - rocker).sin();
-        [
-            1.0,
-            a * (rocker - crank).sin() / (b * s),
-            a * (coupler - crank).sin() / (c * s),
-        ]
+        [1.0, a * (rocker - crank).sin() / (b * s), a * (coupler - crank).sin() / (c * s)]
     }
 
     fn bends(&self, crank: f64) -> [f64; 3] {
@@ -74,20 +65,13 @@ impl FourBar {
         let [a, b, c] = self.lengths;
         let (q, s) = (self.angles(crank), self.slopes(crank));
         // Centroid of the coupler: half way along it from the crank's end.
-        let centre = [
-            -a * q[0].sin() - 0.5 * b * s[1] * q[1].sin(),
-            a * q[0].cos() + 0.5 * b * s[1] * q[1].cos(),
-        ];
+        let centre = [-a * q[0].sin() - 0.5 * b * s[1] * q[1].sin(), a * q[0].cos() + 0.5 * b * s[1] * q[1].cos()];
         let inertia = INERTIA[0]
             + MASS[0] * 0.25 * a * a
             + INERTIA[1] * s[1] * s[1]
             + MASS[1] * (centre[0] * centre[0] + centre[1] * centre[1])
             + (INERTIA[2] + MASS[2] * 0.25 * c * c) * s[2] * s[2];
-        let heights = [
-            0.5 * a * q[0].sin(),
-            a * q[0].sin() + 0.5 * b * q[1].sin(),
-            0.5 * c * q[2].sin(),
-        ];
+        let heights = [0.5 * a * q[0].sin(), a * q[0].sin() + 0.5 * b * q[1].sin(), 0.5 * c * q[2].sin()];
         let potential = heights.iter().zip(MASS).map(|(h, m)| m * G * h).sum();
         (inertia, potential)
     }
@@ -124,23 +108,17 @@ impl FourBar {
         let turning = |length: f64, i: usize| {
             let arm = along(length, q[i]);
             let w2 = s[i] * s[i] * square;
-            [
-                -acceleration[i] * arm[1] - w2 * arm[0],
-                acceleration[i] * arm[0] - w2 * arm[1],
-            ]
+            [-acceleration[i] * arm[1] - w2 * arm[0], acceleration[i] * arm[0] - w2 * arm[1]]
         };
         let (end_a, half_b) = (turning(a, 0), turning(0.5 * b, 1));
         let needed = [end_a[0] + half_b[0], end_a[1] + half_b[1] + G].map(|x| MASS[1] * x);
         let coupler = INERTIA[1] * acceleration[1] + cross(along(0.5 * b, q[1]), needed);
-        let rocker = (INERTIA[2] + MASS[2] * 0.25 * c * c) * acceleration[2]
-            + cross(along(0.5 * c, q[2]), [0.0, MASS[2] * G]);
+        let rocker =
+            (INERTIA[2] + MASS[2] * 0.25 * c * c) * acceleration[2] + cross(along(0.5 * c, q[2]), [0.0, MASS[2] * G]);
         // cross(coupler, -F) = coupler, cross(rocker, F) = rocker.
         let (u, v) = (along(b, q[1]), along(c, q[2]));
         let determinant = u[0] * v[1] - u[1] * v[0];
-        [
-            -(coupler * v[0] + rocker * u[0]) / determinant,
-            -(coupler * v[1] + rocker * u[1]) / determinant,
-        ]
+        [-(coupler * v[0] + rocker * u[0]) / determinant, -(coupler * v[1] + rocker * u[1]) / determinant]
     }
 
     /// The scene: the plane is the world's x and z, turned by `turn`; hinge axes are its -y, so that angles count from x to z.
@@ -158,9 +136,7 @@ impl FourBar {
             }
         };
         let quaternion = format!("[{:e}, {:e}, {:e}, {:e}]", turn.w, turn.i, turn.j, turn.k);
-        let axis = numbers(turn * -Vec3::y(), "")
-            .replace(' ', ", ")
-            .replace(", \"", "\"");
+        let axis = numbers(turn * -Vec3::y(), "").replace(' ', ", ").replace(", \"", "\"");
         let axis = axis.trim_matches('"').trim_end_matches(',').to_owned();
         let ground = |name: &str, child: &str, at: Vec3, start: String| {
             format!(
@@ -183,10 +159,7 @@ impl FourBar {
         let rate = self.rate;
         let text = [
             format!("start = \"{}\"\n", with.start),
-            format!(
-                "[gravity]\nx = \"{:e} m/s^2\"\ny = \"{:e} m/s^2\"\nz = \"{:e} m/s^2\"\n",
-                g.x, g.y, g.z
-            ),
+            format!("[gravity]\nx = \"{:e} m/s^2\"\ny = \"{:e} m/s^2\"\nz = \"{:e} m/s^2\"\n", g.x, g.y, g.z),
             "[solver]\ntolerance = 1e-9\n".to_owned(),
             body(0, "crank") + &body(1, "coupler") + &body(2, "rocker"),
             ground("O", "crank", Vec3::zeros(), start(0, q[0], rate)),
@@ -195,12 +168,7 @@ impl FourBar {
                  parent_point = \"{a:e} 0 0 m\"\naxis = [0, -1, 0]\n{}\n",
                 start(1, q[1] - q[0], rate * (s[1] - 1.0))
             ),
-            ground(
-                "D",
-                "rocker",
-                Vec3::new(self.ground, with.offset, 0.0),
-                start(2, q[2], rate * s[2]),
-            ),
+            ground("D", "rocker", Vec3::new(self.ground, with.offset, 0.0), start(2, q[2], rate * s[2])),
             format!(
                 "[[ball_joint]]\nname = \"B\"\nsocket = {{ body = \"coupler\", at = \"{b:e} 0 0 m\" }}\n\
                  ball = {{ body = \"rocker\", at = \"{c:e} 0 0 m\" }}\nclearance = \"{}\"\n",
@@ -223,14 +191,7 @@ struct Extras {
     rates: Option<[f64; 3]>,
 }
 
-const PLAIN: Extras = Extras {
-    start: "as-given",
-    clearance: "0",
-    driven: &[],
-    offset: 0.0,
-    pose: None,
-    rates: None,
-};
+const PLAIN: Extras = Extras { start: "as-given", clearance: "0", driven: &[], offset: 0.0, pose: None, rates: None };
 
 fn tilted() -> Quat {
     Quat::from_euler_angles(0.4, -0.7, 1.1)
@@ -258,12 +219,9 @@ fn start_error(scene: &Scene) -> String {
 #[test]
 fn a_four_bar_closed_by_an_ideal_ball_joint_moves_as_its_geometry_and_energy_say() {
     let bar = GRASHOF;
-    for (turn, form) in [
-        (Quat::identity(), "tree"),
-        (Quat::identity(), "lagrange"),
-        (tilted(), "tree"),
-        (tilted(), "lagrange"),
-    ] {
+    for (turn, form) in
+        [(Quat::identity(), "tree"), (Quat::identity(), "lagrange"), (tilted(), "tree"), (tilted(), "lagrange")]
+    {
         let scene = bar.scene(turn, PLAIN, &[("formulation", form)]);
         let mut simulation = Simulation::new(&scene).unwrap();
         let summary = simulation.mechanism().summary();
@@ -305,12 +263,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_moves_as_its_geometry_and_energy_say
 #[test]
 fn every_method_takes_a_planar_loop_ideal_driven_and_with_play() {
     for (clearance, driven) in [("0", &[][..]), ("0", &[0]), ("0.3 mm", &[])] {
-        let with = Extras {
-            start: "ideal",
-            clearance,
-            driven,
-            ..PLAIN
-        };
+        let with = Extras { start: "ideal", clearance, driven, ..PLAIN };
         let reference = {
             let scene = GRASHOF.scene(Quat::identity(), with, &[]);
             let mut simulation = Simulation::new(&scene).unwrap();
@@ -350,12 +303,7 @@ fn every_method_takes_a_planar_loop_ideal_driven_and_with_play() {
 
 #[test]
 fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
-    let bar = FourBar {
-        lengths: [0.1, 0.24, 0.1],
-        ground: 0.24,
-        angle: 1.0,
-        rate: 20.0,
-    };
+    let bar = FourBar { lengths: [0.1, 0.24, 0.1], ground: 0.24, angle: 1.0, rate: 20.0 };
     let run = |form, method, tolerance, driven: &'static [usize]| {
         let changes = [
             ("formulation", form),
@@ -368,12 +316,7 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
         let stopped = simulation.advance_to(0.5).err();
         (simulation, stopped)
     };
-    for (method, tolerance) in [
-        ("automatic", "1e-6"),
-        ("automatic", "1e-9"),
-        ("radau5", "1e-8"),
-        ("rk4", "1e-6"),
-    ] {
+    for (method, tolerance) in [("automatic", "1e-6"), ("automatic", "1e-9"), ("radau5", "1e-8"), ("rk4", "1e-6")] {
         for driven in [&[][..], &[0]] {
             let (mut simulation, stopped) = run("tree", method, tolerance, driven);
             let case = format!("{method}, {tolerance}, {driven:?}");
@@ -389,27 +332,15 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
     // Constraints that are only stabilised drift where they hold weakly; whatever comes of it is said and finite.
     let (mut simulation, stopped) = run("lagrange", "automatic", "1e-6", &[]);
     let frame = frame_now(&mut simulation);
-    assert!(
-        frame
-            .bodies
-            .iter()
-            .all(|b| b.acceleration.norm().is_finite())
-    );
+    assert!(frame.bodies.iter().all(|b| b.acceleration.norm().is_finite()));
     let drifted = simulation.statistics().constraint_drift;
     assert!(drifted < 1e-3 && (stopped.is_some() || drifted > 0.0));
     let flat = FourBar { angle: 0.0, ..bar };
-    let with = Extras {
-        pose: Some([0.0; 3]),
-        rates: Some([1.0, 0.0, 1.0]),
-        ..PLAIN
-    };
+    let with = Extras { pose: Some([0.0; 3]), rates: Some([1.0, 0.0, 1.0]), ..PLAIN };
     let error = start_error(&flat.scene(Quat::identity(), with, &[]));
     assert!(error.contains("singular pose: at B"), "{error}");
     // With play there is nothing that could branch.
-    let loose = Extras {
-        clearance: "0.3 mm",
-        ..with
-    };
+    let loose = Extras { clearance: "0.3 mm", ..with };
     for start in ["as-given", "ideal"] {
         let loose = Extras { start, ..loose };
         let mut simulation = Simulation::new(&flat.scene(Quat::identity(), loose, &[])).unwrap();
@@ -420,11 +351,7 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
 #[test]
 fn what_no_motion_closes_is_refused_by_joint_and_direction() {
     for start in ["as-given", "ideal"] {
-        let aside = Extras {
-            start,
-            offset: 5e-3,
-            ..PLAIN
-        };
+        let aside = Extras { start, offset: 5e-3, ..PLAIN };
         let error = start_error(&GRASHOF.scene(Quat::identity(), aside, &[]));
         let words = if start == "ideal" {
             "ball joint B: ball and socket centres are 5 mm apart as given and cannot be closed: remaining gaps: B by \
@@ -434,36 +361,17 @@ fn what_no_motion_closes_is_refused_by_joint_and_direction() {
         };
         assert!(error.contains(words), "{error}");
     }
-    let short = FourBar {
-        lengths: [0.1, 0.05, 0.05],
-        ..GRASHOF
-    };
-    let apart = Extras {
-        start: "ideal",
-        pose: Some([1.0, 0.2, 2.5]),
-        rates: Some([1.0, 0.0, 0.0]),
-        ..PLAIN
-    };
+    let short = FourBar { lengths: [0.1, 0.05, 0.05], ..GRASHOF };
+    let apart = Extras { start: "ideal", pose: Some([1.0, 0.2, 2.5]), rates: Some([1.0, 0.0, 0.0]), ..PLAIN };
     let error = start_error(&short.scene(Quat::identity(), apart, &[]));
-    assert!(
-        error.contains("cannot be closed: the parts do not reach"),
-        "{error}"
-    );
+    assert!(error.contains("cannot be closed: the parts do not reach"), "{error}");
 }
 
 #[test]
 fn two_drives_of_a_parallelogram_share_the_load_or_are_refused() {
-    let bar = FourBar {
-        lengths: [0.1, 0.24, 0.1],
-        ground: 0.24,
-        angle: 1.0,
-        rate: 4.0,
-    };
+    let bar = FourBar { lengths: [0.1, 0.24, 0.1], ground: 0.24, angle: 1.0, rate: 4.0 };
     for form in ["tree", "lagrange"] {
-        let both = Extras {
-            driven: &[0, 2],
-            ..PLAIN
-        };
+        let both = Extras { driven: &[0, 2], ..PLAIN };
         let scene = bar.scene(Quat::identity(), both, &[("formulation", form)]);
         let mut simulation = Simulation::new(&scene).unwrap();
         let loose = simulation.not_unique();
@@ -471,26 +379,17 @@ fn two_drives_of_a_parallelogram_share_the_load_or_are_refused() {
         run_until(&mut simulation, 0.1);
         let frame = frame_now(&mut simulation);
         // One motor alone would need the same work from it.
-        let alone = Extras {
-            driven: &[0],
-            ..PLAIN
-        };
+        let alone = Extras { driven: &[0], ..PLAIN };
         let mut single = Simulation::new(&bar.scene(Quat::identity(), alone, &[])).unwrap();
         assert_eq!(single.not_unique().actuators, [0; 0]);
         run_until(&mut single, 0.1);
         let work = frame_now(&mut single).actuators[0];
         let sum: f64 = frame.actuators.iter().sum();
         assert!((sum - work).abs() < 1e-6, "{form}: {sum} {work}");
-        let against = Extras {
-            rates: Some([1.0, 0.0, 1.5]),
-            ..both
-        };
+        let against = Extras { rates: Some([1.0, 0.0, 1.5]), ..both };
         let scene = bar.scene(Quat::identity(), against, &[("formulation", form)]);
         let error = start_error(&scene);
-        assert!(
-            error.contains("ball joint B: the drives ask for speeds at which it opens"),
-            "{error}"
-        );
+        assert!(error.contains("ball joint B: the drives ask for speeds at which it opens"), "{error}");
     }
 }
 
@@ -536,11 +435,7 @@ fn two_ball_joints_make_a_hinge() {
         let off = (frame.bodies[0].position - expected.bodies[0].position).norm();
         assert!(off < 1e-7, "{form}: {off:e}");
         let [low, high] = [0, 1].map(|j| frame.joints[j].normal_force);
-        assert!(
-            (low + high - weight).norm() < 1e-5,
-            "{form}: {}",
-            low + high
-        );
+        assert!((low + high - weight).norm() < 1e-5, "{form}: {}", low + high);
         assert!((low - high).dot(&axis).abs() < 1e-6, "{form}: {low} {high}");
         assert_eq!(simulation.not_unique().reactions, [0, 1]);
     }
@@ -551,12 +446,7 @@ fn what_the_assembly_moved_is_known() {
     let degrees = std::f64::consts::PI / 180.0;
     let close = GRASHOF.angles(GRASHOF.angle);
     let guess = [close[0], close[1] + 8.0 * degrees, close[2]];
-    let with = Extras {
-        start: "ideal",
-        driven: &[0],
-        pose: Some(guess),
-        ..PLAIN
-    };
+    let with = Extras { start: "ideal", driven: &[0], pose: Some(guess), ..PLAIN };
     let simulation = Simulation::new(&GRASHOF.scene(tilted(), with, &[])).unwrap();
     let assembly = simulation.mechanism().assembly();
     let (joint, gap) = assembly.widest.unwrap();
@@ -579,12 +469,8 @@ fn another_assembly_mode_than_the_guess_s_is_told() {
                 continue; // In line: neither mode.
             }
             let guess = [k, l].map(|k| f64::from(k) * std::f64::consts::TAU / 20.0 + 0.05);
-            let with = Extras {
-                start: "ideal",
-                driven: &[0],
-                pose: Some([GRASHOF.angle, guess[0], guess[1]]),
-                ..PLAIN
-            };
+            let with =
+                Extras { start: "ideal", driven: &[0], pose: Some([GRASHOF.angle, guess[0], guess[1]]), ..PLAIN };
             let scene = GRASHOF.scene(Quat::identity(), with, &[]);
             let Ok(mut simulation) = Simulation::new(&scene) else {
                 continue;
@@ -592,11 +478,7 @@ fn another_assembly_mode_than_the_guess_s_is_told() {
             let frame = frame_now(&mut simulation);
             let [coupler, rocker] = [1, 2].map(|body| angle_of(&frame, Quat::identity(), body));
             let other = ((guess[0] - guess[1]).sin() > 0.0) != ((coupler - rocker).sin() > 0.0);
-            assert_eq!(
-                simulation.mechanism().assembly().other_mode,
-                other,
-                "{guess:?}"
-            );
+            assert_eq!(simulation.mechanism().assembly().other_mode, other, "{guess:?}");
             told += u32::from(other);
             kept += u32::from(!other);
         }

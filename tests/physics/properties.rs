@@ -3,9 +3,7 @@
 
 use crate::common::invariants::finite;
 use crate::common::{METHODS, SCENES};
-use jointplay::scene::{
-    BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table,
-};
+use jointplay::scene::{BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table};
 use jointplay::simulate::{Doubt, Frame, Simulation};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError};
@@ -19,18 +17,11 @@ const MOST_LINKS: u64 = 12;
 /// The same cases every time, unless the environment asks for others.
 pub fn config(cases: u32) -> ProptestConfig {
     let asked = |name| std::env::var_os(name).is_some();
-    let usual = ProptestConfig {
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    };
+    let usual = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
     if asked("PROPTEST_CASES") || asked("PROPTEST_RNG_SEED") {
         return usual;
     }
-    ProptestConfig {
-        cases,
-        rng_seed: RngSeed::Fixed(1),
-        ..usual
-    }
+    ProptestConfig { cases, rng_seed: RngSeed::Fixed(1), ..usual }
 }
 
 /// Values in a row's range, its ends among them; wide ranges evenly in their decades.
@@ -53,9 +44,7 @@ fn values(parameter: &'static Parameter) -> BoxedStrategy<Value> {
             .boxed()
         }
         Kind::Count { min, max } => (min..=max.min(MOST_LINKS)).prop_map(Value::Count).boxed(),
-        Kind::Choice(words) => proptest::sample::select(words)
-            .prop_map(Value::Choice)
-            .boxed(),
+        Kind::Choice(words) => proptest::sample::select(words).prop_map(Value::Choice).boxed(),
     }
 }
 
@@ -77,16 +66,11 @@ fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
 }
 
 /// One of `scenes`, and changes in its keys' ranges.
-fn changed_scenes(
-    scenes: &'static [&'static str],
-) -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
+fn changed_scenes(scenes: &'static [&'static str]) -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
     let of_scene = |name: &'static str| {
         let scene = Scene::load(name, &[]).unwrap();
-        let rows: Vec<BoxedStrategy<(&'static Parameter, Value)>> = scene
-            .parameters()
-            .into_iter()
-            .map(|row| values(row).prop_map(move |value| (row, value)).boxed())
-            .collect();
+        let rows: Vec<BoxedStrategy<(&'static Parameter, Value)>> =
+            scene.parameters().into_iter().map(|row| values(row).prop_map(move |value| (row, value)).boxed()).collect();
         let change = proptest::strategy::Union::new(rows);
         proptest::collection::vec((change, any::<usize>()), 1..=8).prop_map(move |changes| {
             let write = |((row, value), joint): ((&'static Parameter, Value), usize)| {
@@ -106,10 +90,7 @@ fn fail(what: impl Into<String>) -> TestCaseError {
 fn is_clear(words: &str, changes: &[(String, String)]) -> Result<(), TestCaseError> {
     prop_assert!(!words.contains("NaN") && words.len() < 2000, "{words}");
     let part = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
-    prop_assert!(
-        changes.iter().any(|(key, _)| words.contains(&part(key))),
-        "names no key: {words}"
-    );
+    prop_assert!(changes.iter().any(|(key, _)| words.contains(&part(key))), "names no key: {words}");
     Ok(())
 }
 

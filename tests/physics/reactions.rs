@@ -7,10 +7,7 @@ use jointplay::simulate::{BodyMotion, Frame, Simulation};
 
 /// A frame that asks for reactions.
 fn asking() -> Frame {
-    Frame {
-        reactions: Some(Vec::new()),
-        ..Frame::default()
-    }
+    Frame { reactions: Some(Vec::new()), ..Frame::default() }
 }
 
 /// Everything at `time`, s, with reactions.
@@ -32,9 +29,7 @@ const MASS: f64 = 0.7;
 const GRAVITY: f64 = 9.81;
 
 fn body(name: &str, more: &str) -> String {
-    format!(
-        "[[body]]\nname = \"{name}\"\nmass = \"{MASS} kg\"\ninertia = \"2e-3 3e-3 4e-3 kg m^2\"\n{more}\n"
-    )
+    format!("[[body]]\nname = \"{name}\"\nmass = \"{MASS} kg\"\ninertia = \"2e-3 3e-3 4e-3 kg m^2\"\n{more}\n")
 }
 
 #[test]
@@ -61,17 +56,14 @@ fn the_pin_of_a_pendulum_bears_weight_and_centrifugal_force() {
             let moment = MASS * GRAVITY * r;
             let square = 2.0 * moment * (angle.sin() - start.sin()) / inertia;
             let acceleration = moment * angle.cos() / inertia;
-            let needed = MASS * (ahead * (r * acceleration) - along * (r * square))
-                + Vec3::new(0.0, 0.0, MASS * GRAVITY);
+            let needed =
+                MASS * (ahead * (r * acceleration) - along * (r * square)) + Vec3::new(0.0, 0.0, MASS * GRAVITY);
             let [force, torque] = reaction(&frame, 0);
             let label = format!("{formulation} {time}");
             assert!((force - needed).norm() < 1e-6, "{label}: {force} {needed}");
             // About the pin: what its offset along the axis asks for, nothing about the axis.
             let expected = Vec3::new(0.0, aside, 0.0).cross(&needed);
-            assert!(
-                (torque - expected).norm() < 1e-6,
-                "{label}: {torque} {expected}"
-            );
+            assert!((torque - expected).norm() < 1e-6, "{label}: {torque} {expected}");
             assert!(torque.y.abs() < 1e-9, "{label}");
         }
     }
@@ -86,8 +78,7 @@ fn a_slide_bears_what_is_across_it() {
         body("box", "")
     );
     for formulation in FORMULATIONS {
-        let mut simulation =
-            Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
         for time in [0.0, 0.3] {
             let frame = at(&mut simulation, time);
             let [force, torque] = reaction(&frame, 0);
@@ -112,8 +103,7 @@ fn a_driven_crank_is_held_and_turned() {
         body("weight", "centre = \"0 0 20 mm\"")
     );
     for formulation in FORMULATIONS {
-        let mut simulation =
-            Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
         for time in [0.0, 0.011, 0.05] {
             let frame = at(&mut simulation, time);
             let turn = frame.bodies[0].rotation;
@@ -123,23 +113,14 @@ fn a_driven_crank_is_held_and_turned() {
             // The lagrange form lets constraints drift a little.
             let bound = if formulation == "tree" { 1e-9 } else { 1e-4 };
             let [force, torque] = reaction(&frame, 0);
-            assert!(
-                (force - needed[0] - needed[1]).norm() < bound * 1e2,
-                "{label}: {force}"
-            );
+            assert!((force - needed[0] - needed[1]).norm() < bound * 1e2, "{label}: {force}");
             let moment = centres[0].cross(&needed[0]) + centres[1].cross(&needed[1]);
-            assert!(
-                (torque - moment).norm() < bound * 1e2,
-                "{label}: {torque} {moment}"
-            );
+            assert!((torque - moment).norm() < bound * 1e2, "{label}: {torque} {moment}");
             assert!((torque.y - frame.actuators[0]).abs() < 1e-9, "{label}");
             let [force, torque] = reaction(&frame, 1);
             assert!((force - needed[1]).norm() < bound * 1e2, "{label}: {force}");
             let arm = turn * Vec3::new(0.0, 0.0, 0.02);
-            assert!(
-                (torque - arm.cross(&needed[1])).norm() < bound * 1e2,
-                "{label}"
-            );
+            assert!((torque - arm.cross(&needed[1])).norm() < bound * 1e2, "{label}");
         }
     }
 }
@@ -160,10 +141,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
             let (w, alpha) = (m.angular_velocity, m.angular_acceleration);
             let acceleration = m.acceleration + alpha.cross(&arm) + w.cross(&w.cross(&arm));
             let inertia = m.rotation * body.inertia * m.rotation.transpose();
-            [
-                body.mass * (acceleration - scene.gravity),
-                inertia * alpha + w.cross(&(inertia * w)),
-            ]
+            [body.mass * (acceleration - scene.gravity), inertia * alpha + w.cross(&(inertia * w))]
         })
         .collect();
     let mut push = |body: Option<usize>, point: Vec3, force: Vec3, torque: Vec3| {
@@ -172,10 +150,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
             left[b][1] -= torque + (point - centre(b)).cross(&force);
         }
     };
-    let holding = scene
-        .joints
-        .iter()
-        .filter(|joint| joint.kind != JointKind::Free);
+    let holding = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     for (i, joint) in holding.enumerate() {
         let [force, torque] = reaction(frame, i);
         let m = &frame.bodies[joint.child];
@@ -186,12 +161,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
     for (joint, report) in scene.ball_joints.iter().zip(&frame.joints) {
         let force = report.normal_force + report.friction_force;
         push(joint.ball.body, report.contact_point, force, Vec3::zeros());
-        push(
-            joint.socket.body,
-            report.contact_point,
-            -force,
-            Vec3::zeros(),
-        );
+        push(joint.socket.body, report.contact_point, -force, Vec3::zeros());
     }
     for (element, report) in scene.elements.iter().zip(&frame.elements) {
         let torque = report.torque.unwrap_or_else(Vec3::zeros);
@@ -210,9 +180,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
 /// A machine with every kind of joint and element: a driven turntable, on it an arm with a slide, on that a fixed tool; a free
 /// body held by a ball joint without play to the tool.
 fn machine() -> String {
-    ["table", "arm", "ram", "tool", "ball"]
-        .map(|name| body(name, "centre = \"5 -3 8 mm\""))
-        .concat()
+    ["table", "arm", "ram", "tool", "ball"].map(|name| body(name, "centre = \"5 -3 8 mm\"")).concat()
         + "[gravity]\nx = \"1 m/s^2\"\nz = \"-9.81 m/s^2\"\n[contact]\nclearance = 0\n\
            [[joint]]\nname = \"table\"\nkind = \"revolute\"\nchild = \"table\"\naxis = [0, 0, 1]\n\
            drive = { law = \"harmonic\", amplitude = \"1 rad\", frequency = \"1 Hz\" }\n\
@@ -248,10 +216,7 @@ fn with_them_every_body_obeys_newton_and_euler() {
             assert_eq!(frame.reactions.as_ref().map(Vec::len), Some(4));
             for (b, left) in unbalanced(&scene, &frame).into_iter().enumerate() {
                 let name = &scene.bodies[b].name;
-                assert!(
-                    left[0].norm() < 1e-9 && left[1].norm() < 1e-9,
-                    "{formulation} {time} {name}: {left:?}"
-                );
+                assert!(left[0].norm() < 1e-9 && left[1].norm() < 1e-9, "{formulation} {time} {name}: {left:?}");
             }
             found.push(frame);
         }
@@ -271,11 +236,7 @@ fn with_them_every_body_obeys_newton_and_euler() {
 fn contacts_load_them_too() {
     for name in ["slider-crank", "suspension", "delta"] {
         for formulation in FORMULATIONS {
-            let changes = [
-                ("formulation", formulation),
-                ("solver.method", "dopri5"),
-                ("solver.tolerance", "1e-8"),
-            ];
+            let changes = [("formulation", formulation), ("solver.method", "dopri5"), ("solver.tolerance", "1e-8")];
             let scene = scene(name, &changes);
             let mut simulation = Simulation::new(&scene).unwrap();
             let mut touched = false;
@@ -283,17 +244,11 @@ fn contacts_load_them_too() {
                 simulation.advance_to(0.01 * f64::from(n)).unwrap();
                 let time = simulation.time();
                 let frame = at(&mut simulation, time);
-                touched |= frame
-                    .joints
-                    .iter()
-                    .any(|joint| joint.normal_force.norm() > 1.0);
+                touched |= frame.joints.iter().any(|joint| joint.normal_force.norm() > 1.0);
                 for (b, left) in unbalanced(&scene, &frame).into_iter().enumerate() {
                     let body = &scene.bodies[b].name;
                     let size = scene.bodies[b].mass * 1e3;
-                    assert!(
-                        left[0].norm() < 1e-9 * size,
-                        "{name} {formulation} {time} {body}: {left:?}"
-                    );
+                    assert!(left[0].norm() < 1e-9 * size, "{name} {formulation} {time} {body}: {left:?}");
                 }
             }
             assert!(touched, "{name} {formulation}");
@@ -305,8 +260,7 @@ fn contacts_load_them_too() {
 fn asking_for_them_changes_no_bit() {
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation)];
-        let [mut asked, mut not] =
-            [0; 2].map(|_| Simulation::new(&scene("slider-crank", &changes)).unwrap());
+        let [mut asked, mut not] = [0; 2].map(|_| Simulation::new(&scene("slider-crank", &changes)).unwrap());
         let (mut with, mut without) = (asking(), Frame::default());
         for n in 1..=20 {
             let time = 1e-3 * f64::from(n);
@@ -315,10 +269,7 @@ fn asking_for_them_changes_no_bit() {
             not.advance_to(time).unwrap();
             not.sample(time, &mut without);
             assert!(without.reactions.is_none());
-            assert_eq!(
-                format!("{:?}", with.bodies),
-                format!("{:?}", without.bodies)
-            );
+            assert_eq!(format!("{:?}", with.bodies), format!("{:?}", without.bodies));
         }
         assert_eq!(asked.state_hash(), not.state_hash());
     }

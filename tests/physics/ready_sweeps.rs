@@ -15,18 +15,14 @@ fn points(ready: &ReadySweep, vary: Option<&str>, exponent: bool) -> Vec<SweptPo
         task.vary = vec![format!("{}={range}", ready.key)];
     }
     let mut points = Vec::new();
-    perform(
-        &Job::Sweep(task, Share::WHOLE),
-        &mut || 0.0,
-        &mut |message| {
-            match message {
-                Message::Point(point) => points.push(*point),
-                Message::Failed(why) => panic!("{}: {why}", ready.name),
-                _ => {}
-            }
-            ControlFlow::Continue(())
-        },
-    );
+    perform(&Job::Sweep(task, Share::WHOLE), &mut || 0.0, &mut |message| {
+        match message {
+            Message::Point(point) => points.push(*point),
+            Message::Failed(why) => panic!("{}: {why}", ready.name),
+            _ => {}
+        }
+        ControlFlow::Continue(())
+    });
     points.sort_by_key(|point| point.index);
     points
 }
@@ -39,11 +35,7 @@ fn named(name: &str) -> &'static ReadySweep {
 #[test]
 fn every_ready_sweep_has_a_sentence_and_a_range_that_its_scene_takes() {
     for ready in &READY {
-        assert!(
-            ready.shows.ends_with('.') && ready.shows.len() > 60,
-            "{}",
-            ready.name
-        );
+        assert!(ready.shows.ends_with('.') && ready.shows.len() > 60, "{}", ready.name);
         let scene = ready.scene().expect("a built-in scene");
         assert_eq!(scene.name, ready.scene);
         for end in [ready.from, ready.to] {
@@ -52,11 +44,7 @@ fn every_ready_sweep_has_a_sentence_and_a_range_that_its_scene_takes() {
         }
         // Enough sections for the 0-1 test, which decides about chaos here.
         let kept = ready.periods - ready.discard;
-        assert!(
-            kept >= 40 || ready.name == "Play alone is no chaos",
-            "{}",
-            ready.name
-        );
+        assert!(kept >= 40 || ready.name == "Play alone is no chaos", "{}", ready.name);
     }
 }
 
@@ -74,8 +62,7 @@ fn the_road_to_chaos_begins_with_knocks() {
         // Contacts that begin in the kept turns.
         let mut run = simulation(ready.scene, &[(ready.key, value)]);
         let impacts = [ready.discard, ready.periods].map(|turns| {
-            run.advance_to(point.first + turns as f64 * point.interval)
-                .unwrap();
+            run.advance_to(point.first + turns as f64 * point.interval).unwrap();
             run.statistics().impacts.iter().sum::<u64>()
         });
         assert_eq!(impacts[1] > impacts[0], knocks, "{value}: {impacts:?}");
@@ -87,11 +74,7 @@ fn the_road_to_chaos_begins_with_knocks() {
 #[test]
 fn friction_ends_the_chaos_of_the_slider_crank() {
     let ready = named("Friction ends chaos");
-    let regime = |value: &str| {
-        points(ready, Some(&format!("{value}..{value}:1")), false)[0]
-            .regime
-            .clone()
-    };
+    let regime = |value: &str| points(ready, Some(&format!("{value}..{value}:1")), false)[0].regime.clone();
     assert_eq!(regime("0.003"), "chaotic");
     assert_eq!(regime("0.008"), "periodic 1");
     let ends = points(ready, Some("0..0.016:2"), true);
@@ -105,10 +88,7 @@ fn parts_from(chaotic: &SweptPoint, regular: &SweptPoint) {
         (exponent, error.expect("with its error"))
     };
     let (value, error) = exponent(chaotic);
-    assert!(
-        value > 1.5 && value - 2.0 * error > 1.0,
-        "{value} ± {error} 1/s"
-    );
+    assert!(value > 1.5 && value - 2.0 * error > 1.0, "{value} ± {error} 1/s");
     assert_eq!(chaotic.regime, "chaotic");
     let (value, error) = exponent(regular);
     assert!(value + 2.0 * error < 0.1, "{value} ± {error} 1/s");

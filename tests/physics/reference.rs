@@ -4,10 +4,7 @@ use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
 fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
-    let changes: Vec<(String, String)> = changes
-        .iter()
-        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
-        .collect();
+    let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
     Scene::load(name, &changes).unwrap()
 }
 
@@ -40,9 +37,7 @@ fn compare(file: &str, changes: &[(&str, &str)]) -> (f64, f64) {
     for row in reference(file) {
         simulation.advance_to(row[0]).unwrap();
         simulation.sample(row[0], &mut frame);
-        let error = (0..3)
-            .map(|i| (frame.pose.position[i] - row[1 + i]).abs())
-            .fold(0.0, f64::max);
+        let error = (0..3).map(|i| (frame.pose.position[i] - row[1 + i]).abs()).fold(0.0, f64::max);
         if row[0] <= 0.012 {
             early = early.max(error);
         }
@@ -57,11 +52,7 @@ fn positions_follow_the_reference_trajectories() {
         ("spcmm_c0.30_cf0.15_ce0.90_centres.csv", &[]),
         (
             "spcmm_c0.50_cf0.20_ce0.90_surface.csv",
-            &[
-                ("contact.clearance", "0.5 mm"),
-                ("contact.friction", "0.2"),
-                ("contact.friction_velocity", "surface"),
-            ],
+            &[("contact.clearance", "0.5 mm"), ("contact.friction", "0.2"), ("contact.friction_velocity", "surface")],
         ),
     ];
     for method in ["dopri5", "automatic", "radau5"] {
@@ -80,24 +71,13 @@ fn positions_follow_the_reference_trajectories() {
 fn ideal_reactions_are_the_anchors() {
     let mut simulation = simulation("spcmm", &[("contact.clearance", "0")]);
     let mut frame = Frame::default();
-    let anchors = [
-        (0.0, [8.28797785, 8.5687895, 2.83010815]),
-        (0.5, [7.83492554, 7.20329026, 3.07470177]),
-    ];
+    let anchors = [(0.0, [8.28797785, 8.5687895, 2.83010815]), (0.5, [7.83492554, 7.20329026, 3.07470177])];
     for (time, expected) in anchors {
         simulation.advance_to(time).unwrap();
         simulation.sample(time, &mut frame);
         for (joint, expected) in frame.joints.iter().zip(expected) {
-            assert!(
-                (joint.normal_force.norm() - expected).abs() < 1e-7,
-                "{time}: {}",
-                joint.normal_force.norm()
-            );
-            assert!(
-                joint.eccentricity.norm() < 1e-14,
-                "{:e}",
-                joint.eccentricity.norm()
-            );
+            assert!((joint.normal_force.norm() - expected).abs() < 1e-7, "{time}: {}", joint.normal_force.norm());
+            assert!(joint.eccentricity.norm() < 1e-14, "{:e}", joint.eccentricity.norm());
         }
     }
 }
@@ -136,18 +116,9 @@ fn first_impacts_have_the_anchors_speeds_and_peaks() {
     assert!(found.len() >= expected.len());
     for (got, want) in found.iter().zip(expected) {
         assert_eq!(got.0, want.0);
-        assert!(
-            (got.1 - want.1).abs() < 2e-8,
-            "start {got:?} against {want:?}"
-        );
-        assert!(
-            (got.2 / want.2 - 1.0).abs() < 1e-3,
-            "speed {got:?} against {want:?}"
-        );
-        assert!(
-            (got.3 / want.3 - 1.0).abs() < 5e-4,
-            "peak {got:?} against {want:?}"
-        );
+        assert!((got.1 - want.1).abs() < 2e-8, "start {got:?} against {want:?}");
+        assert!((got.2 / want.2 - 1.0).abs() < 1e-3, "speed {got:?} against {want:?}");
+        assert!((got.3 / want.3 - 1.0).abs() < 5e-4, "peak {got:?} against {want:?}");
     }
 }
 
@@ -165,23 +136,10 @@ fn both_formulations_agree_over_the_first_ten_milliseconds() {
         tree.sample(t, &mut a);
         lagrange.sample(t, &mut b);
         worst = worst.max((a.pose.position - b.pose.position).amax());
-        let actuators = a
-            .actuators
-            .iter()
-            .zip(&b.actuators)
-            .map(|(x, y)| (x - y).abs())
-            .fold(0.0, f64::max);
-        assert!(
-            actuators < 1e-2 * (1.0 + a.actuators[0].abs()),
-            "{t}: {:?} {:?}",
-            a.actuators,
-            b.actuators
-        );
+        let actuators = a.actuators.iter().zip(&b.actuators).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        assert!(actuators < 1e-2 * (1.0 + a.actuators[0].abs()), "{t}: {:?} {:?}", a.actuators, b.actuators);
     }
-    println!(
-        "formulations differ by {worst:.2e} m, drift {:.2e}",
-        lagrange.statistics().constraint_drift
-    );
+    println!("formulations differ by {worst:.2e} m, drift {:.2e}", lagrange.statistics().constraint_drift);
     assert!(worst < 1e-7, "{worst:e}");
 }
 
@@ -206,10 +164,7 @@ fn settled_contact_carries_the_ideal_reaction() {
         for j in 0..3 {
             let ratio = force[j] / reaction[j];
             println!("{from}-{to} s, joint {j}: settled over ideal {ratio:.5}");
-            assert!(
-                (ratio - 1.0).abs() < 0.01,
-                "{from}-{to} s, joint {j}: {ratio}"
-            );
+            assert!((ratio - 1.0).abs() < 0.01, "{from}-{to} s, joint {j}: {ratio}");
         }
     }
 }
@@ -218,47 +173,25 @@ fn settled_contact_carries_the_ideal_reaction() {
 fn free_slider_crank_passes_through_its_anchors_and_keeps_its_energy() {
     let mut simulation = simulation(
         "slider-crank",
-        &[
-            ("contact.clearance", "0"),
-            ("joint.C.clearance", "0"),
-            ("solver.tolerance", "1e-10"),
-        ],
+        &[("contact.clearance", "0"), ("joint.C.clearance", "0"), ("solver.tolerance", "1e-10")],
     );
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let energy = frame.kinetic + frame.potential;
-    let crank = simulation
-        .scene()
-        .bodies
-        .iter()
-        .position(|b| b.name == "crank")
-        .unwrap();
-    let slider = simulation
-        .scene()
-        .bodies
-        .iter()
-        .position(|b| b.name == "slider")
-        .unwrap();
-    for (time, theta, theta_rate, x) in [
-        (0.1, 0.55187518, None, 0.22636019),
-        (0.2, 1.23040441, Some(8.77212174), 0.26052243),
-    ] {
+    let crank = simulation.scene().bodies.iter().position(|b| b.name == "crank").unwrap();
+    let slider = simulation.scene().bodies.iter().position(|b| b.name == "slider").unwrap();
+    for (time, theta, theta_rate, x) in
+        [(0.1, 0.55187518, None, 0.22636019), (0.2, 1.23040441, Some(8.77212174), 0.26052243)]
+    {
         simulation.advance_to(time).unwrap();
         simulation.sample(time, &mut frame);
         let r = frame.bodies[crank].rotation;
         let angle = libm::atan2(r[(2, 1)], r[(1, 1)]);
         assert!((angle - theta).abs() < 1e-7, "{time}: {angle}");
-        assert!(
-            (frame.bodies[slider].position.x - x).abs() < 1e-7,
-            "{time}: {}",
-            frame.bodies[slider].position.x
-        );
+        assert!((frame.bodies[slider].position.x - x).abs() < 1e-7, "{time}: {}", frame.bodies[slider].position.x);
         if let Some(rate) = theta_rate {
             assert!((frame.bodies[crank].angular_velocity.x - rate).abs() < 1e-6);
         }
-        assert!(
-            (frame.kinetic + frame.potential - energy).abs() < 1e-8,
-            "{time}"
-        );
+        assert!((frame.kinetic + frame.potential - energy).abs() < 1e-8, "{time}");
     }
 }

@@ -74,10 +74,7 @@ fn an_undisturbed_impact_gives_what_its_law_gives() {
 
 #[test]
 fn an_impact_tells_its_depth_force_and_time() {
-    let mut simulation = flung(&[
-        ("contact.normal_law", "hertz"),
-        ("solver.tolerance", "1e-10"),
-    ]);
+    let mut simulation = flung(&[("contact.normal_law", "hertz"), ("solver.tolerance", "1e-10")]);
     let first = impacts(&mut simulation, 0.01)[0];
     let k = simulation.mechanism().contacts.coefficients(0).stiffness;
     // Elastic: the peak is at the deepest point.
@@ -88,21 +85,14 @@ fn an_impact_tells_its_depth_force_and_time() {
     // 2.94 delta / v.
     let lasted = first.end - first.start;
     let expected = 2.943 * first.deepest / first.approach_speed;
-    assert!(
-        (lasted / expected - 1.0).abs() < 1e-2,
-        "{lasted} {expected}"
-    );
+    assert!((lasted / expected - 1.0).abs() < 1e-2, "{lasted} {expected}");
 }
 
 #[test]
 fn slow_impacts_are_flagged() {
     let changes = [("contact.impact_speed_floor", "0.5 m/s")];
     let found = impacts(&mut flung(&changes), 0.01);
-    assert!(
-        found[0].floored && found[0].achieved() > found[0].law + 0.01,
-        "{:?}",
-        found[0]
-    );
+    assert!(found[0].floored && found[0].achieved() > found[0].law + 0.01, "{:?}", found[0]);
 }
 
 #[test]
@@ -117,16 +107,9 @@ fn impacts_among_other_contacts_are_flagged() {
         (0, 10.50063, 0.07533, false),
     ];
     for (impact, (joint, start, speed, disturbed)) in found.iter().zip(anchors) {
-        assert_eq!(
-            (impact.joint, impact.disturbed),
-            (joint, disturbed),
-            "{impact:?}"
-        );
+        assert_eq!((impact.joint, impact.disturbed), (joint, disturbed), "{impact:?}");
         assert!((1e3 * impact.start - start).abs() < 1e-4, "{impact:?}");
-        assert!(
-            (impact.approach_speed / speed - 1.0).abs() < 1e-3,
-            "{impact:?}"
-        );
+        assert!((impact.approach_speed / speed - 1.0).abs() < 1e-3, "{impact:?}");
         assert_eq!(impact.asked, 0.9);
         assert!((impact.law - 0.913).abs() < 1e-3);
         assert!((0.8..0.92).contains(&impact.achieved()), "{impact:?}");
@@ -142,11 +125,7 @@ fn impacts_among_other_contacts_are_flagged() {
 
 #[test]
 fn methods_agree_about_the_first_impacts() {
-    let reference = of(
-        "pendulum",
-        &[("solver.method", "dopri5"), ("solver.tolerance", "1e-10")],
-        0.02,
-    );
+    let reference = of("pendulum", &[("solver.method", "dopri5"), ("solver.tolerance", "1e-10")], 0.02);
     assert!(reference.len() >= 2);
     for method in METHODS {
         let changes = [("solver.method", method), ("solver.step", "2 us")];
@@ -155,22 +134,10 @@ fn methods_agree_about_the_first_impacts() {
         let loose = if method == "imex-euler" { 10.0 } else { 1.0 };
         for (a, b) in found.iter().zip(&reference).take(2) {
             println!("{method}: {:.5} against {:.5}", a.achieved(), b.achieved());
-            assert!(
-                (a.achieved() - b.achieved()).abs() < 1e-2 * loose,
-                "{method}: {a:?} {b:?}"
-            );
-            assert!(
-                (a.start - b.start).abs() < 2e-5 * loose,
-                "{method}: {a:?} {b:?}"
-            );
-            assert!(
-                (a.peak / b.peak - 1.0).abs() < 3e-2 * loose,
-                "{method}: {a:?} {b:?}"
-            );
-            assert!(
-                (a.deepest / b.deepest - 1.0).abs() < 2e-2 * loose,
-                "{method}: {a:?} {b:?}"
-            );
+            assert!((a.achieved() - b.achieved()).abs() < 1e-2 * loose, "{method}: {a:?} {b:?}");
+            assert!((a.start - b.start).abs() < 2e-5 * loose, "{method}: {a:?} {b:?}");
+            assert!((a.peak / b.peak - 1.0).abs() < 3e-2 * loose, "{method}: {a:?} {b:?}");
+            assert!((a.deepest / b.deepest - 1.0).abs() < 2e-2 * loose, "{method}: {a:?} {b:?}");
         }
     }
     // At 10 us a fixed step takes some fifteen steps through an impact, and says so.
@@ -296,8 +263,7 @@ fn damping_of_a_joint_that_is_hit_again_stays_at_chi_by_the_largest_speed() {
             let statistics = simulation.statistics();
             let (peak, damping) = (statistics.peak_normal[0], statistics.damping[0]);
             let ledger = simulation.ledger().unwrap();
-            let case =
-                format!("{word}, {method}: {peak} against {force}, {damping} against {ratio}");
+            let case = format!("{word}, {method}: {peak} against {force}, {damping} against {ratio}");
             println!("{case}; residual {:.1e}", ledger.relative_residual());
             let bound = match method {
                 "semi-implicit-euler" | "imex-euler" => 5e-3,
@@ -305,14 +271,8 @@ fn damping_of_a_joint_that_is_hit_again_stays_at_chi_by_the_largest_speed() {
             };
             assert!((peak / force - 1.0).abs() < bound, "{case}");
             assert!((damping / ratio - 1.0).abs() < 2.0 * bound, "{case}");
-            assert!(
-                ledger.relative_residual().abs() < bound,
-                "{case}: {ledger:?}"
-            );
-            let said = simulation
-                .doubts()
-                .iter()
-                .any(|doubt| matches!(doubt, Doubt::Damping { .. }));
+            assert!(ledger.relative_residual().abs() < bound, "{case}: {ledger:?}");
+            let said = simulation.doubts().iter().any(|doubt| matches!(doubt, Doubt::Damping { .. }));
             assert_eq!(said, !largest, "{case}");
         }
     }
@@ -331,21 +291,11 @@ fn an_undisturbed_impact_is_the_same_by_the_start_and_by_the_largest_speed() {
             impacts(&mut flung(&changes), 0.01)[0]
         };
         let (start, largest) = (first("start"), first("largest"));
-        for (a, b) in [
-            (start.achieved(), largest.achieved()),
-            (start.peak, largest.peak),
-            (start.end, largest.end),
-        ] {
-            assert!(
-                (a / b - 1.0).abs() < 1e-6,
-                "{method}: {start:?} {largest:?}"
-            );
+        for (a, b) in [(start.achieved(), largest.achieved()), (start.peak, largest.peak), (start.end, largest.end)] {
+            assert!((a / b - 1.0).abs() < 1e-6, "{method}: {start:?} {largest:?}");
         }
         let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
-        assert!(
-            (start.damping / chi - 1.0).abs() < 1e-2,
-            "{method}: {start:?}"
-        );
+        assert!((start.damping / chi - 1.0).abs() < 1e-2, "{method}: {start:?}");
     }
 }
 
@@ -361,24 +311,11 @@ fn damping_in_a_chain_stays_at_chi_by_the_largest_speed() {
             ];
             let mut simulation = simulation("chain", &changes);
             let found = impacts(&mut simulation, 0.04);
-            let most = found
-                .iter()
-                .map(|impact| impact.damping)
-                .fold(0.0, f64::max);
+            let most = found.iter().map(|impact| impact.damping).fold(0.0, f64::max);
             let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
             println!("{method}, {word}: {most:.3} in {} impacts", found.len());
-            assert_eq!(
-                most <= chi * (1.0 + 2e-6),
-                bounded,
-                "{method}, {word}: {most}"
-            );
-            assert!(
-                simulation
-                    .statistics()
-                    .damping
-                    .iter()
-                    .all(|d| !bounded || *d <= chi * (1.0 + 2e-6))
-            );
+            assert_eq!(most <= chi * (1.0 + 2e-6), bounded, "{method}, {word}: {most}");
+            assert!(simulation.statistics().damping.iter().all(|d| !bounded || *d <= chi * (1.0 + 2e-6)));
         }
     }
 }

@@ -12,30 +12,16 @@ fn started(name: &str, changes: &[(&str, &str)]) -> Simulation {
 fn reactions(name: &str) -> Vec<f64> {
     let mut ideal = started(name, &[("contact.clearance", "0"), ("start", "ideal")]);
     let frame = frame_now(&mut ideal);
-    frame
-        .joints
-        .iter()
-        .map(|joint| joint.normal_force.norm())
-        .collect()
+    frame.joints.iter().map(|joint| joint.normal_force.norm()).collect()
 }
 
-const SCENES: [&str; 5] = [
-    "spcmm",
-    "pendulum",
-    "slider-crank",
-    "slider-crank-driven",
-    "chain",
-];
+const SCENES: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
 
 #[test]
 fn every_contact_begins_with_the_force_of_the_ideal_joint() {
     for name in SCENES {
         for formulation in ["tree", "lagrange"] {
-            let changes = [
-                ("start", "settled"),
-                ("contact.friction", "0"),
-                ("formulation", formulation),
-            ];
+            let changes = [("start", "settled"), ("contact.friction", "0"), ("formulation", formulation)];
             let mut simulation = started(name, &changes);
             let frame: Frame = frame_now(&mut simulation);
             let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
@@ -45,11 +31,7 @@ fn every_contact_begins_with_the_force_of_the_ideal_joint() {
             for (joint, ideal) in frame.joints.iter().zip(reactions(name)) {
                 // Its place moves the reaction by the clearance over the machine's size.
                 let off = (joint.normal_force.norm() - ideal).abs() / ideal;
-                assert!(
-                    off < 0.02,
-                    "{name} {formulation}: {} N, {ideal} N",
-                    joint.normal_force
-                );
+                assert!(off < 0.02, "{name} {formulation}: {} N, {ideal} N", joint.normal_force);
                 let depth = joint.penetration;
                 assert!(depth < 1e-4, "{name}: {depth:e} m under {ideal} N");
             }
@@ -69,10 +51,7 @@ fn a_settled_start_does_not_drop() {
                 force
             });
             let ideal = reactions(name);
-            peaks
-                .zip(ideal)
-                .map(|(peak, ideal)| peak / ideal)
-                .fold(0.0, f64::max)
+            peaks.zip(ideal).map(|(peak, ideal)| peak / ideal).fold(0.0, f64::max)
         };
         let (dropped, settled) = (most("ideal"), most("settled"));
         assert!(settled < 1.3, "{name}: {settled}");
@@ -94,27 +73,18 @@ fn a_hanging_pendulum_hangs_from_the_wall() {
     // Hertz: F = K delta^1.5, the force the ideal joint's.
     let stiffness = jointplay::contact::Coefficients::new(contact, contact.clearance).stiffness;
     let depth = (reactions("pendulum")[0] / stiffness).powf(2.0 / 3.0);
-    assert!(
-        (joint.penetration / depth - 1.0).abs() < 0.01,
-        "{} {depth}",
-        joint.penetration
-    );
+    assert!((joint.penetration / depth - 1.0).abs() < 0.01, "{} {depth}", joint.penetration);
     assert!((joint.eccentricity.norm() - contact.clearance - depth).abs() < 1e-9);
 }
 
 #[test]
 fn ideal_and_unloaded_joints_stay_closed() {
-    let mut simulation = started(
-        "slider-crank",
-        &[("start", "settled"), ("joint.B.clearance", "0")],
-    );
+    let mut simulation = started("slider-crank", &[("start", "settled"), ("joint.B.clearance", "0")]);
     let frame = frame_now(&mut simulation);
     assert!(frame.joints[0].eccentricity.norm() < 1e-9);
     assert!(frame.joints[1].penetration > 0.0);
     // Nothing presses a pendulum that floats.
     let mut floating = started("pendulum", &[("start", "settled"), ("gravity.z", "0")]);
     let frame = frame_now(&mut floating);
-    assert!(
-        frame.joints[0].eccentricity.norm() < 1e-12 && frame.joints[0].normal_force.norm() == 0.0
-    );
+    assert!(frame.joints[0].eccentricity.norm() < 1e-12 && frame.joints[0].normal_force.norm() == 0.0);
 }

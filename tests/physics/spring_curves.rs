@@ -45,8 +45,7 @@ impl On {
             Self::Hinge => ("rad", "N m"),
             _ => ("m", "N"),
         };
-        let point =
-            |p: &[f64; 2]| format!("[\"{:e} {x}\", \"{:e} {f}\"]", p[0], p[1] * self.scale());
+        let point = |p: &[f64; 2]| format!("[\"{:e} {x}\", \"{:e} {f}\"]", p[0], p[1] * self.scale());
         let points: Vec<String> = points.iter().map(point).collect();
         let points = points.join(", ");
         let (joint, spring) = match self {
@@ -130,25 +129,16 @@ fn a_hardening_spring_swings_as_duffing_says_in_every_method_and_formulation() {
                 // A quarter along the cubic, a half along the straight end, and back into the cubic.
                 let frame = at(&mut simulation, passes);
                 let [x, v] = on.state(&frame);
-                assert!(
-                    x.abs() < bound && (v + speed).abs() < 20.0 * bound,
-                    "{label}: {x:e} {v}"
-                );
+                assert!(x.abs() < bound && (v + speed).abs() < 20.0 * bound, "{label}: {x:e} {v}");
                 let stored = on.scale() * 0.5 * MASS * speed * speed;
                 assert!(frame.elastic.abs() < 20.0 * bound * on.scale(), "{label}");
                 let frame = at(&mut simulation, passes + 0.5 * PI / omega);
                 let [x, _] = on.state(&frame);
                 assert!((x + speed / omega).abs() < 2.0 * bound, "{label}: {x:e}");
-                assert!(
-                    (frame.elastic / stored - 1.0).abs() < 100.0 * bound,
-                    "{label}"
-                );
+                assert!((frame.elastic / stored - 1.0).abs() < 100.0 * bound, "{label}");
                 let frame = at(&mut simulation, passes + PI / omega);
                 let [x, v] = on.state(&frame);
-                assert!(
-                    x.abs() < 4.0 * bound && (v - speed).abs() < 40.0 * bound,
-                    "{label}: {x:e}"
-                );
+                assert!(x.abs() < 4.0 * bound && (v - speed).abs() < 40.0 * bound, "{label}: {x:e}");
                 let residual = simulation.ledger().unwrap().relative_residual();
                 assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
             }
@@ -165,11 +155,9 @@ fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
         let mut simulation = On::Body.starts(&POINTS, "", &changes);
         On::Body.state(&at(&mut simulation, passes))[0].abs()
     };
-    for (method, steps, order) in [
-        ("semi-implicit-euler", [1e3, 2e3], 1.0),
-        ("imex-euler", [1e3, 2e3], 1.0),
-        ("rk4", [20.0, 40.0], 4.0),
-    ] {
+    for (method, steps, order) in
+        [("semi-implicit-euler", [1e3, 2e3], 1.0), ("imex-euler", [1e3, 2e3], 1.0), ("rk4", [20.0, 40.0], 4.0)]
+    {
         let [coarse, fine] = steps.map(|steps| error(method, steps));
         let found = (coarse / fine).log2();
         println!("{method}: {coarse:e}, {fine:e}, order {found}");
@@ -203,10 +191,7 @@ fn points_on_a_line_are_the_spring_of_that_line() {
                 assert!((a.bodies[0].position - b.bodies[0].position).norm() < 1e-9);
                 assert!((a.elements[0].force - b.elements[0].force).norm() < 1e-6);
                 // Where it does not act, the two may count from different lengths.
-                assert!(
-                    (a.elastic - b.elastic - offset).abs() < 1e-7,
-                    "{on:?} {side}"
-                );
+                assert!((a.elastic - b.elastic - offset).abs() < 1e-7, "{on:?} {side}");
             }
         }
     }
@@ -239,11 +224,7 @@ fn a_buffer_that_only_pushes_gives_back_what_it_took() {
         [[spring]]\nname = \"pad\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"100 mm\"\nside = \"push\"\n\
         characteristic = [[\"-50 mm\", \"-200 N\"], [\"-30 mm\", \"-40 N\"], [\"-10 mm\", \"-5 N\"], [0, 0], [\"10 mm\", \"4 N\"]]\n";
     for (method, formulation) in FOUR_WAYS {
-        let changes = [
-            ("solver.method", method),
-            ("solver.tolerance", "1e-9"),
-            ("formulation", formulation),
-        ];
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = Simulation::new(&parse(text, &changes)).unwrap();
         let mut highest = 0.0_f64;
         let energy = at(&mut simulation, 0.0);
@@ -253,25 +234,13 @@ fn a_buffer_that_only_pushes_gives_back_what_it_took() {
             let height = frame.bodies[0].position.z;
             highest = highest.max(height);
             let force = frame.elements[0].force.z;
-            assert!(
-                force >= 0.0 && (force == 0.0) == (height >= 0.1),
-                "{force} at {height}"
-            );
-            assert!(
-                (frame.kinetic + frame.potential - whole).abs() < 1e-6,
-                "{method}"
-            );
+            assert!(force >= 0.0 && (force == 0.0) == (height >= 0.1), "{force} at {height}");
+            assert!((frame.kinetic + frame.potential - whole).abs() < 1e-6, "{method}");
         }
         let top = whole / (0.5 * 9.81);
-        assert!(
-            top > 0.2 && (highest - top).abs() < 1e-4,
-            "{method}: {highest} {top}"
-        );
+        assert!(top > 0.2 && (highest - top).abs() < 1e-4, "{method}: {highest} {top}");
         let ledger = simulation.ledger().unwrap();
-        assert!(
-            ledger.relative_residual().abs() < 1e-6,
-            "{method} {ledger:?}"
-        );
+        assert!(ledger.relative_residual().abs() < 1e-6, "{method} {ledger:?}");
     }
 }
 
@@ -283,11 +252,7 @@ fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
     let from = text.find("characteristic").unwrap();
     std::fs::write(&scene, format!("{}file = \"coil.csv\"\n", &text[..from])).unwrap();
     let coil = folder.path().join("coil.csv");
-    std::fs::write(
-        &coil,
-        "# measured\nlength_mm, tension [N]\n0, 0\n100, 10\n200, 40\n",
-    )
-    .unwrap();
+    std::fs::write(&coil, "# measured\nlength_mm, tension [N]\n0, 0\n100, 10\n200, 40\n").unwrap();
     let scene = Scene::load(&scene, &[]).unwrap();
     assert_eq!(scene.elements[0].curve.as_deref(), Some(&POINTS[..]));
     let mut simulation = Simulation::new(&scene).unwrap();
@@ -317,45 +282,24 @@ fn what_is_wrong_with_a_characteristic_is_named() {
             "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\nfile = \"a.csv\"",
             ["spring.s.file", "`characteristic` is given as well"],
         ),
-        (
-            spring,
-            "file = \"a.csv\"",
-            ["spring.s.file", "has no folder"],
-        ),
-        (
-            spring,
-            "characteristic = [[0, 0]]",
-            [
-                "spring.s.characteristic",
-                "has 1 points; allowed 2 to 10000",
-            ],
-        ),
+        (spring, "file = \"a.csv\"", ["spring.s.file", "has no folder"]),
+        (spring, "characteristic = [[0, 0]]", ["spring.s.characteristic", "has 1 points; allowed 2 to 10000"]),
         (
             spring,
             "characteristic = [[0, 0], [\"2 mm\", \"1 N\"], [\"1 mm\", \"2 N\"]]",
-            [
-                "spring.s.characteristic[2][0] = \"1 mm\"",
-                "lengths must rise, by at least 1 nm",
-            ],
+            ["spring.s.characteristic[2][0] = \"1 mm\"", "lengths must rise, by at least 1 nm"],
         ),
         (
             spring,
             "characteristic = [[0, 0], [\"2 mm\"]]",
-            [
-                "spring.s.characteristic[1]",
-                "needs a length and a tension, has 1 values",
-            ],
+            ["spring.s.characteristic[1]", "needs a length and a tension, has 1 values"],
         ),
         (
             spring,
             "characteristic = [[0, 0], [\"2 mm\", \"1 mm\"]]",
             ["spring.s.characteristic[1][1]", "wrong unit `mm`"],
         ),
-        (
-            spring,
-            "characteristic = [[0, 0], [\"2 mm\", 0]]",
-            ["spring.s", "does nothing"],
-        ),
+        (spring, "characteristic = [[0, 0], [\"2 mm\", 0]]", ["spring.s", "does nothing"]),
         (
             turning,
             "characteristic = [[0, 0], [\"2 mm\", \"1 N\"]]",
@@ -364,16 +308,11 @@ fn what_is_wrong_with_a_characteristic_is_named() {
         (
             turning,
             "characteristic = [[\"1 deg\"]]",
-            [
-                "joint_spring.t.characteristic[0]",
-                "needs an angle and a torque",
-            ],
+            ["joint_spring.t.characteristic[0]", "needs an angle and a torque"],
         ),
     ] {
         let text = format!("{start}{element}{more}\n");
-        let error = Scene::parse(&text, Some("mine.toml"), &[])
-            .expect_err(more)
-            .to_string();
+        let error = Scene::parse(&text, Some("mine.toml"), &[]).expect_err(more).to_string();
         for said in said {
             assert!(error.contains(said), "{error}\nlacks {said}");
         }

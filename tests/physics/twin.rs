@@ -27,8 +27,7 @@ fn a_displaced_state_goes_on_from_where_it_was_put() {
     for (a, b) in before.joints.iter().zip(&after.joints) {
         assert!(((b.eccentricity - a.eccentricity).x - 1e-5).abs() < 1e-14);
     }
-    let norm =
-        |simulation: &Simulation| simulation.state()[3..7].iter().map(|q| q * q).sum::<f64>();
+    let norm = |simulation: &Simulation| simulation.state()[3..7].iter().map(|q| q * q).sum::<f64>();
     moved(&mut simulation, 4, 1e-3);
     assert!((norm(&simulation) - 1.0).abs() < 1e-15);
     run_until(&mut simulation, 0.02);
@@ -66,9 +65,7 @@ fn contacts_follow_the_displacement_and_keep_their_memory() {
 fn ideal_joints_stay_closed_under_a_displacement() {
     let mut simulation = simulation("slider-crank", &[]);
     run_until(&mut simulation, 0.05);
-    let offset: Vec<f64> = (0..simulation.state().len())
-        .map(|i| 1e-4 * (i as f64).sin())
-        .collect();
+    let offset: Vec<f64> = (0..simulation.state().len()).map(|i| 1e-4 * (i as f64).sin()).collect();
     simulation.displace(&offset);
     let frame = frame_now(&mut simulation);
     assert!(frame.joints[0].eccentricity.norm() < 1e-12);
@@ -77,12 +74,7 @@ fn ideal_joints_stay_closed_under_a_displacement() {
 
 fn point(name: &str, changes: &Changes, periods: usize, discard: usize) -> PointResult {
     let scene = scene(name, changes);
-    let plan = Plan {
-        periods,
-        discard,
-        phase: 0.0,
-        exponent: true,
-    };
+    let plan = Plan { periods, discard, phase: 0.0, exponent: true };
     let mut run = PointRun::cold(&scene, plan, drive_period(&scene).unwrap()).unwrap();
     while !run.is_done() {
         run.step().unwrap();
@@ -96,25 +88,14 @@ fn point(name: &str, changes: &Changes, periods: usize, discard: usize) -> Point
 fn settled_creeping_has_the_exponent_of_an_overdamped_pendulum() {
     for (clearance, friction) in [(3e-4, 0.15), (3e-4, 0.3), (1.5e-4, 0.2)] {
         let (c, cf) = (format!("{clearance} m"), friction.to_string());
-        let changes = [
-            ("contact.clearance", c.as_str()),
-            ("contact.friction", cf.as_str()),
-        ];
+        let changes = [("contact.clearance", c.as_str()), ("contact.friction", cf.as_str())];
         let result = point("spcmm", &changes, 14, 4);
         let exponent = result.evidence.exponent.as_ref().unwrap();
         let predicted = -(1e-4 - 1e-6) / (clearance * friction);
         // The load is not constant over a period, and the three balls are coupled by the platform.
         let ratio = exponent.value / predicted;
-        assert!(
-            (0.9..1.15).contains(&ratio),
-            "{} for {predicted}",
-            exponent.value
-        );
-        assert!(
-            exponent.standard_error < 0.02 * exponent.value.abs(),
-            "{}",
-            exponent.standard_error
-        );
+        assert!((0.9..1.15).contains(&ratio), "{} for {predicted}", exponent.value);
+        assert!(exponent.standard_error < 0.02 * exponent.value.abs(), "{}", exponent.standard_error);
         assert_eq!(result.regime, Regime::Periodic(1));
         assert_eq!(exponent.running.len(), 10);
     }
@@ -147,12 +128,7 @@ fn sections_are_those_of_the_run_without_a_twin() {
     let scene = scene("spcmm", &[]);
     let period = drive_period(&scene).unwrap();
     let sections = |exponent: bool| {
-        let plan = Plan {
-            periods: 3,
-            discard: 1,
-            phase: 0.0,
-            exponent,
-        };
+        let plan = Plan { periods: 3, discard: 1, phase: 0.0, exponent };
         let mut run = PointRun::cold(&scene, plan, period).unwrap();
         while !run.is_done() {
             run.step().unwrap();

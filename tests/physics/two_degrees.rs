@@ -54,11 +54,7 @@ fn a_cylindrical_joint_slides_and_turns_independently() {
 
 /// A free body that tumbles, on it a ring on a cylindrical joint, and on that a rod on a universal one: masses and centroids.
 const MASS: [f64; 3] = [1.2, 0.5, 0.3];
-const CENTRE: [[f64; 3]; 3] = [
-    [0.01, -0.02, 0.005],
-    [0.03, 0.01, -0.02],
-    [-0.02, 0.0, 0.06],
-];
+const CENTRE: [[f64; 3]; 3] = [[0.01, -0.02, 0.005], [0.03, 0.01, -0.02], [-0.02, 0.0, 0.06]];
 const INERTIA: [[f64; 3]; 3] = [[2e-3, 3e-3, 4e-3], [5e-4, 8e-4, 6e-4], [3e-4, 4e-4, 2e-4]];
 
 fn train(gravity: f64) -> String {
@@ -98,8 +94,7 @@ fn momenta(frame: &Frame) -> [Vec3; 2] {
     for (i, body) in frame.bodies.iter().enumerate() {
         let arm = body.rotation * Vec3::from(CENTRE[i]);
         let momentum = MASS[i] * (body.velocity + body.angular_velocity.cross(&arm));
-        let own =
-            Vec3::from(INERTIA[i]).component_mul(&body.rotation.tr_mul(&body.angular_velocity));
+        let own = Vec3::from(INERTIA[i]).component_mul(&body.rotation.tr_mul(&body.angular_velocity));
         sum[0] += momentum;
         sum[1] += (body.position + arm).cross(&momentum) + body.rotation * own;
     }
@@ -117,8 +112,7 @@ fn a_train_of_both_starts_where_its_coordinates_put_it() {
             panic!("three bodies");
         };
         let along = Vec3::new(1.0, 1.0, 0.0).normalize();
-        let ring_turn =
-            turn(along, 20_f64.to_radians()) * turn(Vec3::new(0.0, 1.0, 1.0), 35_f64.to_radians());
+        let ring_turn = turn(along, 20_f64.to_radians()) * turn(Vec3::new(0.0, 1.0, 1.0), 35_f64.to_radians());
         let of_ring = base.rotation * ring_turn.to_rotation_matrix().into_inner();
         assert!((ring.rotation - of_ring).amax() < 1e-14);
         let joint = base.position + base.rotation * (Vec3::new(0.05, 0.0, 0.02) + along * 5e-3);
@@ -128,25 +122,16 @@ fn a_train_of_both_starts_where_its_coordinates_put_it() {
         assert!((ring.angular_velocity - spin).norm() < 1e-13);
         let rest = turn(Vec3::new(1.0, 2.0, -1.0), 0.6);
         let second = rest.inverse() * Vec3::z();
-        let rod_turn =
-            turn(Vec3::x(), 25_f64.to_radians()) * rest * turn(second, -40_f64.to_radians());
+        let rod_turn = turn(Vec3::x(), 25_f64.to_radians()) * rest * turn(second, -40_f64.to_radians());
         let of_rod = ring.rotation * rod_turn.to_rotation_matrix().into_inner();
         assert!((rod.rotation - of_rod).amax() < 1e-13);
-        let spin =
-            ring.angular_velocity + ring.rotation * Vec3::x() * 3.0 - rod.rotation * second * 5.0;
+        let spin = ring.angular_velocity + ring.rotation * Vec3::x() * 3.0 - rod.rotation * second * 5.0;
         assert!((rod.angular_velocity - spin).norm() < 1e-13);
-        let expected = [
-            [5e-3, 0.2],
-            [20_f64.to_radians(), 6.0],
-            [25_f64.to_radians(), 3.0],
-            [-40_f64.to_radians(), -5.0],
-        ];
+        let expected =
+            [[5e-3, 0.2], [20_f64.to_radians(), 6.0], [25_f64.to_radians(), 3.0], [-40_f64.to_radians(), -5.0]];
         for (own, expected) in frame.coordinates.iter().zip(expected) {
             for (own, expected) in own.iter().zip(expected) {
-                assert!(
-                    (own - expected).abs() < 1e-13,
-                    "{formulation}: {own} {expected}"
-                );
+                assert!((own - expected).abs() < 1e-13, "{formulation}: {own} {expected}");
             }
         }
         assert_eq!(frame.coordinates.len(), 4);
@@ -177,21 +162,14 @@ fn a_free_train_keeps_its_momenta_and_its_energy_in_both_forms() {
         assert!((a.angular_velocity - b.angular_velocity).norm() < 1e-5);
     }
     for (a, b) in tree.coordinates.iter().zip(&lagrange.coordinates) {
-        assert!(
-            differ(a[0], b[0]) < 1e-6 && (a[1] - b[1]).abs() < 1e-5,
-            "{a:?} {b:?}"
-        );
+        assert!(differ(a[0], b[0]) < 1e-6 && (a[1] - b[1]).abs() < 1e-5, "{a:?} {b:?}");
     }
 }
 
 #[test]
 fn the_error_falls_with_the_order_of_the_method() {
     let end = |method: &str, step: &str, tolerance: &str| {
-        let changes = [
-            ("solver.method", method),
-            ("solver.step", step),
-            ("solver.tolerance", tolerance),
-        ];
+        let changes = [("solver.method", method), ("solver.step", step), ("solver.tolerance", tolerance)];
         let mut simulation = started(&train(-G), &changes);
         at(&mut simulation, 0.2)
     };

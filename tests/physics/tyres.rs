@@ -77,17 +77,11 @@ fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
                 let stored = 0.5 * STIFFNESS * depth * depth;
                 assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
                 let below = frame.elements[0].points[0];
-                assert!(
-                    (below - Vec3::new(0.0, 0.0, ground)).norm() < 1e-15,
-                    "{label}"
-                );
+                assert!((below - Vec3::new(0.0, 0.0, ground)).norm() < 1e-15, "{label}");
                 let ledger = simulation.ledger().unwrap();
                 assert!(ledger.drive_work != 0.0, "{ledger:?}");
                 assert_eq!(ledger.damping_loss > 0.0, damping > 0.0, "{ledger:?}");
-                assert!(
-                    ledger.relative_residual().abs() < 1e-4,
-                    "{label} {ledger:?}"
-                );
+                assert!(ledger.relative_residual().abs() < 1e-4, "{label} {ledger:?}");
             }
         }
     }
@@ -97,11 +91,7 @@ fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
 fn a_wheel_that_falls_on_a_hard_tyre_flies_again() {
     let text = wheel(0.5, "");
     for (method, formulation) in FOUR_WAYS {
-        let changes = [
-            ("solver.method", method),
-            ("solver.tolerance", "1e-9"),
-            ("formulation", formulation),
-        ];
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = started(&text, &changes);
         let mut highest = 0.0_f64;
         for n in 1..=1500 {
@@ -109,63 +99,36 @@ fn a_wheel_that_falls_on_a_hard_tyre_flies_again() {
             let height = frame.bodies[0].position.z;
             let force = frame.elements[0].force.z;
             let expected = STIFFNESS * (RADIUS - height).max(0.0);
-            assert!(
-                (force - expected).abs() < 1e-9 * STIFFNESS,
-                "{force} {expected}"
-            );
+            assert!((force - expected).abs() < 1e-9 * STIFFNESS, "{force} {expected}");
             if n > 400 {
                 highest = highest.max(height);
             }
         }
         assert!((highest - 0.5).abs() < 1e-4, "{method}: {highest}");
         let ledger = simulation.ledger().unwrap();
-        assert!(
-            ledger.relative_residual().abs() < 1e-6,
-            "{method} {ledger:?}"
-        );
+        assert!(ledger.relative_residual().abs() < 1e-6, "{method} {ledger:?}");
     }
 }
 
 #[test]
 fn no_bump_is_stepped_over() {
     // Half a millisecond after a second of rest, a hundredth of the wheel's period: an impulse.
-    let text = wheel(
-        REST,
-        "ground = { law = \"pulse\", height = \"2 mm\", start = \"1 s\", duration = \"0.5 ms\" }",
-    );
+    let text = wheel(REST, "ground = { law = \"pulse\", height = \"2 mm\", start = \"1 s\", duration = \"0.5 ms\" }");
     // The integral of sin^3(pi s) from 0 to 1 is 4 / 3 pi.
     let impulse = STIFFNESS * 2e-3 * 0.5e-3 * 4.0 / (3.0 * std::f64::consts::PI);
     let speed = impulse / MASS;
     for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
-        let mut simulation = started(
-            &text,
-            &[("solver.method", method), ("solver.tolerance", "1e-8")],
-        );
+        let mut simulation = started(&text, &[("solver.method", method), ("solver.tolerance", "1e-8")]);
         let before = at(&mut simulation, 0.99);
-        assert!(
-            (before.bodies[0].position.z - REST).abs() < 1e-9,
-            "{method}"
-        );
-        let swing = at(
-            &mut simulation,
-            1.00025 + 0.25 * TAU / (STIFFNESS / MASS).sqrt(),
-        );
+        assert!((before.bodies[0].position.z - REST).abs() < 1e-9, "{method}");
+        let swing = at(&mut simulation, 1.00025 + 0.25 * TAU / (STIFFNESS / MASS).sqrt());
         let expected = speed / (STIFFNESS / MASS).sqrt();
         let found = swing.bodies[0].position.z - REST;
-        assert!(
-            (found / expected - 1.0).abs() < 1e-3,
-            "{method}: {found} {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < 1e-3, "{method}: {found} {expected}");
         let ledger = simulation.ledger().unwrap();
         let given = 0.5 * MASS * speed * speed;
-        assert!(
-            (ledger.drive_work / given - 1.0).abs() < 1e-2,
-            "{method} {ledger:?}"
-        );
-        assert!(
-            ledger.relative_residual().abs() < 1e-5,
-            "{method} {ledger:?}"
-        );
+        assert!((ledger.drive_work / given - 1.0).abs() < 1e-2, "{method} {ledger:?}");
+        assert!(ledger.relative_residual().abs() < 1e-5, "{method} {ledger:?}");
     }
 }
 
@@ -191,10 +154,7 @@ fn it_is_a_spring_on_a_driven_road_that_only_pushes() {
     }
     assert!(lifted, "the road throws the wheel off");
     let [a, b] = [a, b].map(|s| *s.ledger().unwrap());
-    assert!(
-        (a.damping_loss / b.damping_loss - 1.0).abs() < 1e-4,
-        "{a:?} {b:?}"
-    );
+    assert!((a.damping_loss / b.damping_loss - 1.0).abs() < 1e-4, "{a:?} {b:?}");
 }
 
 #[test]
@@ -212,10 +172,7 @@ fn up_is_against_the_gravity_of_the_file_or_given() {
     let mut simulation = started(&text, &[]);
     simulation.set("gravity.z", "5 m/s^2").unwrap();
     assert!((at(&mut simulation, 0.0).elements[0].force - weight).norm() < 1e-9);
-    let given = wheel(
-        REST,
-        "up = [0, 0.6, 0.8]\nground = { law = \"constant\", position = \"-50 mm\", velocity = 0 }",
-    );
+    let given = wheel(REST, "up = [0, 0.6, 0.8]\nground = { law = \"constant\", position = \"-50 mm\", velocity = 0 }");
     let height = RADIUS - 0.05 - 0.8 * REST;
     let expected = Vec3::new(0.0, 0.6, 0.8) * (STIFFNESS * height.max(0.0));
     assert!((push(&given, &[]) - expected).norm() < 1e-9, "{expected}");
@@ -223,47 +180,22 @@ fn up_is_against_the_gravity_of_the_file_or_given() {
 
 #[test]
 fn what_is_wrong_with_a_tyre_is_named() {
-    let error = |text: &str| {
-        Scene::parse(text, Some("mine.toml"), &[])
-            .unwrap_err()
-            .to_string()
-    };
+    let error = |text: &str| Scene::parse(text, Some("mine.toml"), &[]).unwrap_err().to_string();
     let still = wheel(REST, "").replace("z = \"-9.81 m/s^2\"", "x = 0\ny = 0\nz = 0");
     for (text, said) in [
-        (
-            still,
-            [
-                "tyre.t.up",
-                "without gravity only the file can say which way is up",
-            ],
-        ),
+        (still, ["tyre.t.up", "without gravity only the file can say which way is up"]),
         (
             wheel(REST, "").replace("body = \"wheel\" }\nradius", "body = \"world\" }\nradius"),
             ["tyre.t.on", "acts on a body, not on the world"],
         ),
+        (wheel(REST, "").replace("stiffness = \"5e4 N/m\"", "stiffness = 0"), ["tyre.t", "does nothing"]),
+        (wheel(REST, "ground = { law = \"spcmm\", slider = 1 }"), ["tyre.t.ground.law", "[spcmm]"]),
         (
-            wheel(REST, "").replace("stiffness = \"5e4 N/m\"", "stiffness = 0"),
-            ["tyre.t", "does nothing"],
-        ),
-        (
-            wheel(REST, "ground = { law = \"spcmm\", slider = 1 }"),
-            ["tyre.t.ground.law", "[spcmm]"],
-        ),
-        (
-            wheel(
-                REST,
-                "ground = { law = \"pulse\", height = \"1 deg\", duration = \"1 s\" }",
-            ),
+            wheel(REST, "ground = { law = \"pulse\", height = \"1 deg\", duration = \"1 s\" }"),
             ["tyre.t.ground.height", "wrong unit `deg`"],
         ),
-        (
-            wheel(REST, "up = [0, 0, 0]"),
-            ["tyre.t.up", "must not be zero"],
-        ),
-        (
-            wheel(REST, "ground = \"flat\""),
-            ["tyre.t.ground", "a table"],
-        ),
+        (wheel(REST, "up = [0, 0, 0]"), ["tyre.t.up", "must not be zero"]),
+        (wheel(REST, "ground = \"flat\""), ["tyre.t.ground", "a table"]),
     ] {
         let message = error(&text);
         for said in said {

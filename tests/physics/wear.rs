@@ -43,19 +43,13 @@ fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
         println!("{case}: {work:e} of {loss:e}, {:e}", work - loss);
         // The same sums in another order.
         assert!(size > 1e-7, "{case}: {size:e}");
-        assert!(
-            (work - loss).abs() < 1e-11 * size,
-            "{case}: {work:e}, {loss:e}"
-        );
+        assert!((work - loss).abs() < 1e-11 * size, "{case}: {work:e}, {loss:e}");
     };
     for name in SCENES {
         check(name, &after(name, &[], 0.1));
     }
     for method in METHODS {
-        let changes = [
-            ("solver.method", method),
-            ("contact.friction_velocity", "surface"),
-        ];
+        let changes = [("solver.method", method), ("contact.friction_velocity", "surface")];
         check(method, &after("spcmm", &changes, 0.03));
     }
     let lagrange = ("formulation", "lagrange");
@@ -66,11 +60,9 @@ fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
     check("partly ideal", &run);
     // Parameters that change in contact.
     let mut run = after("spcmm", &[], 0.2);
-    for (key, value) in [
-        ("contact.friction", "0.3"),
-        ("contact.youngs_modulus", "150 GPa"),
-        ("contact.clearance", "0.25 mm"),
-    ] {
+    for (key, value) in
+        [("contact.friction", "0.3"), ("contact.youngs_modulus", "150 GPa"), ("contact.clearance", "0.25 mm")]
+    {
         run.set(key, value).unwrap();
         let end = run.time() + 0.05;
         run_until(&mut run, end);
@@ -90,22 +82,10 @@ fn impulses_are_time_integrals_of_the_normal_force() {
             let (from, to) = (simulation.step_start(), simulation.time());
             // Gauss's five points.
             let root = (10.0_f64 / 7.0).sqrt();
-            let (near, far) = (
-                (5.0 - 2.0 * root).sqrt() / 3.0,
-                (5.0 + 2.0 * root).sqrt() / 3.0,
-            );
-            let (more, less) = (
-                (322.0 + 13.0 * 70.0_f64.sqrt()) / 1800.0,
-                (322.0 - 13.0 * 70.0_f64.sqrt()) / 1800.0,
-            );
+            let (near, far) = ((5.0 - 2.0 * root).sqrt() / 3.0, (5.0 + 2.0 * root).sqrt() / 3.0);
+            let (more, less) = ((322.0 + 13.0 * 70.0_f64.sqrt()) / 1800.0, (322.0 - 13.0 * 70.0_f64.sqrt()) / 1800.0);
             let middle = 64.0 / 225.0;
-            for (at, weight) in [
-                (-far, less),
-                (-near, more),
-                (0.0, middle),
-                (near, more),
-                (far, less),
-            ] {
+            for (at, weight) in [(-far, less), (-near, more), (0.0, middle), (near, more), (far, less)] {
                 simulation.sample(from + 0.5 * (1.0 + at) * (to - from), &mut frame);
                 for (expected, joint) in expected.iter_mut().zip(&frame.joints) {
                     *expected += weight * (to - from) * joint.normal_force.norm();
@@ -115,15 +95,9 @@ fn impulses_are_time_integrals_of_the_normal_force() {
         simulation.commit_wear();
         for (j, expected) in expected.into_iter().enumerate() {
             let found = sum(wear(&simulation), j).impulse;
-            println!(
-                "{method}, joint {j}: {found} N s, {:e}",
-                found / expected - 1.0
-            );
+            println!("{method}, joint {j}: {found} N s, {:e}", found / expected - 1.0);
             // Simpson's rule, or Radau's, over steps that resolve an impact.
-            assert!(
-                (found / expected - 1.0).abs() < 1e-4,
-                "{method}: {found} {expected}"
-            );
+            assert!((found / expected - 1.0).abs() < 1e-4, "{method}: {found} {expected}");
         }
     }
 }
@@ -195,15 +169,10 @@ fn a_cell_lies_where_the_ball_touches() {
             }
             let found = |cell: usize| wear.cells(j)[cell].impulse;
             let whole: f64 = expected.iter().sum();
-            let apart: f64 = (0..expected.len())
-                .map(|i| (found(i) - expected[i]).abs())
-                .sum();
+            let apart: f64 = (0..expected.len()).map(|i| (found(i) - expected[i]).abs()).sum();
             println!("{name}, joint {j}: {apart:e} of {whole:e}");
             // A step on the edge of two cells gives all of its rectangle to one here.
-            assert!(
-                whole > 0.0 && apart < 0.05 * whole,
-                "{name}, joint {j}: {apart} of {whole}"
-            );
+            assert!(whole > 0.0 && apart < 0.05 * whole, "{name}, joint {j}: {apart} of {whole}");
         }
     }
 }

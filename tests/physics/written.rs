@@ -4,8 +4,8 @@
 use crate::common::invariants::finite;
 use crate::properties::config;
 use jointplay::scene::{
-    ABOVE_ZERO, Absent, Dimension, ELEMENT_KINDS, FileKey, FileTable, Quat, Scene, SceneError,
-    Takes, Texts, Vec3, file_tables, si_unit,
+    ABOVE_ZERO, Absent, Dimension, ELEMENT_KINDS, FileKey, FileTable, Quat, Scene, SceneError, Takes, Texts, Vec3,
+    file_tables, si_unit,
 };
 use jointplay::simulate::{Frame, Simulation};
 use proptest::prelude::*;
@@ -34,9 +34,7 @@ fn within((least, most): (f64, f64)) -> BoxedStrategy<f64> {
         ABOVE_ZERO => (most.min(1e-4), inside.1),
         _ => inside,
     };
-    signed
-        .prop_map(move |x| x.clamp(inside.0, inside.1))
-        .boxed()
+    signed.prop_map(move |x| x.clamp(inside.0, inside.1)).boxed()
 }
 
 /// A value of a key as a file writes it; `hinge`: whether it belongs to one.
@@ -47,21 +45,17 @@ fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
         _ => key.like,
     };
     match key.takes {
-        Takes::Number(_, range) => within(range)
-            .prop_map(move |x| quoted(x, dimension))
-            .boxed(),
+        Takes::Number(_, range) => within(range).prop_map(move |x| quoted(x, dimension)).boxed(),
         Takes::Vector(_, range) => proptest::collection::vec(within(range), 3)
             .prop_map(move |v| {
                 let all: Vec<String> = v.iter().map(|x| quoted(*x, dimension)).collect();
                 format!("[{}]", all.join(", "))
             })
             .boxed(),
-        Takes::Direction => (-9..10_i32, -9..10_i32, 1..10_i32)
-            .prop_map(|(x, y, z)| format!("[{x}, {y}, {z}]"))
-            .boxed(),
-        Takes::Word(words) => proptest::sample::select(words)
-            .prop_map(|word| format!("\"{word}\""))
-            .boxed(),
+        Takes::Direction => {
+            (-9..10_i32, -9..10_i32, 1..10_i32).prop_map(|(x, y, z)| format!("[{x}, {y}, {z}]")).boxed()
+        }
+        Takes::Word(words) => proptest::sample::select(words).prop_map(|word| format!("\"{word}\"")).boxed(),
         Takes::Flag => any::<bool>().prop_map(|flag| flag.to_string()).boxed(),
         Takes::Table(table) if !table.words().is_empty() => {
             // The law of the paper's machine needs that machine.
@@ -87,9 +81,7 @@ fn filled(
     let by = table.variants.map(|_| table.words());
     for key in table.of(word).filter(|key| !skip.contains(&key.name)) {
         let values = match (key.takes, word) {
-            (Takes::Word(words), Some(word)) if by == Some(words) => {
-                Just(format!("\"{word}\"")).boxed()
-            }
+            (Takes::Word(words), Some(word)) if by == Some(words) => Just(format!("\"{word}\"")).boxed(),
             _ => value(key, hinge),
         };
         let written = values.prop_map(|value| format!("{} = {value}", key.name));
@@ -101,8 +93,7 @@ fn filled(
             _ => proptest::option::weighted(0.7, written).boxed(),
         });
     }
-    all.prop_map(|keys| keys.into_iter().flatten().collect())
-        .boxed()
+    all.prop_map(|keys| keys.into_iter().flatten().collect()).boxed()
 }
 
 /// Two bodies, the second on a slide or hinge of the first.
@@ -119,10 +110,7 @@ fn machine(hinge: bool, more: &str) -> String {
 /// What is wrong is said at its place, in words for a person.
 fn is_clear(error: &SceneError, text: &str) -> Result<(), TestCaseError> {
     let words = error.to_string();
-    prop_assert!(
-        error.key.is_some() && error.position.is_some(),
-        "{words}\n{text}"
-    );
+    prop_assert!(error.key.is_some() && error.position.is_some(), "{words}\n{text}");
     prop_assert!(!words.contains("NaN") && words.len() < 2000, "{words}");
     Ok(())
 }
@@ -158,8 +146,7 @@ fn runs(text: &str) -> Result<(), TestCaseError> {
 
 /// Everything of a scene but its text and the numbers in it.
 fn built(text: &str, files: &Texts) -> String {
-    let mut scene =
-        Scene::parse_with(text, None, files, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let mut scene = Scene::parse_with(text, None, files, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
     scene.source = Default::default();
     format!("{scene:?}")
 }
@@ -173,22 +160,13 @@ fn elements() -> impl Strategy<Value = String> {
             let [here, there] = [hinge, !hinge].map(|hinge| number.on(hinge).0);
             (here != there).then_some(there)
         });
-        let skip: Vec<&str> = ["name"]
-            .into_iter()
-            .chain(kind.points.iter().copied())
-            .chain(other)
-            .collect();
+        let skip: Vec<&str> = ["name"].into_iter().chain(kind.points.iter().copied()).chain(other).collect();
         filled(rows(kind.section), None, hinge, &skip).prop_map(move |keys| {
             let bodies = ["base", "rod"].into_iter().rev();
             let points = kind.points.iter().zip(bodies);
-            let point =
-                |(key, body)| format!("{key} = {{ body = \"{body}\", at = \"0 0 10 mm\" }}\n");
+            let point = |(key, body)| format!("{key} = {{ body = \"{body}\", at = \"0 0 10 mm\" }}\n");
             let points: String = points.map(point).collect();
-            let section = format!(
-                "\n[[{}]]\nname = \"e\"\n{points}{}\n",
-                kind.section,
-                keys.join("\n")
-            );
+            let section = format!("\n[[{}]]\nname = \"e\"\n{points}{}\n", kind.section, keys.join("\n"));
             machine(hinge, &section)
         })
     })
@@ -211,15 +189,13 @@ fn lengths() -> impl Strategy<Value = (String, f64)> {
     });
     let arm = Just(("arm".to_owned(), 0.12));
     prop_oneof![leaf, arm].prop_recursive(4, 24, 2, |inner| {
-        (inner.clone(), inner, 1..9_u32, 0..5_u32).prop_map(
-            |((a, x), (b, y), n, which)| match which {
-                0 => (format!("({a} + {b})"), x + y),
-                1 => (format!("({a} - {b})"), x - y),
-                2 => (format!("{n} * {a}"), f64::from(n) * x),
-                3 => (format!("{a} / {n}"), x / f64::from(n)),
-                _ => (format!("max({a}, {b})"), x.max(y)),
-            },
-        )
+        (inner.clone(), inner, 1..9_u32, 0..5_u32).prop_map(|((a, x), (b, y), n, which)| match which {
+            0 => (format!("({a} + {b})"), x + y),
+            1 => (format!("({a} - {b})"), x - y),
+            2 => (format!("{n} * {a}"), f64::from(n) * x),
+            3 => (format!("{a} / {n}"), x / f64::from(n)),
+            _ => (format!("max({a}, {b})"), x.max(y)),
+        })
     })
 }
 

@@ -18,19 +18,14 @@ fn read(path: impl AsRef<Path>) -> String {
 
 #[test]
 fn the_page_of_parameters_is_what_the_program_prints() {
-    assert!(
-        read("docs/parameters.md") == reference_page(),
-        "cargo run -- parameters > docs/parameters.md"
-    );
+    assert!(read("docs/parameters.md") == reference_page(), "cargo run -- parameters > docs/parameters.md");
 }
 
 /// The blocks of TOML of the page about scenes.
 fn examples() -> Vec<String> {
     let page = read("docs/scene-format.md");
     let blocks = page.split("```toml\n").skip(1);
-    blocks
-        .filter_map(|rest| rest.split("```").next().map(str::to_owned))
-        .collect()
+    blocks.filter_map(|rest| rest.split("```").next().map(str::to_owned)).collect()
 }
 
 /// The first of them that contains `line`.
@@ -84,11 +79,7 @@ fn the_page_of_scenes_has_the_tables_of_the_rows() {
 
 #[test]
 fn the_schema_is_what_the_program_prints() {
-    is_page(
-        "assets/scene.schema.json",
-        &schema::page(),
-        "jointplay schema",
-    );
+    is_page("assets/scene.schema.json", &schema::page(), "jointplay schema");
 }
 
 #[test]
@@ -97,11 +88,7 @@ fn hinges_that_are_not_parallel_stand_where_the_page_says() {
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
-    let arm = &frame.bodies[scene
-        .bodies
-        .iter()
-        .position(|body| body.name == "arm")
-        .unwrap()];
+    let arm = &frame.bodies[scene.bodies.iter().position(|body| body.name == "arm").unwrap()];
     let tip = arm.position + arm.rotation * Vec3::new(0.0, 0.0, 0.1);
     let millimetres = |v: Vec3| {
         let part = |x: f64| format!("{}", (x * 1e4).round() / 10.0 + 0.0);
@@ -126,10 +113,7 @@ fn the_example_of_the_scene_format_runs() {
     let scene = Scene::parse(example, None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     simulation.advance_to(0.02).expect("the example runs");
-    assert!(
-        simulation.statistics().impacts[0] > 0,
-        "a rod that is let go falls onto its socket"
-    );
+    assert!(simulation.statistics().impacts[0] > 0, "a rod that is let go falls onto its socket");
 }
 
 /// The scenes of `assets/presets.json`: the built-in ones, in their order.
@@ -137,10 +121,7 @@ fn measured_scenes() -> Vec<&'static str> {
     let record = &jointplay::analysis::presets::record().scenes;
     let all = jointplay::scene::BUILT_IN;
     for name in all {
-        assert!(
-            record.contains_key(name),
-            "{name}: run `jointplay tradeoff --all --write .`"
-        );
+        assert!(record.contains_key(name), "{name}: run `jointplay tradeoff --all --write .`");
     }
     all.to_vec()
 }
@@ -183,17 +164,9 @@ fn documents_name_files_that_exist() {
     ] {
         let text = read(document);
         for word in text.split(['`', '(', ')']) {
-            let kept = [
-                "src/",
-                "docs/",
-                "assets/",
-                "tests/",
-                "benches/",
-                "examples/",
-                "shaders/",
-            ]
-            .iter()
-            .any(|folder| word.starts_with(folder));
+            let kept = ["src/", "docs/", "assets/", "tests/", "benches/", "examples/", "shaders/"]
+                .iter()
+                .any(|folder| word.starts_with(folder));
             if kept && !word.contains(['*', '<', ' ', '\n']) {
                 assert!(root().join(word).exists(), "{document} names {word}");
             }
@@ -208,11 +181,7 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     // 105 mm long at the start: 5 N against a weight of 4.905 N.
-    assert!(
-        (frame.elements[0].force.z - 5.0).abs() < 1e-12,
-        "{:?}",
-        frame.elements[0]
-    );
+    assert!((frame.elements[0].force.z - 5.0).abs() < 1e-12, "{:?}", frame.elements[0]);
     assert!((frame.bodies[0].acceleration.z - (5.0 - 4.905) / 0.5).abs() < 1e-9);
     simulation.advance_to(2.0).expect("the example runs");
     let ledger = simulation.ledger().expect("is kept");
@@ -238,15 +207,9 @@ fn the_wheel_of_the_page_rides_over_its_bump() {
     }
     assert!((highest - 0.04).abs() < 1e-4, "{highest}");
     let weight = 320.0 * 9.81;
-    assert!(
-        most > 2.0 * weight && least < 0.5 * weight,
-        "{most} {least}"
-    );
+    assert!(most > 2.0 * weight && least < 0.5 * weight, "{most} {least}");
     let ledger = simulation.ledger().expect("is kept");
-    assert!(
-        ledger.drive_work > 0.0 && ledger.damping_loss > 0.0,
-        "{ledger:?}"
-    );
+    assert!(ledger.drive_work > 0.0 && ledger.damping_loss > 0.0, "{ledger:?}");
     assert!(ledger.relative_residual().abs() < 1e-3, "{ledger:?}");
 }
 

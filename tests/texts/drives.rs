@@ -27,10 +27,7 @@ fn points(scene: &Scene) -> &[[f64; 2]] {
 fn holds(case: &str, error: &SceneError, fragments: &[&str]) {
     let text = error.to_string();
     for fragment in fragments {
-        assert!(
-            text.contains(fragment),
-            "{case}\n  should say `{fragment}`, says:\n{text}"
-        );
+        assert!(text.contains(fragment), "{case}\n  should say `{fragment}`, says:\n{text}");
     }
 }
 
@@ -40,9 +37,7 @@ fn every_law_is_read_on_slides_and_hinges() {
         for drive in [
             format!("law = \"constant\", velocity = \"1 {speed}\""),
             format!("law = \"harmonic\", amplitude = \"1 {place}\", frequency = \"1 Hz\""),
-            format!(
-                "law = \"harmonics\", terms = [{{ amplitude = \"1 {place}\", frequency = \"1 Hz\" }}]"
-            ),
+            format!("law = \"harmonics\", terms = [{{ amplitude = \"1 {place}\", frequency = \"1 Hz\" }}]"),
             format!("law = \"ramp\", to = \"1 {place}\", duration = \"1 s\""),
             format!("law = \"pulse\", height = \"1 {place}\", duration = \"1 s\""),
             format!("law = \"table\", points = [[0, 0], [\"1 s\", \"1 {place}\"]]"),
@@ -73,11 +68,7 @@ fn numbers_of_a_law_are_keys_and_may_be_expressions() {
     let saved = Scene::parse(&scene.to_toml().unwrap(), None, &[]).unwrap();
     assert_eq!(height(&saved), 1e-3);
     let error = scene.set("joint.P.drive.duration", "0 s").unwrap_err();
-    holds(
-        "no duration",
-        &error,
-        &["joint.P.drive.duration", "allowed 1e-6 s to"],
-    );
+    holds("no duration", &error, &["joint.P.drive.duration", "allowed 1e-6 s to"]);
 }
 
 /// Position that a formula prescribes at `t`, s: that of a scene with `own` parameters.
@@ -109,42 +100,21 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
             0.02 * libm::sin(2.0 * std::f64::consts::PI * 3.0 * t + 30f64.to_radians()),
         ),
         // Pure numbers are numbers like any other.
-        (
-            "prismatic",
-            "formula = \"10 * part * t\", unit = \"mm\"",
-            5e-3 * t,
-        ),
+        ("prismatic", "formula = \"10 * part * t\", unit = \"mm\"", 5e-3 * t),
         (
             "revolute",
             "formula = \"lift * (1 - exp(-t / 20 ms)) * part\"",
             30f64.to_radians() * (1.0 - libm::exp(-t / 0.02)) * 0.5,
         ),
-        (
-            "prismatic",
-            "formula = \"3 mm + 2 m/s^2 * t^2\"",
-            3e-3 + 2.0 * t * t,
-        ),
+        ("prismatic", "formula = \"3 mm + 2 m/s^2 * t^2\"", 3e-3 + 2.0 * t * t),
         ("prismatic", "formula = \"stroke\"", 0.02),
         // What is constant is computed beforehand: its derivative is not infinite but 0.
-        (
-            "revolute",
-            "formula = \"asin(2 * part) * rate * t\"",
-            1.5 * std::f64::consts::PI * t,
-        ),
+        ("revolute", "formula = \"asin(2 * part) * rate * t\"", 1.5 * std::f64::consts::PI * t),
     ] {
         let found = formula(OWN, kind, &format!("law = \"formula\", {drive}"), t);
-        assert!(
-            (found - expected).abs() < 1e-14,
-            "{drive}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < 1e-14, "{drive}: {found} {expected}");
     }
-    let text = format!(
-        "{OWN}{}",
-        text(
-            "prismatic",
-            "law = \"formula\", formula = \"stroke * t / 1 s\""
-        )
-    );
+    let text = format!("{OWN}{}", text("prismatic", "law = \"formula\", formula = \"stroke * t / 1 s\""));
     let mut scene = Scene::parse(&text, None, &[]).unwrap();
     assert_eq!(position(&scene, 1.0), 0.02);
     scene.set("parameter.stroke", "5 mm").unwrap();
@@ -154,46 +124,19 @@ fn a_formula_may_be_one_of_the_scenes_parameters() {
     for (drive, fragments) in [
         (
             "formula = \"stroke * sin(3*t)\"",
-            &[
-                "joint.P.drive.formula",
-                "a function of a quantity that is not a pure number",
-            ][..],
+            &["joint.P.drive.formula", "a function of a quantity that is not a pure number"][..],
         ),
-        (
-            "formula = \"stroke + t\"",
-            &["adds or compares quantities of different dimensions"],
-        ),
-        (
-            "formula = \"rate * t\"",
-            &["which is not in m; units m, cm, mm"],
-        ),
+        ("formula = \"stroke + t\"", &["adds or compares quantities of different dimensions"]),
+        ("formula = \"rate * t\"", &["which is not in m; units m, cm, mm"]),
         (
             "formula = \"stroke * rate * t\", unit = \"mm\"",
-            &[
-                "joint.P.drive.unit",
-                "a formula with quantities has its own unit",
-            ],
+            &["joint.P.drive.unit", "a formula with quantities has its own unit"],
         ),
-        (
-            "formula = \"strok * rate * t\"",
-            &[
-                "my.toml:22:39",
-                "no variable `strok` (did you mean `stroke`?)",
-            ],
-        ),
-        (
-            "formula = \"max(stroke, 2 mm)\"",
-            &["`max` has no second derivative"],
-        ),
-        (
-            "formula = \"stroke / (rate * t)\"",
-            &["is not a finite number"],
-        ),
+        ("formula = \"strok * rate * t\"", &["my.toml:22:39", "no variable `strok` (did you mean `stroke`?)"]),
+        ("formula = \"max(stroke, 2 mm)\"", &["`max` has no second derivative"]),
+        ("formula = \"stroke / (rate * t)\"", &["is not a finite number"]),
     ] {
-        let text = format!(
-            "{OWN}{}",
-            self::text("prismatic", &format!("law = \"formula\", {drive}"))
-        );
+        let text = format!("{OWN}{}", self::text("prismatic", &format!("law = \"formula\", {drive}")));
         let error = Scene::parse(&text, Some("my.toml"), &[]).expect_err(drive);
         holds(drive, &error, fragments);
     }
@@ -212,90 +155,43 @@ fn what_is_wrong_with_a_law_is_named() {
             ],
         ),
         ("to = \"1 mm\"", &["joint.P.drive.law", "missing"]),
-        (
-            "law = \"ramp\", duration = \"1 s\"",
-            &["joint.P.drive.to", "missing", "to = \"10 mm\""],
-        ),
+        ("law = \"ramp\", duration = \"1 s\"", &["joint.P.drive.to", "missing", "to = \"10 mm\""]),
         (
             "law = \"ramp\", to = \"1 mm\", duration = \"0 s\"",
-            &[
-                "joint.P.drive.duration = \"0 s\"",
-                "allowed 1e-6 s to 1000000 s; units s, ms",
-            ],
+            &["joint.P.drive.duration = \"0 s\"", "allowed 1e-6 s to 1000000 s; units s, ms"],
         ),
-        (
-            "law = \"ramp\", to = \"1 mm\", duration = \"1 mm\"",
-            &["wrong unit `mm`"],
-        ),
+        ("law = \"ramp\", to = \"1 mm\", duration = \"1 mm\"", &["wrong unit `mm`"]),
         (
             "law = \"ramp\", to = \"1 mm\", duration = \"1 s\", height = \"1 mm\"",
-            &[
-                "joint.P.drive.height",
-                "unknown key",
-                "allowed here: law, from, to, start, duration",
-            ],
+            &["joint.P.drive.height", "unknown key", "allowed here: law, from, to, start, duration"],
         ),
         (
             "law = \"pulse\", height = \"1 deg\", duration = \"1 s\"",
             &["joint.P.drive.height = \"1 deg\"", "wrong unit `deg`"],
         ),
         ("law = \"harmonics\"", &["joint.P.drive.terms", "missing"]),
-        (
-            "law = \"harmonics\", terms = []",
-            &["joint.P.drive.terms = []", "needs a term"],
-        ),
-        (
-            "law = \"harmonics\", terms = [{ amplitude = \"1 mm\" }]",
-            &["joint.P.drive.terms[0].frequency", "missing"],
-        ),
+        ("law = \"harmonics\", terms = []", &["joint.P.drive.terms = []", "needs a term"]),
+        ("law = \"harmonics\", terms = [{ amplitude = \"1 mm\" }]", &["joint.P.drive.terms[0].frequency", "missing"]),
         (
             "law = \"harmonics\", terms = [{ amplitude = \"1 mm\", frequency = 0 }]",
-            &[
-                "joint.P.drive.terms[0].frequency = 0",
-                "above 0 up to 10000 Hz",
-            ],
+            &["joint.P.drive.terms[0].frequency = 0", "above 0 up to 10000 Hz"],
         ),
-        (
-            "law = \"table\"",
-            &[
-                "joint.P.drive.points",
-                "missing",
-                "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
-            ],
-        ),
-        (
-            "law = \"table\", points = [[0, 0]]",
-            &["joint.P.drive.points", "has 1 points; allowed 2 to 10000"],
-        ),
+        ("law = \"table\"", &["joint.P.drive.points", "missing", "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]"]),
+        ("law = \"table\", points = [[0, 0]]", &["joint.P.drive.points", "has 1 points; allowed 2 to 10000"]),
         (
             "law = \"table\", points = [[0, 0], [\"1 s\"]]",
-            &[
-                "joint.P.drive.points[1]",
-                "a time and a position, has 1 values",
-            ],
+            &["joint.P.drive.points[1]", "a time and a position, has 1 values"],
         ),
         (
             "law = \"table\", points = [[0, 0], [\"1 s\", 0], [\"1 s\", 0]]",
-            &[
-                "joint.P.drive.points[2][0] = \"1 s\"",
-                "times must rise, by at least 1 us",
-            ],
+            &["joint.P.drive.points[2][0] = \"1 s\"", "times must rise, by at least 1 us"],
         ),
-        (
-            "law = \"table\", points = [[0, 0], [\"1 s\", 3]]",
-            &["joint.P.drive.points[1][1] = 3", "needs a unit"],
-        ),
+        ("law = \"table\", points = [[0, 0], [\"1 s\", 3]]", &["joint.P.drive.points[1][1] = 3", "needs a unit"]),
         (
             "law = \"table\", repeat = true, points = [[0, 0], [\"1 s\", \"1 mm\"], [\"2 s\", \"2 mm\"]]",
-            &[
-                "joint.P.drive.points",
-                "the last position must be the first",
-            ],
+            &["joint.P.drive.points", "the last position must be the first"],
         ),
-        (
-            "law = \"table\", repeat = true, points = [[0, 0], [\"1 s\", 0]]",
-            &["has 2 points; allowed 3 to 10000"],
-        ),
+        ("law = \"table\", repeat = true, points = [[0, 0], [\"1 s\", 0]]", &["has 2 points; allowed 3 to 10000"]),
         (
             "law = \"table\", repeat = 1, points = [[0, 0], [\"1 s\", 0]]",
             &["joint.P.drive.repeat = 1", "true or false"],
@@ -306,54 +202,25 @@ fn what_is_wrong_with_a_law_is_named() {
         ),
         (
             "law = \"table\", file = \"a.csv\"",
-            &[
-                "my.toml:10:",
-                "joint.P.drive.file = \"a.csv\"",
-                "has no folder",
-                "written into the scene itself",
-            ],
+            &["my.toml:10:", "joint.P.drive.file = \"a.csv\"", "has no folder", "written into the scene itself"],
         ),
         ("law = \"formula\"", &["joint.P.drive.formula", "missing"]),
         (
             "law = \"formula\", formula = \"sin(2*pi*f*t)\"",
             &["my.toml:10:48", "joint.P.drive.formula", "no variable `f`"],
         ),
-        (
-            "law = \"formula\", formula = \"sine(t)\"",
-            &["no function `sine` (did you mean `sin`?)"],
-        ),
-        (
-            "law = \"formula\", formula = \"(1 + t\"",
-            &["ends where an operator or `)` should follow"],
-        ),
-        (
-            "law = \"formula\", formula = \"0.1 * abs(t)\"",
-            &["my.toml:10:45", "`abs` has no second derivative"],
-        ),
-        (
-            "law = \"formula\", formula = \"1/t\"",
-            &["has no finite position at t = 0"],
-        ),
-        (
-            "law = \"formula\", formula = \"t^0.5\"",
-            &["has no finite speed at t = 0"],
-        ),
-        (
-            "law = \"formula\", formula = \"t^1.5\"",
-            &["has no finite acceleration at t = 0"],
-        ),
-        (
-            "law = \"formula\", formula = \"t\", unit = \"deg\"",
-            &["joint.P.drive.unit = \"deg\"", "wrong unit `deg`"],
-        ),
+        ("law = \"formula\", formula = \"sine(t)\"", &["no function `sine` (did you mean `sin`?)"]),
+        ("law = \"formula\", formula = \"(1 + t\"", &["ends where an operator or `)` should follow"]),
+        ("law = \"formula\", formula = \"0.1 * abs(t)\"", &["my.toml:10:45", "`abs` has no second derivative"]),
+        ("law = \"formula\", formula = \"1/t\"", &["has no finite position at t = 0"]),
+        ("law = \"formula\", formula = \"t^0.5\"", &["has no finite speed at t = 0"]),
+        ("law = \"formula\", formula = \"t^1.5\"", &["has no finite acceleration at t = 0"]),
+        ("law = \"formula\", formula = \"t\", unit = \"deg\"", &["joint.P.drive.unit = \"deg\"", "wrong unit `deg`"]),
         (
             "law = \"formula\", formula = \"t\", resolve = \"2 s\"",
             &["joint.P.drive.resolve = \"2 s\"", "allowed 1e-6 s to 1 s"],
         ),
-        (
-            "law = \"formula\", formula = 3",
-            &["joint.P.drive.formula = 3", "a text in quotes"],
-        ),
+        ("law = \"formula\", formula = 3", &["joint.P.drive.formula = 3", "a text in quotes"]),
     ];
     for (drive, fragments) in cases {
         match parse("prismatic", drive) {
@@ -362,16 +229,8 @@ fn what_is_wrong_with_a_law_is_named() {
         }
     }
     let many = vec!["{ amplitude = 0, frequency = \"1 Hz\" }"; 101].join(", ");
-    let error = parse(
-        "prismatic",
-        &format!("law = \"harmonics\", terms = [{many}]"),
-    )
-    .unwrap_err();
-    holds(
-        "101 terms",
-        &error,
-        &["too many: 101 terms; allowed at most 100"],
-    );
+    let error = parse("prismatic", &format!("law = \"harmonics\", terms = [{many}]")).unwrap_err();
+    holds("101 terms", &error, &["too many: 101 terms; allowed at most 100"]);
     let error = parse("revolute", "law = \"ramp\", duration = \"1 s\"").unwrap_err();
     holds("a hinge", &error, &["to = \"10 deg\""]);
 }
@@ -379,11 +238,7 @@ fn what_is_wrong_with_a_law_is_named() {
 fn in_folder(folder: &Path, csv: &[u8], name: &str) -> Result<Scene, SceneError> {
     fs::write(folder.join("bump.csv"), csv).unwrap();
     let scene = folder.join("scene.toml");
-    fs::write(
-        &scene,
-        text("prismatic", &format!("law = \"table\", file = \"{name}\"")),
-    )
-    .unwrap();
+    fs::write(&scene, text("prismatic", &format!("law = \"table\", file = \"{name}\""))).unwrap();
     Scene::load(&scene, &[])
 }
 
@@ -396,8 +251,7 @@ fn a_file_beside_the_scene_is_read_once() {
         "\u{feff}t [ms]; z [mm]\r\n# measured\r\n0; 0\r\n\r\n10; 1\r\n20; 0\r\n",
         "t_ms\tbump height (um)\n0\t0\n10\t1000\n20\t0",
     ] {
-        let mut scene = in_folder(folder.path(), csv.as_bytes(), "bump.csv")
-            .unwrap_or_else(|error| panic!("{error}"));
+        let mut scene = in_folder(folder.path(), csv.as_bytes(), "bump.csv").unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(points(&scene), given, "{csv}");
         // What is read again does not look at the disk.
         fs::write(folder.path().join("bump.csv"), "gone").unwrap();
@@ -420,46 +274,16 @@ fn what_is_wrong_with_a_file_beside_the_scene_is_named_in_it() {
     let folder = tempfile::tempdir().unwrap();
     let cases: &[(&[u8], &[&str])] = &[
         (b"", &["joint.P.drive.file = \"bump.csv\"", "has 0 points"]),
-        (
-            b"0,0\n1,1\n",
-            &[
-                "bump.csv:1:1",
-                "names the columns with their units, as `time_s`; units s, ms",
-            ],
-        ),
-        (
-            b"time_s,angle_deg\n0,0\n",
-            &["bump.csv:1:8", "as `position_mm`; units m, cm, mm"],
-        ),
-        (
-            b"time_s,x_m\n0,0,0\n",
-            &["bump.csv:2:1", "needs two columns", "has 3"],
-        ),
-        (
-            b"time_s,x_m\n0,zero\n",
-            &[
-                "bump.csv:2:3: x_m = zero",
-                "is not a number; its unit stands in the header",
-            ],
-        ),
-        (
-            b"time_s,x_m\n0,0 mm\n",
-            &["bump.csv:2:3", "is not a number"],
-        ),
+        (b"0,0\n1,1\n", &["bump.csv:1:1", "names the columns with their units, as `time_s`; units s, ms"]),
+        (b"time_s,angle_deg\n0,0\n", &["bump.csv:1:8", "as `position_mm`; units m, cm, mm"]),
+        (b"time_s,x_m\n0,0,0\n", &["bump.csv:2:1", "needs two columns", "has 3"]),
+        (b"time_s,x_m\n0,zero\n", &["bump.csv:2:3: x_m = zero", "is not a number; its unit stands in the header"]),
+        (b"time_s,x_m\n0,0 mm\n", &["bump.csv:2:3", "is not a number"]),
         (b"time_s,x_m\n0,nan\n", &["bump.csv:2:3", "finite"]),
-        (
-            b"time_s,x_m\n0,1e9\n",
-            &["bump.csv:2:3", "allowed -1000000 m to 1000000 m"],
-        ),
-        (
-            b"time_s,x_m\n0,0\n\n 0 ,1\n",
-            &["bump.csv:4:2", "times must rise"],
-        ),
+        (b"time_s,x_m\n0,1e9\n", &["bump.csv:2:3", "allowed -1000000 m to 1000000 m"]),
+        (b"time_s,x_m\n0,0\n\n 0 ,1\n", &["bump.csv:4:2", "times must rise"]),
         (b"time_s,x_m\n0,0\n", &["has 1 points"]),
-        (
-            b"time_s,x_m\n0,\xff\n",
-            &["joint.P.drive.file", "not valid UTF-8"],
-        ),
+        (b"time_s,x_m\n0,\xff\n", &["joint.P.drive.file", "not valid UTF-8"]),
     ];
     for (csv, fragments) in cases {
         let case = String::from_utf8_lossy(csv);
@@ -483,19 +307,11 @@ fn what_is_wrong_with_a_file_beside_the_scene_is_named_in_it() {
     holds("a folder", &error, &["this is a directory"]);
     let large = vec![b'#'; LARGEST_FILE as usize + 1];
     let error = in_folder(folder.path(), &large, "bump.csv").unwrap_err();
-    holds(
-        "a large file",
-        &error,
-        &["too large; allowed at most 4 MiB"],
-    );
+    holds("a large file", &error, &["too large; allowed at most 4 MiB"]);
     let mut many = String::from("t_s,x_m\n");
     for n in 0..=10_000 {
         many += &format!("{n},0\n");
     }
     let error = in_folder(folder.path(), many.as_bytes(), "bump.csv").unwrap_err();
-    holds(
-        "many points",
-        &error,
-        &["bump.csv:10002:1", "too many points; allowed at most 10000"],
-    );
+    holds("many points", &error, &["bump.csv:10002:1", "too many points; allowed at most 10000"]);
 }

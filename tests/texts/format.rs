@@ -7,8 +7,7 @@ use std::path::Path;
 use boon::{Compiler, Draft, SchemaIndex, Schemas};
 use jointplay::cli::schema;
 use jointplay::scene::{
-    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Takes, Texts, Variants, built_in_text,
-    file_tables,
+    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Takes, Texts, Variants, built_in_text, file_tables,
 };
 use serde_json::Value as Json;
 
@@ -60,9 +59,7 @@ fn beside() -> Texts {
         ("coil.csv", "length_mm,force_N\n-1,-5\n0,0\n1,8\n"),
         ("corner.stl", corner),
     ];
-    files
-        .map(|(name, text)| (name.to_owned(), text.into()))
-        .into()
+    files.map(|(name, text)| (name.to_owned(), text.into())).into()
 }
 
 fn parse(text: &str) -> Result<Scene, SceneError> {
@@ -77,8 +74,7 @@ fn corpus(kind: &str) -> Vec<(String, String)> {
     paths.sort();
     let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
     let own = paths.iter().filter(|path| name(path).starts_with(kind));
-    own.map(|path| (name(path), std::fs::read_to_string(path).unwrap()))
-        .collect()
+    own.map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
 }
 
 /// Scenes that are read, and have every key together.
@@ -113,10 +109,7 @@ struct Found {
 impl Found {
     fn of(text: &str) -> Self {
         let document: DocumentMut = text.parse().unwrap();
-        let mut found = Self {
-            keys: Vec::new(),
-            tables: Vec::new(),
-        };
+        let mut found = Self { keys: Vec::new(), tables: Vec::new() };
         found.walk(document.as_item(), &FILE, Vec::new());
         found
     }
@@ -188,11 +181,7 @@ fn every_row_is_read_and_nothing_else_is() {
         for (path, rows) in found.tables {
             let error = parse(&changed(&text, &path, Some("hue"))).unwrap_err();
             assert_eq!(last(&error), "hue", "{name}: {path:?}: {error}");
-            assert!(
-                error.message.contains("unknown key"),
-                "{}: {error}",
-                rows.name
-            );
+            assert!(error.message.contains("unknown key"), "{}: {error}", rows.name);
         }
     }
     let mut missing = Vec::new();
@@ -214,10 +203,7 @@ fn rows_say_what_they_are() {
         for row in table.keys {
             let place = format!("{} of {}", row.name, table.name);
             assert!(!row.help.is_empty() && !row.help.contains('|'), "{place}");
-            assert!(
-                row.of.iter().all(|word| table.words().contains(word)),
-                "{place}"
-            );
+            assert!(row.of.iter().all(|word| table.words().contains(word)), "{place}");
             for like in [Some(row.like), row.on_hinge.map(|(_, like)| like)] {
                 let text = format!("like = {}", like.unwrap_or("0"));
                 let parsed = like == Some("") || text.parse::<DocumentMut>().is_ok();
@@ -240,9 +226,7 @@ impl Schema {
         compiler.set_default_draft(Draft::V7);
         compiler.add_resource("scene.json", text).unwrap();
         let mut schemas = Schemas::new();
-        let index = compiler
-            .compile("scene.json", &mut schemas)
-            .unwrap_or_else(|error| panic!("{error:#}"));
+        let index = compiler.compile("scene.json", &mut schemas).unwrap_or_else(|error| panic!("{error:#}"));
         Self { schemas, index }
     }
 
@@ -281,13 +265,10 @@ fn the_schema_takes_every_scene_and_refuses_bad_ones() {
     let schema = Schema::new();
     let page = include_str!("../../docs/scene-format.md");
     let blocks = page.split("```toml\n").skip(1);
-    let examples = blocks
-        .filter_map(|rest| Some(("example".to_owned(), rest.split("```").next()?.to_owned())));
+    let examples = blocks.filter_map(|rest| Some(("example".to_owned(), rest.split("```").next()?.to_owned())));
     for (name, text) in scenes().into_iter().chain(examples) {
         let text = text.trim_start_matches('\u{feff}');
-        schema
-            .check(text)
-            .unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+        schema.check(text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
     }
     for name in WRONG_FORM {
         let [(name, text)] = &corpus(&format!("bad-{name}.toml"))[..] else {

@@ -17,16 +17,7 @@ const FLOORS: [&[&str]; 10] = [
     &["main", "web"],
 ];
 /// Modules whose results must be the same bits everywhere.
-const EXACT: [&str; 8] = [
-    "jet",
-    "mesh",
-    "contact",
-    "integrate",
-    "scene",
-    "mechanism",
-    "simulate",
-    "analysis",
-];
+const EXACT: [&str; 8] = ["jet", "mesh", "contact", "integrate", "scene", "mechanism", "simulate", "analysis"];
 
 fn floor(module: &str) -> Option<usize> {
     FLOORS.iter().position(|floor| floor.contains(&module))
@@ -34,10 +25,7 @@ fn floor(module: &str) -> Option<usize> {
 
 /// Source files under `folder`.
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
-    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
     for path in entries {
         if path.is_dir() {
@@ -72,20 +60,13 @@ fn code(text: &str) -> String {
     let c: Vec<char> = text.chars().collect();
     let (mut out, mut i) = (String::new(), 0);
     let blank = |out: &mut String, from: usize, to: usize| {
-        out.extend(
-            c[from..to]
-                .iter()
-                .map(|&c| if c == '\n' { '\n' } else { ' ' }),
-        );
+        out.extend(c[from..to].iter().map(|&c| if c == '\n' { '\n' } else { ' ' }));
     };
     while i < c.len() {
         let start = i;
         let word_before = i > 0 && (c[i - 1].is_alphanumeric() || c[i - 1] == '_');
         if c[i..].starts_with(&['/', '/']) {
-            i += c[i..]
-                .iter()
-                .position(|&c| c == '\n')
-                .unwrap_or(c.len() - i);
+            i += c[i..].iter().position(|&c| c == '\n').unwrap_or(c.len() - i);
             blank(&mut out, start, i);
         } else if c[i..].starts_with(&['/', '*']) {
             i += 2;
@@ -103,9 +84,7 @@ fn code(text: &str) -> String {
                 continue;
             }
             i += 2 + hashes;
-            while i < c.len()
-                && !(c[i] == '"' && c[i + 1..].iter().take_while(|&&c| c == '#').count() >= hashes)
-            {
+            while i < c.len() && !(c[i] == '"' && c[i + 1..].iter().take_while(|&&c| c == '#').count() >= hashes) {
                 i += 1;
             }
             i = (i + 1 + hashes).min(c.len());
@@ -161,9 +140,7 @@ fn tree<'c>(mut code: &'c str, start: &[&'c str], found: &mut Vec<Vec<&'c str>>)
                 list = rest.strip_prefix(',').unwrap_or(rest);
             }
         }
-        let end = code
-            .find(|c: char| !(c.is_alphanumeric() || c == '_'))
-            .unwrap_or(code.len());
+        let end = code.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(code.len());
         let end = if code.starts_with('*') { 1 } else { end };
         path.extend((end > 0).then(|| &code[..end]));
         match code[end..].strip_prefix("::") {
@@ -193,9 +170,7 @@ fn paths<'c>(code: &'c str, starts: &[&str]) -> Vec<(usize, Vec<&'c str>)> {
 /// Modules that stand first after `crate::` (or `jointplay::` in the entries).
 fn uses(code: &str) -> Vec<(usize, &str)> {
     let paths = paths(code, &["crate", "jointplay"]).into_iter();
-    paths
-        .filter_map(|(at, path)| Some((at, *path.get(1)?)))
-        .collect()
+    paths.filter_map(|(at, path)| Some((at, *path.get(1)?))).collect()
 }
 
 #[test]
@@ -210,11 +185,7 @@ fn modules_use_only_lower_floors() {
                 continue;
             };
             arrows += 1;
-            assert!(
-                used == module || other < own,
-                "src/{file}:{}: {module} uses {used}",
-                line_of(code, at)
-            );
+            assert!(used == module || other < own, "src/{file}:{}: {module} uses {used}", line_of(code, at));
         }
         // `super` above the module's own folder would be a way around; a module of tests at the end is one deeper.
         let depth = file.matches('/').count() - usize::from(file.ends_with("mod.rs"));
@@ -224,10 +195,7 @@ fn modules_use_only_lower_floors() {
             assert!(!part.contains(&climb), "src/{file}: climbs out by {climb}");
         }
     }
-    assert!(
-        arrows > 20,
-        "only {arrows} arrows found: does the search still work?"
-    );
+    assert!(arrows > 20, "only {arrows} arrows found: does the search still work?");
 }
 
 /// What a module's code says, without its tests at the end.
@@ -242,28 +210,14 @@ struct Module<'c> {
 
 impl<'c> Module<'c> {
     fn of(file: &'c str, code: &'c str) -> Self {
-        const KINDS: [&str; 8] = [
-            "fn",
-            "struct",
-            "enum",
-            "trait",
-            "type",
-            "const",
-            "static",
-            "macro_rules",
-        ];
+        const KINDS: [&str; 8] = ["fn", "struct", "enum", "trait", "type", "const", "static", "macro_rules"];
         let all: Vec<&str> = words(code).map(|(_, word)| word).collect();
         let pairs = all.windows(2).filter(|pair| KINDS.contains(&pair[0]));
         let mut imports = Vec::new();
         for (at, word) in words(code).filter(|(_, word)| *word == "use") {
             tree(&code[at + word.len()..], &[], &mut imports);
         }
-        Self {
-            file,
-            code,
-            items: pairs.map(|pair| pair[1]).collect(),
-            imports,
-        }
+        Self { file, code, items: pairs.map(|pair| pair[1]).collect(), imports }
     }
 }
 
@@ -343,13 +297,9 @@ fn siblings_use_each_other_in_one_direction() {
     let files = files();
     let mut modules = Modules(BTreeMap::new());
     for (_, file, code) in &files {
-        let (plain, _) = code
-            .split_once("#[cfg(test)]\nmod tests {")
-            .unwrap_or((code, ""));
+        let (plain, _) = code.split_once("#[cfg(test)]\nmod tests {").unwrap_or((code, ""));
         let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
-        modules
-            .0
-            .insert(path.split('/').collect(), Module::of(file, plain));
+        modules.0.insert(path.split('/').collect(), Module::of(file, plain));
     }
     // (folder, user, used) with a place; what a folder shares with its parent does not count.
     let mut arrows = BTreeMap::new();
@@ -363,11 +313,7 @@ fn siblings_use_each_other_in_one_direction() {
             }
         }
     }
-    assert!(
-        arrows.len() > 300,
-        "only {} arrows found: does the search still work?",
-        arrows.len()
-    );
+    assert!(arrows.len() > 300, "only {} arrows found: does the search still work?", arrows.len());
     // What nothing follows or nothing precedes is in no circle.
     loop {
         let before = arrows.len();
@@ -400,24 +346,15 @@ fn files_are_written_through_one_module() {
         "NamedTempFile",
     ];
     for (module, file, code) in files() {
-        let (plain, _) = code
-            .split_once("#[cfg(test)]\nmod tests")
-            .unwrap_or((&code, ""));
+        let (plain, _) = code.split_once("#[cfg(test)]\nmod tests").unwrap_or((&code, ""));
         // Pictures that are drawn to be looked at.
-        if module == "files"
-            || file.ends_with("survival.rs")
-            || file == "render/look.rs"
-            || file.ends_with("/tests.rs")
+        if module == "files" || file.ends_with("survival.rs") || file == "render/look.rs" || file.ends_with("/tests.rs")
         {
             continue;
         }
         for call in WRITING {
             let at = plain.find(call);
-            assert!(
-                at.is_none(),
-                "src/{file}:{}: {call}",
-                line_of(plain, at.unwrap_or(0))
-            );
+            assert!(at.is_none(), "src/{file}:{}: {call}", line_of(plain, at.unwrap_or(0)));
         }
     }
 }
@@ -444,9 +381,8 @@ fn physics_knows_no_screen_clock_or_platform_dependent_function() {
     ];
     // Elementary functions of std: their bits differ between platforms; `libm` has the same ones everywhere.
     const ELEMENTARY: [&str; 25] = [
-        "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sin_cos", "sinh", "cosh", "tanh",
-        "asinh", "acosh", "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10",
-        "powf", "cbrt", "hypot",
+        "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sin_cos", "sinh", "cosh", "tanh", "asinh", "acosh",
+        "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot",
     ];
     let mut seen = 0;
     for (module, file, code) in files() {

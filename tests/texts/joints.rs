@@ -4,9 +4,7 @@ use jointplay::scene::{Freedom, JointKind, JointStart, Scene};
 
 /// An arm on a hinge, a rod that hangs free, and the joint `j` between them.
 fn text(joint: &str) -> String {
-    let body = |name: &str| {
-        format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n")
-    };
+    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n");
     format!(
         "{}{}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n\
          [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nstart = {{ position = [0, 0, 0] }}\n\
@@ -35,16 +33,10 @@ fn refused(text: &str, words: &[&str]) {
 
 #[test]
 fn a_joint_that_closes_a_loop_is_no_part_of_the_tree() {
-    let scene = parse(&text(
-        "kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = true\n",
-    ))
-    .unwrap();
+    let scene = parse(&text("kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = true\n")).unwrap();
     assert_eq!((scene.joints.len(), scene.closing_joints.len()), (2, 1));
     let joint = &scene.closing_joints[0];
-    assert_eq!(
-        (joint.kind, joint.parent, joint.child),
-        (JointKind::Revolute, Some(0), 1)
-    );
+    assert_eq!((joint.kind, joint.parent, joint.child), (JointKind::Revolute, Some(0), 1));
     assert_eq!(scene.cut_joints().collect::<Vec<_>>(), ["j"]);
     // Written out, the default.
     let hung = hung("kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = false\n");
@@ -70,54 +62,26 @@ fn start_values_of_two_degrees_are_keys() {
 #[test]
 fn what_is_refused_says_what_is_allowed() {
     let hinge = "kind = \"revolute\"\naxis = [0, 1, 0]\n";
-    refused(
-        &text(hinge),
-        &[
-            "joint.j.child = \"rod\"",
-            "already the child of joint `free`",
-            "`closes_loop = true`",
-        ],
-    );
+    refused(&text(hinge), &["joint.j.child = \"rod\"", "already the child of joint `free`", "`closes_loop = true`"]);
     let closing = |more: &str| text(&format!("{hinge}closes_loop = true\n{more}"));
     refused(
         &closing("drive = { law = \"constant\", velocity = \"1 rad/s\" }\n"),
         &["joint.j.drive", "a joint that closes a loop has no drive"],
     );
+    refused(&closing("start = { position = \"1 deg\" }\n"), &["joint.j.start", "starts where"]);
+    refused(&closing("stiffness = 1\n"), &["joint.j.stiffness", "unknown key"]);
     refused(
-        &closing("start = { position = \"1 deg\" }\n"),
-        &["joint.j.start", "starts where"],
-    );
-    refused(
-        &closing("stiffness = 1\n"),
-        &["joint.j.stiffness", "unknown key"],
-    );
-    refused(
-        &closing("").replace(
-            "parent = \"arm\"\nchild = \"rod\"",
-            "parent = \"rod\"\nchild = \"rod\"",
-        ),
+        &closing("").replace("parent = \"arm\"\nchild = \"rod\"", "parent = \"rod\"\nchild = \"rod\""),
         &["joint.j.child", "parent and child are the same body"],
     );
     refused(&text("closes_loop = 1\n"), &["joint.j.kind", "missing"]);
-    refused(
-        &text(&format!("{hinge}closes_loop = \"yes\"\n")),
-        &["joint.j.closes_loop", "true or false"],
-    );
+    refused(&text(&format!("{hinge}closes_loop = \"yes\"\n")), &["joint.j.closes_loop", "true or false"]);
     refused(
         &text("kind = \"free\"\ncloses_loop = true\n"),
-        &[
-            "joint.j.kind",
-            "allowed fixed, prismatic, revolute, cylindrical, universal",
-        ],
+        &["joint.j.kind", "allowed fixed, prismatic, revolute, cylindrical, universal"],
     );
-    refused(
-        &hung("kind = \"cylindrical\"\n"),
-        &["joint.j.axis", "missing"],
-    );
-    refused(
-        &hung("kind = \"universal\"\naxis = [0, 1, 0]\n"),
-        &["joint.j.child_axis", "missing"],
-    );
+    refused(&hung("kind = \"cylindrical\"\n"), &["joint.j.axis", "missing"]);
+    refused(&hung("kind = \"universal\"\naxis = [0, 1, 0]\n"), &["joint.j.child_axis", "missing"]);
     refused(
         &hung("kind = \"universal\"\naxis = [0, 1, 0]\nchild_axis = [0, 1, 1]\n"),
         &["joint.j.child_axis", "perpendicular to `axis`", "45"],
@@ -133,38 +97,22 @@ fn what_is_refused_says_what_is_allowed() {
     let stop = "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"1 mm\"\nforce = \"1 N\"\ndepth = \"1 mm\"\n";
     refused(
         &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + stop),
-        &[
-            "stop.s.coordinate",
-            "missing: a cylindrical joint has position and angle",
-            "coordinate = \"position\"",
-        ],
+        &["stop.s.coordinate", "missing: a cylindrical joint has position and angle", "coordinate = \"position\""],
     );
     let of = |word: &str| stop.replace("lower", &format!("coordinate = \"{word}\"\nlower"));
     refused(
         &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + &of("child_angle")),
-        &[
-            "stop.s.coordinate = \"child_angle\"",
-            "no such coordinate: a cylindrical joint has position and angle",
-        ],
+        &["stop.s.coordinate = \"child_angle\"", "no such coordinate: a cylindrical joint has position and angle"],
     );
-    refused(
-        &(closing("") + &of("position")),
-        &["no such coordinate: a revolute joint has angle"],
-    );
-    refused(
-        &(closing("") + stop),
-        &["stop.s.lower", "wrong unit `mm`", "units of angle"],
-    );
+    refused(&(closing("") + &of("position")), &["no such coordinate: a revolute joint has angle"]);
+    refused(&(closing("") + stop), &["stop.s.lower", "wrong unit `mm`", "units of angle"]);
     refused(
         &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + &of("angle")),
         &["stop.s.lower", "wrong unit `mm`", "units of angle"],
     );
     refused(
         &(closing("") + &stop.replace("\"j\"", "\"free\"")),
-        &[
-            "a free joint is neither a slide nor a hinge",
-            "allowed hinge, j",
-        ],
+        &["a free joint is neither a slide nor a hinge", "allowed hinge, j"],
     );
 }
 
@@ -173,45 +121,23 @@ fn drives_of_two_degrees_name_their_coordinates() {
     let hung = |more: &str| hung(&format!("kind = \"cylindrical\"\naxis = [0, 1, 0]\n{more}"));
     let slide = "{ law = \"constant\", velocity = \"2 mm/s\" }";
     let turn = "{ law = \"constant\", velocity = \"3 rad/s\" }";
-    let mut scene = parse(&hung(&format!(
-        "drive = {{ angle = {turn} }}\nstart = {{ velocity = \"1 m/s\" }}\n"
-    )))
-    .unwrap();
+    let mut scene =
+        parse(&hung(&format!("drive = {{ angle = {turn} }}\nstart = {{ velocity = \"1 m/s\" }}\n"))).unwrap();
     let driven: Vec<_> = scene.driven().collect();
     assert_eq!(driven, [(&scene.joints[1], Freedom::TurnOfSlide)]);
-    scene
-        .set("joint.j.drive.angle.velocity", "4 rad/s")
-        .unwrap();
+    scene.set("joint.j.drive.angle.velocity", "4 rad/s").unwrap();
     scene.set("joint.j.start.velocity", "2 m/s").unwrap();
     let both = format!("drive = {{ angle = {turn}, position = {slide} }}\n");
     let scene = parse(&hung(&both)).unwrap();
     assert!(scene.joints[1].is_prescribed() && scene.driven().count() == 2);
     for (more, words) in [
-        (
-            format!("drive = {slide}\n"),
-            ["joint.j.drive.law", "unknown key"],
-        ),
-        (
-            format!("drive = {{ angle = {slide} }}\n"),
-            ["joint.j.drive.angle.velocity", "rad/s"],
-        ),
-        (
-            format!("drive = {{ child_angle = {turn} }}\n"),
-            ["joint.j.drive.child_angle", "unknown key"],
-        ),
-        (
-            "drive = { }\n".to_owned(),
-            [
-                "joint.j.drive",
-                "drives nothing: give `position`, `angle` or both",
-            ],
-        ),
+        (format!("drive = {slide}\n"), ["joint.j.drive.law", "unknown key"]),
+        (format!("drive = {{ angle = {slide} }}\n"), ["joint.j.drive.angle.velocity", "rad/s"]),
+        (format!("drive = {{ child_angle = {turn} }}\n"), ["joint.j.drive.child_angle", "unknown key"]),
+        ("drive = { }\n".to_owned(), ["joint.j.drive", "drives nothing: give `position`, `angle` or both"]),
         (
             format!("{both}start = {{ angle = \"1 deg\" }}\n"),
-            [
-                "joint.j.start.angle",
-                "the drive of this coordinate says where it starts",
-            ],
+            ["joint.j.start.angle", "the drive of this coordinate says where it starts"],
         ),
         (
             format!("drive = {{ angle = {turn} }}\nstart = {{ angular_velocity = \"1 rad/s\" }}\n"),
@@ -224,11 +150,7 @@ fn drives_of_two_degrees_name_their_coordinates() {
     ] {
         refused(&hung(&more), &words);
     }
-    let motor =
-        "[[motor]]\nname = \"m\"\njoint = \"j\"\ncoordinate = \"angle\"\ntorque = \"1 N m\"\n";
-    refused(
-        &(hung(&format!("drive = {{ angle = {turn} }}\n")) + motor),
-        &["motor.m.joint", "has a drive"],
-    );
+    let motor = "[[motor]]\nname = \"m\"\njoint = \"j\"\ncoordinate = \"angle\"\ntorque = \"1 N m\"\n";
+    refused(&(hung(&format!("drive = {{ angle = {turn} }}\n")) + motor), &["motor.m.joint", "has a drive"]);
     parse(&(hung(&format!("drive = {{ position = {slide} }}\n")) + motor)).unwrap();
 }

@@ -51,9 +51,7 @@ impl Folder {
 #[test]
 fn a_body_weighs_what_its_mesh_encloses() {
     let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
-    let place = format!(
-        "{OBJ}, position = \"0 5 0 mm\", rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}"
-    );
+    let place = format!("{OBJ}, position = \"0 5 0 mm\", rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}");
     let scene = folder.read(&scene(&place, HEAVY)).unwrap();
     let body = &scene.bodies[0];
     assert!((body.mass - 0.012).abs() < 1e-12, "{}", body.mass);
@@ -90,16 +88,8 @@ fn shapes_of_one_file_share_its_triangles() {
     let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
     let shapes = format!("{OBJ} }}, {{ {OBJ}, position = \"1 0 0 m\"");
     let scene = folder.read(&scene(&shapes, GIVEN)).unwrap();
-    let meshes: Vec<_> = scene.bodies[0]
-        .shapes
-        .iter()
-        .map(|shape| &shape.geometry)
-        .collect();
-    let [
-        Geometry::Mesh { mesh: a, .. },
-        Geometry::Mesh { mesh: b, .. },
-    ] = meshes[..]
-    else {
+    let meshes: Vec<_> = scene.bodies[0].shapes.iter().map(|shape| &shape.geometry).collect();
+    let [Geometry::Mesh { mesh: a, .. }, Geometry::Mesh { mesh: b, .. }] = meshes[..] else {
         panic!("two meshes");
     };
     assert!(std::sync::Arc::ptr_eq(a, b));
@@ -114,18 +104,10 @@ fn a_fixed_mesh_follows_a_pattern() {
         scene(OBJ, GIVEN)
     );
     let scene = folder.read(&text).unwrap();
-    let Geometry::Mesh {
-        position,
-        rotation,
-        unit,
-        ..
-    } = scene.fixed_shapes[1].geometry
-    else {
+    let Geometry::Mesh { position, rotation, unit, .. } = scene.fixed_shapes[1].geometry else {
         panic!("a mesh");
     };
-    assert!(
-        (position.x + 2.0).abs() < 1e-12 && (rotation.angle() - std::f64::consts::PI).abs() < 1e-12
-    );
+    assert!((position.x + 2.0).abs() < 1e-12 && (rotation.angle() - std::f64::consts::PI).abs() < 1e-12);
     assert_eq!(unit, 0.01);
 }
 
@@ -146,66 +128,18 @@ fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
     let mesh = |file: &str, more: &str| format!("form = \"mesh\", file = \"{file}\"{more}");
     let mm = ", unit = \"mm\"";
     for (shape, keys, wanted) in [
-        (
-            mesh("bad.obj", mm),
-            GIVEN,
-            &["bad.obj:8:6: is not a number", "v 10 2O 30"][..],
-        ),
-        (
-            mesh("cut.stl", mm),
-            GIVEN,
-            &["cut.stl: byte 80: ", "has 134 bytes, this file has 127"],
-        ),
-        (
-            mesh("arm.gltf", ""),
-            GIVEN,
-            &["arm.gltf: no glTF file: ", "line 2 column"],
-        ),
-        (
-            mesh("large.obj", mm),
-            GIVEN,
-            &["shapes[0].file", "at most 8 MiB in all meshes"],
-        ),
-        (
-            mesh("arm.obj", ""),
-            GIVEN,
-            &["shapes[0].unit: missing", "unit = \"1 mm\""],
-        ),
-        (
-            mesh("arm.obj", ", unit = \"kg\""),
-            GIVEN,
-            &["shapes[0].unit", "mm"],
-        ),
-        (
-            mesh("arm.obj", ", unit = \"50 m\""),
-            GIVEN,
-            &["reaches 1500 m far", "up to 1000 m"],
-        ),
-        (
-            mesh("arm.step", mm),
-            GIVEN,
-            &["shapes[0].file", ".stl, .obj, .gltf, .glb"],
-        ),
-        (
-            mesh("none.obj", mm),
-            GIVEN,
-            &["shapes[0].file", "cannot read this file"],
-        ),
-        (
-            mesh("../arm.obj", mm),
-            GIVEN,
-            &["shapes[0].file", "without `..`"],
-        ),
-        (
-            mesh("arm.obj", ", unit = \"mm\", size = \"1 1 1 mm\""),
-            GIVEN,
-            &["a mesh has file, unit"],
-        ),
-        (
-            mesh("open.obj", mm),
-            HEAVY,
-            &["body.arm.shapes[0]", "not closed", "(0, 0, 30)", "`mass`"],
-        ),
+        (mesh("bad.obj", mm), GIVEN, &["bad.obj:8:6: is not a number", "v 10 2O 30"][..]),
+        (mesh("cut.stl", mm), GIVEN, &["cut.stl: byte 80: ", "has 134 bytes, this file has 127"]),
+        (mesh("arm.gltf", ""), GIVEN, &["arm.gltf: no glTF file: ", "line 2 column"]),
+        (mesh("large.obj", mm), GIVEN, &["shapes[0].file", "at most 8 MiB in all meshes"]),
+        (mesh("arm.obj", ""), GIVEN, &["shapes[0].unit: missing", "unit = \"1 mm\""]),
+        (mesh("arm.obj", ", unit = \"kg\""), GIVEN, &["shapes[0].unit", "mm"]),
+        (mesh("arm.obj", ", unit = \"50 m\""), GIVEN, &["reaches 1500 m far", "up to 1000 m"]),
+        (mesh("arm.step", mm), GIVEN, &["shapes[0].file", ".stl, .obj, .gltf, .glb"]),
+        (mesh("none.obj", mm), GIVEN, &["shapes[0].file", "cannot read this file"]),
+        (mesh("../arm.obj", mm), GIVEN, &["shapes[0].file", "without `..`"]),
+        (mesh("arm.obj", ", unit = \"mm\", size = \"1 1 1 mm\""), GIVEN, &["a mesh has file, unit"]),
+        (mesh("open.obj", mm), HEAVY, &["body.arm.shapes[0]", "not closed", "(0, 0, 30)", "`mass`"]),
     ] {
         let error = folder.read(&scene(&shape, keys)).unwrap_err();
         for part in wanted {
@@ -221,21 +155,14 @@ fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
 #[test]
 fn colours_are_read_and_refused() {
     let sphere = |colour: &str| {
-        let shape = format!(
-            "form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", colour = \"{colour}\""
-        );
+        let shape = format!("form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", colour = \"{colour}\"");
         Scene::parse(&scene(&shape, GIVEN), None, &[])
     };
     let read = sphere("#C2255c").unwrap();
     assert_eq!(read.bodies[0].shapes[0].colour, Some([0xc2, 0x25, 0x5c]));
-    for bad in [
-        "red", "#12345", "#1234567", "#+12345", "#é2345", "123456", "",
-    ] {
+    for bad in ["red", "#12345", "#1234567", "#+12345", "#é2345", "123456", ""] {
         let error = sphere(bad).unwrap_err().to_string();
-        assert!(
-            error.contains("no colour; allowed `#` and six"),
-            "{bad}: {error}"
-        );
+        assert!(error.contains("no colour; allowed `#` and six"), "{bad}: {error}");
     }
 }
 
@@ -245,12 +172,8 @@ fn without_a_role_a_shape_has_that_of_its_body() {
     let joint = |name: &str, kind: &str, more: &str| {
         format!("[[joint]]\nname = \"{name}\"\nchild = \"{name}\"\nkind = \"{kind}\"\n{more}\n")
     };
-    let names = [
-        "crank", "pump", "free", "ram", "hinged", "foot", "base", "last",
-    ];
-    let drive = |speed: &str| {
-        format!("axis = [0, 0, 1]\ndrive = {{ law = \"constant\", velocity = \"{speed}\" }}")
-    };
+    let names = ["crank", "pump", "free", "ram", "hinged", "foot", "base", "last"];
+    let drive = |speed: &str| format!("axis = [0, 0, 1]\ndrive = {{ law = \"constant\", velocity = \"{speed}\" }}");
     let axis = "axis = [0, 0, 1]";
     let mut text: String = names.iter().map(|name| body(name)).collect();
     text += &joint("crank", "revolute", &drive("1 rad/s"));

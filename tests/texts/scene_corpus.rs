@@ -176,9 +176,7 @@ pub fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
             }
             // The likeliest to remain a scene: another digit, sign or power of ten.
             _ => {
-                let digits: Vec<usize> = (0..bytes.len())
-                    .filter(|&i| bytes[i].is_ascii_digit())
-                    .collect();
+                let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
                 let Some(&at) = digits.get(numbers.below(digits.len())) else {
                     continue;
                 };
@@ -209,12 +207,8 @@ fn corpus() -> Vec<(String, Vec<u8>)> {
 
 /// Checks, and names the text of a panic.
 fn survives(what: &str, bytes: &[u8]) -> Fate {
-    std::panic::catch_unwind(|| check(bytes)).unwrap_or_else(|_| {
-        panic!(
-            "{what} breaks the reader:\n{}",
-            String::from_utf8_lossy(bytes)
-        )
-    })
+    std::panic::catch_unwind(|| check(bytes))
+        .unwrap_or_else(|_| panic!("{what} breaks the reader:\n{}", String::from_utf8_lossy(bytes)))
 }
 
 #[test]
@@ -241,35 +235,23 @@ fn the_corpus_ends_as_its_names_say() {
 fn mutations_of_the_corpus_break_nothing() {
     let times = std::env::var("SCENE_MUTATIONS").ok();
     let times = times.map_or(1, |times| times.parse::<u64>().expect("a number"));
-    let mut seeds: Vec<(String, Vec<u8>, u64)> = corpus()
-        .into_iter()
-        .map(|(name, bytes)| (name, bytes, MUTATIONS))
-        .collect();
+    let mut seeds: Vec<(String, Vec<u8>, u64)> =
+        corpus().into_iter().map(|(name, bytes)| (name, bytes, MUTATIONS)).collect();
     for name in BUILT_IN {
         let text = built_in_text(name).unwrap();
         assert_eq!(survives(name, text.as_bytes()), Fate::Starts);
-        seeds.push((
-            name.to_owned(),
-            text.as_bytes().to_vec(),
-            MUTATIONS_OF_BUILT_IN,
-        ));
+        seeds.push((name.to_owned(), text.as_bytes().to_vec(), MUTATIONS_OF_BUILT_IN));
     }
     let next = AtomicUsize::new(0);
     let fates = std::sync::Mutex::new(BTreeMap::<String, u64>::new());
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                while let Some((name, bytes, count)) =
-                    seeds.get(next.fetch_add(1, Ordering::Relaxed))
-                {
+                while let Some((name, bytes, count)) = seeds.get(next.fetch_add(1, Ordering::Relaxed)) {
                     for seed in 1..=*count * times {
                         let mutated = mutate(bytes, &mut Numbers(seed));
                         let fate = survives(&format!("{name}, mutation {seed}"), &mutated);
-                        *fates
-                            .lock()
-                            .unwrap()
-                            .entry(format!("{fate:?}"))
-                            .or_default() += 1;
+                        *fates.lock().unwrap().entry(format!("{fate:?}")).or_default() += 1;
                     }
                 }
             });
@@ -278,8 +260,5 @@ fn mutations_of_the_corpus_break_nothing() {
     let fates = fates.into_inner().unwrap();
     println!("{fates:?}");
     // Mutations that only ever fail to parse would look at nothing.
-    assert!(
-        fates["Refused"] > 1000 && fates["Starts"] > 200,
-        "{fates:?}"
-    );
+    assert!(fates["Refused"] > 1000 && fates["Starts"] > 200, "{fates:?}");
 }

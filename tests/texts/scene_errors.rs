@@ -33,10 +33,7 @@ fn parse(text: &str) -> Result<Scene, SceneError> {
 fn holds(case: &str, error: &SceneError, fragments: &[&str]) {
     let text = error.to_string();
     for fragment in fragments {
-        assert!(
-            text.contains(fragment),
-            "{case}\n  should say `{fragment}`, says:\n{text}"
-        );
+        assert!(text.contains(fragment), "{case}\n  should say `{fragment}`, says:\n{text}");
     }
 }
 
@@ -56,11 +53,7 @@ fn a_law_and_a_role_that_are_none_are_named_before_their_keys() {
             "law = \"sinus\", speed = \"3 Hz\"",
             ["drive.law = \"sinus\"", "allowed spcmm, constant, harmonic"],
         ),
-        (
-            "role = \"frame\"",
-            "role = \"fame\"\ncolour = \"red\"",
-            ["role = \"fame\"", "did you mean `frame`"],
-        ),
+        ("role = \"frame\"", "role = \"fame\"\ncolour = \"red\"", ["role = \"fame\"", "did you mean `frame`"]),
     ] {
         let broken = text.replacen(right, wrong, 1);
         assert_ne!(broken, text, "{right}");
@@ -75,18 +68,9 @@ fn every_broken_line_is_named_with_its_remedy() {
         (
             "friction = 0.15",
             "fricton = 0.15",
-            &[
-                "my.toml:5:1",
-                "contact.fricton",
-                "unknown key",
-                "did you mean `friction`",
-            ],
+            &["my.toml:5:1", "contact.fricton", "unknown key", "did you mean `friction`"],
         ),
-        (
-            "mass = \"0.384 kg\"",
-            "mas = \"0.384 kg\"",
-            &["my.toml:8:1", "body.rod.mas", "did you mean `mass`"],
-        ),
+        ("mass = \"0.384 kg\"", "mas = \"0.384 kg\"", &["my.toml:8:1", "body.rod.mas", "did you mean `mass`"]),
         (
             "clearance = \"0.3 mm\"",
             "clearance = \"0.3 kg\"",
@@ -101,12 +85,7 @@ fn every_broken_line_is_named_with_its_remedy() {
         (
             "clearance = \"0.3 mm\"",
             "clearance = 0.3",
-            &[
-                "my.toml:4:13",
-                "contact.clearance = 0.3",
-                "needs a unit",
-                "mm",
-            ],
+            &["my.toml:4:13", "contact.clearance = 0.3", "needs a unit", "mm"],
         ),
         (
             "clearance = \"0.3 mm\"",
@@ -119,133 +98,51 @@ fn every_broken_line_is_named_with_its_remedy() {
                 "units m",
             ],
         ),
-        (
-            "clearance = \"0.3 mm\"",
-            "clearance = nan",
-            &["my.toml:4:13", "contact.clearance = nan", "finite"],
-        ),
-        (
-            "clearance = \"0.3 mm\"",
-            "clearance = \"inf mm\"",
-            &["my.toml:4:13", "finite"],
-        ),
+        ("clearance = \"0.3 mm\"", "clearance = nan", &["my.toml:4:13", "contact.clearance = nan", "finite"]),
+        ("clearance = \"0.3 mm\"", "clearance = \"inf mm\"", &["my.toml:4:13", "finite"]),
         (
             "clearance = \"0.3 mm\"",
             "clearance = \"12 mm\"",
-            &[
-                "my.toml:4:13",
-                "contact.clearance = \"12 mm\"",
-                "below the ball radius, 10 mm",
-                "mm, um",
-            ],
+            &["my.toml:4:13", "contact.clearance = \"12 mm\"", "below the ball radius, 10 mm", "mm, um"],
         ),
-        (
-            "clearance = \"0.3 mm\"",
-            "clearance = \"10 mm\"",
-            &["my.toml:4:13", "below the ball radius"],
-        ),
-        (
-            "clearance = \"0.3 mm\"",
-            "clearance = true",
-            &["my.toml:4:13", "must be a number or a text, not a boolean"],
-        ),
-        (
-            "friction = 0.15",
-            "friction = inf",
-            &[
-                "my.toml:5:12",
-                "contact.friction = inf",
-                "finite",
-                "0 to 10",
-            ],
-        ),
-        (
-            "friction = 0.15",
-            "friction = \"0.15 mm\"",
-            &["my.toml:5:12", "pure number"],
-        ),
-        (
-            "friction = 0.15",
-            "friction = 11",
-            &["my.toml:5:12", "contact.friction = 11", "allowed 0 to 10"],
-        ),
+        ("clearance = \"0.3 mm\"", "clearance = \"10 mm\"", &["my.toml:4:13", "below the ball radius"]),
+        ("clearance = \"0.3 mm\"", "clearance = true", &["my.toml:4:13", "must be a number or a text, not a boolean"]),
+        ("friction = 0.15", "friction = inf", &["my.toml:5:12", "contact.friction = inf", "finite", "0 to 10"]),
+        ("friction = 0.15", "friction = \"0.15 mm\"", &["my.toml:5:12", "pure number"]),
+        ("friction = 0.15", "friction = 11", &["my.toml:5:12", "contact.friction = 11", "allowed 0 to 10"]),
         (
             "friction = 0.15",
             "normal_law = \"herz\"",
-            &[
-                "my.toml:5:14",
-                "contact.normal_law",
-                "did you mean `hertz`",
-                "lankarani-nikravesh",
-            ],
+            &["my.toml:5:14", "contact.normal_law", "did you mean `hertz`", "lankarani-nikravesh"],
         ),
         (
             "restitution = 0.9",
             "clearance = \"12 mm\"",
-            &[
-                "my.toml:20:13",
-                "joint.S1.clearance = \"12 mm\"",
-                "below the ball radius, 10 mm",
-            ],
+            &["my.toml:20:13", "joint.S1.clearance = \"12 mm\"", "below the ball radius, 10 mm"],
         ),
         (
             "restitution = 0.9",
             "ball_radius = \"0.2 mm\"",
-            &[
-                "my.toml:20:15",
-                "joint.S1.ball_radius",
-                "below the ball radius, 0.2 mm",
-            ],
+            &["my.toml:20:15", "joint.S1.ball_radius", "below the ball radius, 0.2 mm"],
         ),
         (
             "restitution = 0.9",
             "restitution = 0\nnormal_law = \"flores\"",
-            &[
-                "my.toml:20:15",
-                "joint.S1.restitution = 0",
-                "flores divides by",
-                "above 0 to 1",
-            ],
+            &["my.toml:20:15", "joint.S1.restitution = 0", "flores divides by", "above 0 to 1"],
         ),
         (
             "restitution = 0.9",
             "slip_speed_low = \"1 mm/s\"",
-            &[
-                "my.toml:20:18",
-                "joint.S1.slip_speed_low",
-                "below slip_speed_high 0.1 mm/s",
-            ],
+            &["my.toml:20:18", "joint.S1.slip_speed_low", "below slip_speed_high 0.1 mm/s"],
         ),
-        (
-            "restitution = 0.9",
-            "gap = 1",
-            &["my.toml:20:1", "joint.S1.gap", "unknown key", "clearance"],
-        ),
-        (
-            "mass = \"0.384 kg\"",
-            "mass = 0",
-            &["my.toml:8:8", "body.rod.mass = 0", "above 0", "kg"],
-        ),
-        (
-            "mass = \"0.384 kg\"",
-            "mass = \"-2 kg\"",
-            &["my.toml:8:8", "body.rod.mass = \"-2 kg\"", "above 0"],
-        ),
-        (
-            "mass = \"0.384 kg\"\n",
-            "",
-            &["my.toml:6:1", "body.rod.mass", "missing", "0.384 kg"],
-        ),
+        ("restitution = 0.9", "gap = 1", &["my.toml:20:1", "joint.S1.gap", "unknown key", "clearance"]),
+        ("mass = \"0.384 kg\"", "mass = 0", &["my.toml:8:8", "body.rod.mass = 0", "above 0", "kg"]),
+        ("mass = \"0.384 kg\"", "mass = \"-2 kg\"", &["my.toml:8:8", "body.rod.mass = \"-2 kg\"", "above 0"]),
+        ("mass = \"0.384 kg\"\n", "", &["my.toml:6:1", "body.rod.mass", "missing", "0.384 kg"]),
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
             "inertia = \"1e-3 1e-3 3e-3 kg m^2\"",
-            &[
-                "my.toml:9:11",
-                "body.rod.inertia",
-                "no body has this inertia",
-                "0.003 kg m^2",
-                "0.002 kg m^2",
-            ],
+            &["my.toml:9:11", "body.rod.inertia", "no body has this inertia", "0.003 kg m^2", "0.002 kg m^2"],
         ),
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
@@ -255,106 +152,50 @@ fn every_broken_line_is_named_with_its_remedy() {
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
             "inertia = \"1e-3 1e-3 1e-3 kg m^2\"\nproducts = \"2e-3 0 0 kg m^2\"",
-            &[
-                "body.rod.inertia",
-                "no body has this inertia",
-                "-0.001 kg m^2",
-            ],
+            &["body.rod.inertia", "no body has this inertia", "-0.001 kg m^2"],
         ),
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
             "inertia = \"1e-3 1e-3 kg m^2\"",
-            &[
-                "my.toml:9:11",
-                "body.rod.inertia",
-                "needs 3 numbers",
-                "has 2 numbers",
-            ],
+            &["my.toml:9:11", "body.rod.inertia", "needs 3 numbers", "has 2 numbers"],
         ),
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
             "inertia = [\"1e-3 kg m^2\", \"1e-3 kg m^2\"]",
             &["needs 3 values, has 2"],
         ),
-        (
-            "form = \"sphere\"",
-            "form = \"shere\"",
-            &["my.toml:10:20", "did you mean `sphere`"],
-        ),
+        ("form = \"sphere\"", "form = \"shere\"", &["my.toml:10:20", "did you mean `sphere`"]),
         // A wrong word decides which other keys are wrong: it is named, not these.
         (
             "form = \"sphere\"",
             "form = \"torus\", bore = \"1 mm\"",
-            &[
-                "body.rod.shapes[0].form = \"torus\"",
-                "allowed capsule, cylinder, cone, box, sphere, plate",
-            ],
+            &["body.rod.shapes[0].form = \"torus\"", "allowed capsule, cylinder, cone, box, sphere, plate"],
         ),
-        (
-            "form = \"sphere\"",
-            "form = \"sphere\", bore = \"1 mm\"",
-            &["shapes[0].bore", "unknown key"],
-        ),
+        ("form = \"sphere\"", "form = \"sphere\", bore = \"1 mm\"", &["shapes[0].bore", "unknown key"]),
         (
             "kind = \"free\"",
             "kind = \"spherical\"\nstiffness = 3",
-            &[
-                "joint.free.kind = \"spherical\"",
-                "allowed fixed, prismatic, revolute, free",
-            ],
+            &["joint.free.kind = \"spherical\"", "allowed fixed, prismatic, revolute, free"],
         ),
-        (
-            "radius = \"4 mm\"",
-            "radius = \"-4 mm\"",
-            &["body.rod.shapes[0].radius", "above 0"],
-        ),
-        (
-            "centre = \"0 0 1 mm\"",
-            "size = \"1 1 1 mm\"",
-            &["body.rod.shapes[0].size", "a sphere has centre, radius"],
-        ),
-        (
-            "role = \"driven-rod\"",
-            "role = \"rod\"",
-            &["body.rod.shapes[0].role", "driven-rod"],
-        ),
+        ("radius = \"4 mm\"", "radius = \"-4 mm\"", &["body.rod.shapes[0].radius", "above 0"]),
+        ("centre = \"0 0 1 mm\"", "size = \"1 1 1 mm\"", &["body.rod.shapes[0].size", "a sphere has centre, radius"]),
+        ("role = \"driven-rod\"", "role = \"rod\"", &["body.rod.shapes[0].role", "driven-rod"]),
         (
             "kind = \"free\"",
             "kind = \"ball\"",
-            &[
-                "my.toml:13:8",
-                "joint.free.kind = \"ball\"",
-                "fixed, prismatic, revolute, free",
-            ],
+            &["my.toml:13:8", "joint.free.kind = \"ball\"", "fixed, prismatic, revolute, free"],
         ),
-        (
-            "kind = \"free\"",
-            "kind = \"revolute\"\naxis = [0, 0, 0]",
-            &["my.toml:", "joint.free"],
-        ),
+        ("kind = \"free\"", "kind = \"revolute\"\naxis = [0, 0, 0]", &["my.toml:", "joint.free"]),
         (
             "child = \"rod\"",
             "child = \"rot\"",
-            &[
-                "my.toml:14:9",
-                "joint.free.child = \"rot\"",
-                "no body `rot`",
-                "did you mean `rod`",
-            ],
+            &["my.toml:14:9", "joint.free.child = \"rot\"", "no body `rot`", "did you mean `rod`"],
         ),
-        (
-            "start = { position = [0, 0, \"-100 mm\"] }\n",
-            "",
-            &["my.toml:11:1", "joint.free.start", "missing"],
-        ),
+        ("start = { position = [0, 0, \"-100 mm\"] }\n", "", &["my.toml:11:1", "joint.free.start", "missing"]),
         (
             "start = { position = [0, 0, \"-100 mm\"] }",
             "start = { position = [0, 0, \"-100 s\"] }",
-            &[
-                "my.toml:15:29",
-                "joint.free.start.position.z",
-                "wrong unit `s`",
-            ],
+            &["my.toml:15:29", "joint.free.start.position.z", "wrong unit `s`"],
         ),
         (
             "start = { position = [0, 0, \"-100 mm\"] }",
@@ -364,101 +205,36 @@ fn every_broken_line_is_named_with_its_remedy() {
         (
             "socket = { body = \"world\" }",
             "socket = { body = \"wold\" }",
-            &[
-                "my.toml:18:19",
-                "joint.S1.socket.body = \"wold\"",
-                "no body `wold`",
-                "did you mean `world`",
-            ],
+            &["my.toml:18:19", "joint.S1.socket.body = \"wold\"", "no body `wold`", "did you mean `world`"],
         ),
-        (
-            "socket = { body = \"world\" }",
-            "socket = { body = \"rod\" }",
-            &["joint.S1.ball", "same body"],
-        ),
-        (
-            "socket = { body = \"world\" }\n",
-            "",
-            &["my.toml:16:1", "joint.S1.socket", "missing"],
-        ),
-        (
-            "name = \"S1\"",
-            "name = \"S.1\"",
-            &["my.toml:17:8", "joint.S.1.name", "is not a name"],
-        ),
-        (
-            "name = \"S1\"",
-            "name = \"free\"",
-            &["my.toml:17:8", "already a joint of this name, in line 12"],
-        ),
-        (
-            "start = \"as-given\"",
-            "start = \"idea\"",
-            &["my.toml:2:9", "did you mean `ideal`"],
-        ),
+        ("socket = { body = \"world\" }", "socket = { body = \"rod\" }", &["joint.S1.ball", "same body"]),
+        ("socket = { body = \"world\" }\n", "", &["my.toml:16:1", "joint.S1.socket", "missing"]),
+        ("name = \"S1\"", "name = \"S.1\"", &["my.toml:17:8", "joint.S.1.name", "is not a name"]),
+        ("name = \"S1\"", "name = \"free\"", &["my.toml:17:8", "already a joint of this name, in line 12"]),
+        ("start = \"as-given\"", "start = \"idea\"", &["my.toml:2:9", "did you mean `ideal`"]),
         (
             "start = \"as-given\"",
             "formulation = \"trees\"",
-            &[
-                "my.toml:2:15",
-                "formulation = \"trees\"",
-                "did you mean `tree`",
-            ],
+            &["my.toml:2:15", "formulation = \"trees\"", "did you mean `tree`"],
         ),
-        (
-            "start = \"as-given\"",
-            "chain.links = 0",
-            &["my.toml:2:15", "chain.links = 0", "allowed 1 to 4096"],
-        ),
-        (
-            "start = \"as-given\"",
-            "chain.links = 2.5",
-            &["chain.links = 2.5", "whole number"],
-        ),
+        ("start = \"as-given\"", "chain.links = 0", &["my.toml:2:15", "chain.links = 0", "allowed 1 to 4096"]),
+        ("start = \"as-given\"", "chain.links = 2.5", &["chain.links = 2.5", "whole number"]),
         (
             "start = \"as-given\"",
             "gravity.z = \"9.81 m/s\"",
-            &[
-                "my.toml:2:13",
-                "gravity.z",
-                "wrong unit `m/s` (a unit of speed)",
-            ],
+            &["my.toml:2:13", "gravity.z", "wrong unit `m/s` (a unit of speed)"],
         ),
-        (
-            "start = \"as-given\"",
-            "solver.step = \"1 s\"",
-            &["solver.step = \"1 s\"", "0.1 us to 10000 us"],
-        ),
-        (
-            "start = \"as-given\"",
-            "view.down = \"down\"",
-            &["view.down", "+x, -x, +y, -y, +z, -z"],
-        ),
+        ("start = \"as-given\"", "solver.step = \"1 s\"", &["solver.step = \"1 s\"", "0.1 us to 10000 us"]),
+        ("start = \"as-given\"", "view.down = \"down\"", &["view.down", "+x, -x, +y, -y, +z, -z"]),
         (
             "start = \"as-given\"",
             "output.body = \"rop\"",
-            &[
-                "my.toml:2:15",
-                "output.body = \"rop\"",
-                "did you mean `rod`",
-            ],
+            &["my.toml:2:15", "output.body = \"rop\"", "did you mean `rod`"],
         ),
-        (
-            "start = \"as-given\"",
-            "start = ",
-            &["my.toml:2:", "not valid TOML"],
-        ),
+        ("start = \"as-given\"", "start = ", &["my.toml:2:", "not valid TOML"]),
         ("[contact]", "[contact", &["my.toml:3:", "not valid TOML"]),
-        (
-            "friction = 0.15",
-            "clearance = 0",
-            &["my.toml:5:1", "duplicate key"],
-        ),
-        (
-            "[contact]",
-            "[contacts]",
-            &["my.toml:3:2", "contacts", "did you mean `contact`"],
-        ),
+        ("friction = 0.15", "clearance = 0", &["my.toml:5:1", "duplicate key"]),
+        ("[contact]", "[contacts]", &["my.toml:3:2", "contacts", "did you mean `contact`"]),
     ];
     for (good, bad, fragments) in cases {
         assert!(GOOD.contains(good), "the case `{good}` breaks nothing");
@@ -477,23 +253,10 @@ fn additions_that_contradict_the_scene_are_refused() {
             "[[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n",
             &["my.toml:22:8", "already a body of this name, in line 7"],
         ),
-        (
-            body,
-            &[
-                "my.toml:21:1",
-                "body.arm",
-                "no [[joint]] has this body as its child",
-                "ball_joint",
-            ],
-        ),
+        (body, &["my.toml:21:1", "body.arm", "no [[joint]] has this body as its child", "ball_joint"]),
         (
             "[[joint]]\nname = \"again\"\nkind = \"free\"\nchild = \"rod\"\nstart = { position = \"0 0 0 m\" }\n",
-            &[
-                "my.toml:24:9",
-                "joint.again.child",
-                "is already the child of joint `free`",
-                "[[ball_joint]]",
-            ],
+            &["my.toml:24:9", "joint.again.child", "is already the child of joint `free`", "[[ball_joint]]"],
         ),
         (
             &format!(
@@ -502,14 +265,8 @@ fn additions_that_contradict_the_scene_are_refused() {
             &["joint.hinge.parent", "cycle", "[[ball_joint]]"],
         ),
         (
-            &format!(
-                "{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 0, 0]\n"
-            ),
-            &[
-                "my.toml:29:8",
-                "joint.hinge.axis = [0, 0, 0]",
-                "must not be zero",
-            ],
+            &format!("{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 0, 0]\n"),
+            &["my.toml:29:8", "joint.hinge.axis = [0, 0, 0]", "must not be zero"],
         ),
         (
             &format!("{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\n"),
@@ -525,10 +282,7 @@ fn additions_that_contradict_the_scene_are_refused() {
             &format!(
                 "{body}[[joint]]\nname = \"slide\"\nkind = \"prismatic\"\nchild = \"arm\"\naxis = [1, 0, 0]\ndrive = {{ law = \"constant\", velocity = \"6 rad/s\" }}\n"
             ),
-            &[
-                "joint.slide.drive.velocity = \"6 rad/s\"",
-                "a unit of angular speed",
-            ],
+            &["joint.slide.drive.velocity = \"6 rad/s\"", "a unit of angular speed"],
         ),
         (
             &format!(
@@ -555,67 +309,21 @@ fn additions_that_contradict_the_scene_are_refused() {
 fn one_slider_law_drives_one_joint() {
     let text = jointplay::scene::built_in_text("spcmm").unwrap();
     let error = parse(&text.replace("slider = 2", "slider = 1")).unwrap_err();
-    holds(
-        "slider twice",
-        &error,
-        &["joint.P2.drive", "slider 1 already drives joint `P1`"],
-    );
+    holds("slider twice", &error, &["joint.P2.drive", "slider 1 already drives joint `P1`"]);
     let error = parse(&text.replace("slider = 2", "slider = 4")).unwrap_err();
-    holds(
-        "slider 4",
-        &error,
-        &["joint.P2.drive.slider = 4", "allowed 1, 2 or 3"],
-    );
+    holds("slider 4", &error, &["joint.P2.drive.slider = 4", "allowed 1, 2 or 3"]);
 }
 
 #[test]
 fn changes_are_refused_with_key_value_and_range() {
     let cases: &[(&str, &str, &str, &[&str])] = &[
-        (
-            "spcmm",
-            "contact.clearance",
-            "12 mm",
-            &["contact.clearance = 12 mm", "below the ball radius, 10 mm"],
-        ),
-        (
-            "spcmm",
-            "contact.clearance",
-            "0.3",
-            &["contact.clearance = 0.3", "needs a unit", "mm"],
-        ),
-        (
-            "spcmm",
-            "contact.clearence",
-            "0.3mm",
-            &[
-                "contact.clearence = 0.3mm",
-                "did you mean `contact.clearance`",
-            ],
-        ),
-        (
-            "spcmm",
-            "clearance",
-            "0.3mm",
-            &["did you mean `contact.clearance`"],
-        ),
-        (
-            "spcmm",
-            "joint.S4.clearance",
-            "0.3mm",
-            &["joint.S4.clearance", "no ball joint `S4`", "S1, S2, S3"],
-        ),
-        (
-            "spcmm",
-            "joint.S1.clearence",
-            "0.3mm",
-            &["did you mean `clearance`"],
-        ),
-        (
-            "spcmm",
-            "clearence",
-            "0.3mm",
-            &["clearence", "did you mean `contact.clearance`"],
-        ),
+        ("spcmm", "contact.clearance", "12 mm", &["contact.clearance = 12 mm", "below the ball radius, 10 mm"]),
+        ("spcmm", "contact.clearance", "0.3", &["contact.clearance = 0.3", "needs a unit", "mm"]),
+        ("spcmm", "contact.clearence", "0.3mm", &["contact.clearence = 0.3mm", "did you mean `contact.clearance`"]),
+        ("spcmm", "clearance", "0.3mm", &["did you mean `contact.clearance`"]),
+        ("spcmm", "joint.S4.clearance", "0.3mm", &["joint.S4.clearance", "no ball joint `S4`", "S1, S2, S3"]),
+        ("spcmm", "joint.S1.clearence", "0.3mm", &["did you mean `clearance`"]),
+        ("spcmm", "clearence", "0.3mm", &["clearence", "did you mean `contact.clearance`"]),
         (
             "slider-crank-driven",
             "joint.crank.drive.velocit",
@@ -625,43 +333,13 @@ fn changes_are_refused_with_key_value_and_range() {
                 "Ball joints, B, C, have joint.<ball joint>.<key>; keys: clearance, friction,",
             ],
         ),
-        (
-            "spcmm",
-            "chain.links",
-            "4",
-            &["chain.links = 4", "has no such key", "chains"],
-        ),
-        (
-            "chain",
-            "chain.links",
-            "-4",
-            &["chain.links = -4", "allowed 1 to 4096"],
-        ),
-        (
-            "pendulum",
-            "spcmm.frequency",
-            "1 Hz",
-            &["has no such key", "inverse kinematics"],
-        ),
-        (
-            "spcmm",
-            "spcmm.frequency",
-            "51 Hz",
-            &["allowed 0 Hz to 50 Hz"],
-        ),
-        (
-            "spcmm",
-            "solver.method",
-            "rk5",
-            &["did you mean `rk4`", "dopri5"],
-        ),
+        ("spcmm", "chain.links", "4", &["chain.links = 4", "has no such key", "chains"]),
+        ("chain", "chain.links", "-4", &["chain.links = -4", "allowed 1 to 4096"]),
+        ("pendulum", "spcmm.frequency", "1 Hz", &["has no such key", "inverse kinematics"]),
+        ("spcmm", "spcmm.frequency", "51 Hz", &["allowed 0 Hz to 50 Hz"]),
+        ("spcmm", "solver.method", "rk5", &["did you mean `rk4`", "dopri5"]),
         ("spcmm", "solver.preset", "", &["preview"]),
-        (
-            "spcmm",
-            "joint.S2.ball_radius",
-            "0.3 mm",
-            &["joint.S2.ball_radius = 0.3 mm", "below the ball radius"],
-        ),
+        ("spcmm", "joint.S2.ball_radius", "0.3 mm", &["joint.S2.ball_radius = 0.3 mm", "below the ball radius"]),
     ];
     for (scene, key, value, fragments) in cases {
         let change = [((*key).to_owned(), (*value).to_owned())];
@@ -692,19 +370,12 @@ fn what_is_no_scene_file_at_all_is_said_plainly() {
     let only_text = write("comment.toml", b"# nothing\n");
     holds("no body", &load(&only_text), &["at least one [[body]]"]);
     let junk = write("junk.toml", b"name = \"x\"\n\x7fELF\xff\xfe\x00");
-    holds(
-        "binary",
-        &load(&junk),
-        &["junk.toml:2:5", "not valid UTF-8"],
-    );
+    holds("binary", &load(&junk), &["junk.toml:2:5", "not valid UTF-8"]);
     let zeros = write("zeros.toml", &[0; 4096]);
     holds("zeros", &load(&zeros), &["zeros.toml:1:", "not valid TOML"]);
     let huge = write("huge.toml", &vec![b'#'; (4 << 20) + 1]);
     holds("huge", &load(&huge), &["too large", "4 MiB"]);
-    let deep = write(
-        "deep.toml",
-        format!("a = {}", "[".repeat(100_000)).as_bytes(),
-    );
+    let deep = write("deep.toml", format!("a = {}", "[".repeat(100_000)).as_bytes());
     holds("deep", &load(&deep), &["deep.toml:1:", "not valid TOML"]);
 
     let directory = format!("{}/", folder.path().to_str().unwrap());
@@ -716,37 +387,17 @@ fn what_is_no_scene_file_at_all_is_said_plainly() {
     holds("missing", &error, &["missing.toml", "cannot read"]);
     let error = load("spcm");
     assert!(!error.unreadable);
-    holds(
-        "misspelt",
-        &error,
-        &[
-            "no built-in scene `spcm`",
-            "did you mean `spcmm`",
-            "pendulum",
-        ],
-    );
-    holds(
-        "misspelt file",
-        &load("slider-crnk.toml"),
-        &["did you mean `slider-crank`"],
-    );
+    holds("misspelt", &error, &["no built-in scene `spcm`", "did you mean `spcmm`", "pendulum"]);
+    holds("misspelt file", &load("slider-crnk.toml"), &["did you mean `slider-crank`"]);
 }
 
 #[test]
 fn a_file_works_wherever_a_built_in_name_does() {
     let folder = tempfile::tempdir().unwrap();
     for name in BUILT_IN {
-        let path = folder
-            .path()
-            .join(format!("{name}.toml"))
-            .to_str()
-            .unwrap()
-            .to_owned();
+        let path = folder.path().join(format!("{name}.toml")).to_str().unwrap().to_owned();
         std::fs::write(&path, jointplay::scene::built_in_text(name).unwrap()).unwrap();
-        let (from_file, built_in) = (
-            Scene::load(&path, &[]).unwrap(),
-            Scene::load(name, &[]).unwrap(),
-        );
+        let (from_file, built_in) = (Scene::load(&path, &[]).unwrap(), Scene::load(name, &[]).unwrap());
         assert_eq!(from_file.bodies, built_in.bodies);
         assert_eq!(from_file.joints, built_in.joints);
         assert_eq!(from_file.ball_joints, built_in.ball_joints);
@@ -760,19 +411,13 @@ fn a_damaged_file_never_panics_and_its_error_has_a_place() {
         let text = jointplay::scene::built_in_text(name).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         for skipped in 0..lines.len() {
-            let without = [&lines[..skipped], &lines[skipped + 1..]]
-                .concat()
-                .join("\n");
+            let without = [&lines[..skipped], &lines[skipped + 1..]].concat().join("\n");
             let doubled = [&lines[..=skipped], &lines[skipped..]].concat().join("\n");
             // A number where a text was, a text where a number was.
             let swapped = text.replacen(lines[skipped], &lines[skipped].replace(['"', '{'], ""), 1);
             for damaged in [without, doubled, swapped] {
                 if let Err(error) = parse(&damaged) {
-                    assert!(
-                        error.position.is_some(),
-                        "{name}, line {}: {error}",
-                        skipped + 1
-                    );
+                    assert!(error.position.is_some(), "{name}, line {}: {error}", skipped + 1);
                     assert_eq!(error.file.as_deref(), Some("my.toml"));
                 }
             }
@@ -799,45 +444,25 @@ fn a_drive_that_swings_backwards_in_time_is_refused() {
     assert!(parse(&drive("1 Hz")).is_ok());
     for bad in ["-1 Hz", "0 Hz", "20 kHz"] {
         let error = parse(&drive(bad)).unwrap_err();
-        holds(
-            bad,
-            &error,
-            &[
-                "my.toml:16:",
-                "joint.free.drive.frequency",
-                bad,
-                "above 0 up to 10000 Hz",
-            ],
-        );
+        holds(bad, &error, &["my.toml:16:", "joint.free.drive.frequency", bad, "above 0 up to 10000 Hz"]);
     }
 }
 
 #[test]
 fn a_scene_beyond_a_limit_is_refused_with_its_line() {
-    let many =
-        |count: usize, part: &dyn Fn(usize) -> String| -> String { (0..count).map(part).collect() };
-    let body =
-        |n: usize| format!("[[body]]\nname=\"b{n}\"\nmass=\"1 kg\"\ninertia=\"1 1 1 kg m^2\"\n");
-    let joint = |n: usize| {
-        format!(
-            "[[joint]]\nname=\"f{n}\"\nkind=\"free\"\nchild=\"b{n}\"\nstart={{position=[0,0,0]}}\n"
-        )
-    };
-    let ball = |n: usize| {
-        format!("[[ball_joint]]\nname=\"S{n}\"\nsocket={{body=\"world\"}}\nball={{body=\"b0\"}}\n")
-    };
+    let many = |count: usize, part: &dyn Fn(usize) -> String| -> String { (0..count).map(part).collect() };
+    let body = |n: usize| format!("[[body]]\nname=\"b{n}\"\nmass=\"1 kg\"\ninertia=\"1 1 1 kg m^2\"\n");
+    let joint =
+        |n: usize| format!("[[joint]]\nname=\"f{n}\"\nkind=\"free\"\nchild=\"b{n}\"\nstart={{position=[0,0,0]}}\n");
+    let ball = |n: usize| format!("[[ball_joint]]\nname=\"S{n}\"\nsocket={{body=\"world\"}}\nball={{body=\"b0\"}}\n");
     let shapes = |count: usize| {
         let shape = "{form=\"sphere\",centre=[0,0,0],radius=\"1 m\",role=\"pin\"},";
         format!("shapes=[{}]\n", shape.repeat(count))
     };
     let corners = "[0,0,0],".repeat(101);
-    let plate =
-        format!("shapes=[{{form=\"plate\",role=\"pin\",thickness=\"1 m\",corners=[{corners}]}}]\n");
+    let plate = format!("shapes=[{{form=\"plate\",role=\"pin\",thickness=\"1 m\",corners=[{corners}]}}]\n");
     let cases = [
-        (
-            many(10_001, &body),
-            "my.toml:40001:1: body[10000]: too many: 10001 bodies; allowed at most 10000",
-        ),
+        (many(10_001, &body), "my.toml:40001:1: body[10000]: too many: 10001 bodies; allowed at most 10000"),
         (
             body(0) + &many(10_001, &joint),
             "my.toml:50005:1: joint[10000]: too many: 10001 joints; allowed at most 10000",
@@ -846,18 +471,12 @@ fn a_scene_beyond_a_limit_is_refused_with_its_line() {
             body(0) + &joint(0) + &many(10_001, &ball),
             "my.toml:40010:1: ball_joint[10000]: too many: 10001 ball joints; allowed at most 10000",
         ),
-        (
-            body(0) + &shapes(50_001),
-            "body.b0.shapes[50000]: too many: 50001 shapes; allowed at most 50000",
-        ),
+        (body(0) + &shapes(50_001), "body.b0.shapes[50000]: too many: 50001 shapes; allowed at most 50000"),
         (
             body(0) + &shapes(25_001) + &body(1) + &shapes(25_001) + &joint(0) + &joint(1),
             "too many shapes: 50002; allowed at most 50000",
         ),
-        (
-            body(0) + &plate,
-            "corners[100]: too many: 101 corners; allowed at most 100",
-        ),
+        (body(0) + &plate, "corners[100]: too many: 101 corners; allowed at most 100"),
     ];
     for (text, words) in cases {
         holds(words, &parse(&text).expect_err(words), &[words]);
@@ -865,19 +484,14 @@ fn a_scene_beyond_a_limit_is_refused_with_its_line() {
     let chain = jointplay::scene::built_in_text("chain").unwrap();
     let changes = vec![("chain.links".to_owned(), "4096".to_owned())];
     let beside = chain.to_owned() + &many(5905, &body) + &many(5905, &joint);
-    let words =
-        "chain.links: too many bodies with those of the file: 5905 and 4096; allowed at most 10000";
+    let words = "chain.links: too many bodies with those of the file: 5905 and 4096; allowed at most 10000";
     let error = Scene::parse(&beside, None, &changes).expect_err(words);
     holds("chain", &error, &[words]);
 
     let more = (1..=4096).map(|n| (format!("joint.J{n}.friction"), "0.1".to_owned()));
     let changes: Vec<_> = changes.into_iter().chain(more).collect();
     let error = Scene::parse(chain, None, &changes).expect_err("too many changes");
-    holds(
-        "changes",
-        &error,
-        &["joint.J4096.friction = 0.1", "allowed at most 4096"],
-    );
+    holds("changes", &error, &["joint.J4096.friction = 0.1", "allowed at most 4096"]);
 }
 
 #[test]

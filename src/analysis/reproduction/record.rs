@@ -18,12 +18,7 @@ pub struct Column {
 }
 
 const fn column(name: &'static str, label: &'static str, unit: &'static str, one: f64) -> Column {
-    Column {
-        name,
-        label,
-        unit,
-        one,
-    }
+    Column { name, label, unit, one }
 }
 
 /// Columns of a [`RecordedRow`]; each coordinate is followed by its derivatives.
@@ -162,9 +157,7 @@ impl SettledPoint {
 
 /// Minimum and maximum.
 pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-        (a.min(v), b.max(v))
-    })
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
 }
 
 /// Maximum less minimum.
@@ -208,9 +201,7 @@ impl SweepData {
         };
         let (offset, length) = (layout.offset(at), layout.values_in(&layout.columns()[at]));
         let records = self.records.chunks_exact(layout.record_length());
-        records
-            .flat_map(|r| r[offset..offset + length].to_vec())
-            .collect()
+        records.flat_map(|r| r[offset..offset + length].to_vec()).collect()
     }
 
     /// Reads [`Self::points`] from the records.
@@ -219,11 +210,7 @@ impl SweepData {
             return;
         };
         // Clearances in mm.
-        let factor = if axis.key() == "contact.clearance" {
-            1e3
-        } else {
-            1.0
-        };
+        let factor = if axis.key() == "contact.clearance" { 1e3 } else { 1.0 };
         let kept = self.sweep.layout().kept();
         let column = |name: &str| self.values(name);
         let (regimes, periods) = (column("regime"), column("period"));

@@ -1,12 +1,8 @@
 //! Whether the paper's statements hold here: a verdict by the test of each one in [`PAPER`], with its numbers.
 
 use super::Findings;
-use super::record::{
-    RecordedRow, RecordedRun, SettledPoint, column_of, derivative, exponents, extent,
-};
-use crate::analysis::paper::{
-    Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test,
-};
+use super::record::{RecordedRow, RecordedRun, SettledPoint, column_of, derivative, exponents, extent};
+use crate::analysis::paper::{Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test};
 use crate::analysis::regime::Regime;
 
 /// A change below this fraction of the amplitude counts as none.
@@ -49,11 +45,7 @@ impl Findings {
     pub fn statements(&self) -> Vec<Statement> {
         let of = |claim: &'static Claim| {
             let (confirmed, grounds) = self.judge(&claim.test);
-            Statement {
-                claim,
-                confirmed,
-                grounds,
-            }
+            Statement { claim, confirmed, grounds }
         };
         PAPER.statements.iter().map(of).collect()
     }
@@ -72,8 +64,7 @@ impl Findings {
             }
             Test::AllGrow(series) => {
                 let tests = PAPER.statements.iter().map(|claim| &claim.test);
-                let own =
-                    |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
+                let own = |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
                 let grown: Vec<bool> = tests.filter(own).map(|test| self.judge(test).0).collect();
                 let held = grown.iter().filter(|held| **held).count();
                 (held == grown.len(), Count(held, grown.len()))
@@ -96,8 +87,7 @@ impl Findings {
                 (this > other, Values(vec![this, other]))
             }
             Test::ChangesMoreWith { of, with, than } => {
-                let [this, other] =
-                    [with, than].map(|series| extent(self.values(of, series).into_iter()));
+                let [this, other] = [with, than].map(|series| extent(self.values(of, series).into_iter()));
                 (this > other, Values(vec![this, other]))
             }
             Test::Steady { after, over } => {
@@ -112,12 +102,7 @@ impl Findings {
                 let joints = response.joints.iter().cloned().zip(forces.iter().copied());
                 (holds, Joints(joints.collect()))
             }
-            Test::Coincide {
-                curves,
-                ideal,
-                ref columns,
-                from,
-            } => {
+            Test::Coincide { curves, ideal, ref columns, from } => {
                 let ideal = ideal.then_some(&self.ideal);
                 let curves = self.curves_of(curves).into_iter().chain(ideal);
                 let curves: Vec<Vec<&RecordedRow>> = curves.map(RecordedRun::samples).collect();
@@ -233,9 +218,7 @@ impl Findings {
         let column = derivative(coordinate, 0);
         let (tree, lagrange) = (self.runs[0].samples(), self.lagrange.samples());
         let pairs = tree.iter().zip(&lagrange);
-        pairs
-            .map(|(a, b)| (a[column] - b[column]).abs())
-            .fold(0.0, f64::max)
+        pairs.map(|(a, b)| (a[column] - b[column]).abs()).fold(0.0, f64::max)
     }
 }
 
@@ -253,9 +236,7 @@ fn apart(curves: &[Vec<&RecordedRow>], column: usize, from: f64) -> f64 {
 /// Largest distance between any two of `curves` at equal indices.
 fn furthest<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
     let places = curves.iter().map(|c| c.as_ref().len()).min().unwrap_or(0);
-    (0..places)
-        .map(|k| extent(curves.iter().map(|c| c.as_ref()[k])))
-        .fold(0.0, f64::max)
+    (0..places).map(|k| extent(curves.iter().map(|c| c.as_ref()[k]))).fold(0.0, f64::max)
 }
 
 /// Fraction of the sections within half of the largest distance from their mean; `None` if they cannot be told apart.
@@ -265,10 +246,7 @@ fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
         all.iter().sum::<f64>() / all.len() as f64
     });
     let distance = |(x, beta): (&f64, &f64)| {
-        let [x, beta] = [
-            (x - middle[0]) / resolution[0],
-            (beta - middle[1]) / resolution[1],
-        ];
+        let [x, beta] = [(x - middle[0]) / resolution[0], (beta - middle[1]) / resolution[1]];
         (x * x + beta * beta).sqrt()
     };
     let pairs = run.sections[0].iter().zip(&run.sections[1]);
@@ -309,9 +287,7 @@ fn regimes(points: &[SettledPoint]) -> Grounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::reproduction::{
-        Agenda, COLUMNS, Extent, Outcome, ReportJob, SettledCurve,
-    };
+    use crate::analysis::reproduction::{Agenda, COLUMNS, Extent, Outcome, ReportJob, SettledCurve};
     use crate::analysis::response::respond;
     use crate::scene::Scene;
 
@@ -353,9 +329,7 @@ mod tests {
     fn expect(found: &Findings, verdicts: &[(&str, &str, bool)]) {
         let statements = found.statements();
         for (place, says, confirmed) in verdicts {
-            let mut own = statements
-                .iter()
-                .filter(|s| s.claim.place.ends_with(place) && s.claim.says.contains(says));
+            let mut own = statements.iter().filter(|s| s.claim.place.ends_with(place) && s.claim.says.contains(says));
             let (one, more) = (own.next(), own.next());
             assert!(one.is_some() && more.is_none(), "{place}, {says}");
             let verdict = one.map(|s| s.confirmed);
@@ -441,11 +415,7 @@ mod tests {
         let mut found = nothing_moves();
         let grow = |found: &mut Findings, case: usize, size: f64| {
             let response = &mut found.runs[case].response;
-            for values in [
-                &mut response.full.deviation,
-                &mut response.full.rate,
-                &mut response.full.acceleration,
-            ] {
+            for values in [&mut response.full.deviation, &mut response.full.rate, &mut response.full.acceleration] {
                 *values = [size; 6];
             }
             response.full.normal = vec![size];
@@ -455,15 +425,9 @@ mod tests {
             grow(&mut found, case, size);
         }
         let of = "second conclusion";
-        expect(
-            &found,
-            &[(of, "with clearance", true), (of, "with friction", true)],
-        );
+        expect(&found, &[(of, "with clearance", true), (of, "with friction", true)]);
         found.runs[2].response.full.rate[0] = 1.0;
-        expect(
-            &found,
-            &[(of, "with clearance", false), (of, "with friction", true)],
-        );
+        expect(&found, &[(of, "with clearance", false), (of, "with friction", true)]);
     }
 
     #[test]
@@ -486,13 +450,7 @@ mod tests {
         };
         let mut found = nothing_moves();
         // By clearance apart only at the beginning, and until after 0.3 s; by friction 4 % apart from there on.
-        let off = [
-            (0.0, 0.0),
-            (0.25, 0.0),
-            (0.5, 0.0),
-            (0.0, 0.02),
-            (0.0, 0.04),
-        ];
+        let off = [(0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.0, 0.02), (0.0, 0.04)];
         for (run, (early, late)) in found.runs.iter_mut().zip(off) {
             run.rows = curve(early, late);
         }
@@ -531,17 +489,10 @@ mod tests {
             point(0.5, Regime::Periodic(1), 0.2, &wide(0.0)),
             point(1.0, Regime::Chaotic, 0.2, &wide(1e-3)),
         ];
-        let runs = |regime, width: f64| {
-            [1.0, 2.0, 3.0]
-                .map(|n| point(n, regime, 0.2 + 0.01 * n, &wide(width * n)))
-                .to_vec()
-        };
+        let runs =
+            |regime, width: f64| [1.0, 2.0, 3.0].map(|n| point(n, regime, 0.2 + 0.01 * n, &wide(width * n))).to_vec();
         put(&mut found, "clearance_cold", as_printed.clone());
-        put(
-            &mut found,
-            "runs_by_clearance",
-            runs(Regime::QuasiPeriodic, 1e-4),
-        );
+        put(&mut found, "runs_by_clearance", runs(Regime::QuasiPeriodic, 1e-4));
         expect(
             &found,
             &[
@@ -596,12 +547,7 @@ mod tests {
     #[test]
     fn sections_crowd_around_a_centre_only_where_they_can_be_told_apart() {
         let near = [0.0, 1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 9.0, -9.0];
-        let with = |size: f64| {
-            crowd(
-                &point(0.2, Regime::Chaotic, 0.2, &near.map(|v| v * size)),
-                [1e-7, 1e-6],
-            )
-        };
+        let with = |size: f64| crowd(&point(0.2, Regime::Chaotic, 0.2, &near.map(|v| v * size)), [1e-7, 1e-6]);
         assert_eq!(with(1e-5), Some(7.0 / 9.0));
         assert_eq!(with(1e-9), None);
         let ring = point(0.2, Regime::Chaotic, 0.2, &[1e-4, -1e-4, 1e-4, -1e-4]);
@@ -612,13 +558,7 @@ mod tests {
     fn portraits_are_compared_at_equal_phases() {
         let mut found = nothing_moves();
         // By clearance 0.2 mm apart and increasingly wide; by friction 4 mm of 25 mm apart.
-        let curves = [
-            (0.0, 1e-3),
-            (1e-4, 2e-3),
-            (2e-4, 3e-3),
-            (4e-3, 0.0),
-            (0.0, 1e-3),
-        ];
+        let curves = [(0.0, 1e-3), (1e-4, 2e-3), (2e-4, 3e-3), (4e-3, 0.0), (0.0, 1e-3)];
         for (found, (x, width)) in found.curves.iter_mut().zip(curves) {
             found.coordinates[0] = vec![x; 4];
             found.width[1] = width;
@@ -635,10 +575,7 @@ mod tests {
         );
         found.curves[1].width[1] = 4e-3;
         found.curves[3].width[1] = 1e-5;
-        expect(
-            &found,
-            &[("Figure 18b", "width", false), ("Figure 21b", "wide", true)],
-        );
+        expect(&found, &[("Figure 18b", "width", false), ("Figure 21b", "wide", true)]);
         assert_eq!(found.loops(Series::Friction)[0].case, PAPER.runs[3]);
     }
 }

@@ -28,11 +28,7 @@ impl Coordinate {
     }
 
     fn quantities(self) -> [Quantity; 2] {
-        if self.0 < 3 {
-            [Quantity::Position, Quantity::Velocity]
-        } else {
-            [Quantity::Angles, Quantity::AngleRates]
-        }
+        if self.0 < 3 { [Quantity::Position, Quantity::Velocity] } else { [Quantity::Angles, Quantity::AngleRates] }
     }
 
     /// The axis of the coordinate.

@@ -106,12 +106,7 @@ impl Diagram {
     }
 
     /// The diagram of `swept`; returns the point and its kept section that were clicked.
-    pub fn ui(
-        &mut self,
-        ui: &mut Ui,
-        swept: &Swept,
-        coordinate: Coordinate,
-    ) -> Option<(usize, usize)> {
+    pub fn ui(&mut self, ui: &mut Ui, swept: &Swept, coordinate: Coordinate) -> Option<(usize, usize)> {
         let parameter = table().iter().find(|p| p.key == swept.range.key);
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let label = parameter.map_or(swept.range.key.as_str(), |parameter| parameter.label);
@@ -131,38 +126,28 @@ impl Diagram {
         let dark = ui.visuals().dark_mode;
         let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);
         let (from, to) = (shown(swept.range.from), shown(swept.range.to));
-        let margin = if to > from {
-            0.03 * (to - from)
-        } else {
-            0.5 * from.abs().max(1e-3)
-        };
+        let margin = if to > from { 0.03 * (to - from) } else { 0.5 * from.abs().max(1e-3) };
         let picked = self.picked;
-        let now = self
-            .all
-            .iter()
-            .find(|mark| picked == Some((mark.1, mark.2)))
-            .map(|mark| mark.0);
-        let response = plane(ui, "diagram", &across, &up, HEIGHT)
-            .sense(Sense::click())
-            .show(ui, |plot| {
-                plot.set_plot_bounds_x(from - margin..=to + margin);
-                plot.set_auto_bounds([false, true]);
-                if self.ordinate == Ordinate::Exponent {
-                    plot.hline(HLine::new("0", 0.0).color(faint).width(1.0));
-                }
-                for value in &self.diverged {
-                    let line = VLine::new("diverged", *value).color(bad);
-                    plot.vline(line.style(LineStyle::dotted_dense()).width(1.0));
-                }
-                for ((regime, colour), marks) in REGIMES.iter().zip(&self.marks) {
-                    let points = Points::new(regime.word(), PlotPoints::Borrowed(marks));
-                    plot.points(points.color(theme::series(*colour, dark)).radius(1.8));
-                }
-                if let Some(now) = now {
-                    let ring = Points::new("loaded", PlotPoints::Owned(vec![now]));
-                    plot.points(ring.color(faint).filled(false).radius(6.0));
-                }
-            });
+        let now = self.all.iter().find(|mark| picked == Some((mark.1, mark.2))).map(|mark| mark.0);
+        let response = plane(ui, "diagram", &across, &up, HEIGHT).sense(Sense::click()).show(ui, |plot| {
+            plot.set_plot_bounds_x(from - margin..=to + margin);
+            plot.set_auto_bounds([false, true]);
+            if self.ordinate == Ordinate::Exponent {
+                plot.hline(HLine::new("0", 0.0).color(faint).width(1.0));
+            }
+            for value in &self.diverged {
+                let line = VLine::new("diverged", *value).color(bad);
+                plot.vline(line.style(LineStyle::dotted_dense()).width(1.0));
+            }
+            for ((regime, colour), marks) in REGIMES.iter().zip(&self.marks) {
+                let points = Points::new(regime.word(), PlotPoints::Borrowed(marks));
+                plot.points(points.color(theme::series(*colour, dark)).radius(1.8));
+            }
+            if let Some(now) = now {
+                let ring = Points::new("loaded", PlotPoints::Owned(vec![now]));
+                plot.points(ring.color(faint).filled(false).radius(6.0));
+            }
+        });
         let clicked = response.response.clicked();
         let pointer = response.response.interact_pointer_pos();
         self.transform = Some(response.transform);
@@ -174,12 +159,7 @@ impl Diagram {
         let nearest = self
             .all
             .iter()
-            .map(|mark| {
-                (
-                    response.transform.position_from_point(&mark.0).distance(at),
-                    mark,
-                )
-            })
+            .map(|mark| (response.transform.position_from_point(&mark.0).distance(at), mark))
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         if nearest.0 > theme::side(ui, NEAR) {
             return None;
@@ -203,8 +183,7 @@ impl Diagram {
                 .accessible_name("Diagram of");
             let come = swept.points.iter().flatten().count();
             let words = format!("{come} of {} values", swept.points.len());
-            ui.label(RichText::new(words).small().weak())
-                .on_hover_text("Values computed so far");
+            ui.label(RichText::new(words).small().weak()).on_hover_text("Values computed so far");
         });
     }
 
@@ -215,9 +194,7 @@ impl Diagram {
             .iter()
             .map(|(regime, colour)| {
                 let points = swept.points.iter().flatten();
-                let count = points
-                    .filter(|point| point.regime_code == regime.code())
-                    .count();
+                let count = points.filter(|point| point.regime_code == regime.code()).count();
                 let help = "Kind of motion, and at how many values it was found";
                 (count, regime.word(), theme::series(*colour, dark), help)
             })
@@ -231,11 +208,7 @@ impl Diagram {
             Grid::new("regimes").num_columns(3).show(ui, |ui| {
                 for (index, (count, word, colour, help)) in entries.into_iter().enumerate() {
                     let text = RichText::new(format!("{count} {word}")).small();
-                    let text = if count > 0 {
-                        text.strong().color(colour)
-                    } else {
-                        text.color(weak)
-                    };
+                    let text = if count > 0 { text.strong().color(colour) } else { text.color(weak) };
                     ui.label(text).on_hover_text(help);
                     if index % 3 == 2 {
                         ui.end_row();

@@ -55,10 +55,8 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         "Euclidean distance of all coordinates and velocities, each over its scale of the tolerance (1 ball radius, 0.1 rad \
          and so on); the line is fitted over the growing part",
     );
-    let points: Vec<PlotPoint> = distances
-        .iter()
-        .map(|[time, distance]| PlotPoint::new(time / size, distance.log10()))
-        .collect();
+    let points: Vec<PlotPoint> =
+        distances.iter().map(|[time, distance]| PlotPoint::new(time / size, distance.log10())).collect();
     let fit = twin.fit();
     let ink = ui.visuals().weak_text_color();
     plane(ui, "divergence", &across, &up, HEIGHT)
@@ -86,10 +84,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         || ("—".to_owned(), String::new()),
         |fit| {
             let [from, to] = [fit.from, fit.to].map(value::time);
-            (
-                value::number(fit.slope, 4),
-                format!(", here from {from} to {to}"),
-            )
+            (value::number(fit.slope, 4), format!(", here from {from} to {to}"))
         },
     );
     ui.label(format!("Slope {slope} 1/s")).on_hover_text(format!(
@@ -107,13 +102,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
 /// Marks at whole powers of ten, spaced so that there are few.
 fn decades((least, greatest): (f64, f64)) -> Vec<GridMark> {
     let step = ((greatest - least) / 5.0).ceil().clamp(1.0, 100.0);
-    let (first, last) = (
-        (least / step).ceil() as i64,
-        (greatest / step).floor() as i64,
-    );
-    let mark = |index: i64| GridMark {
-        value: index as f64 * step,
-        step_size: step,
-    };
+    let (first, last) = ((least / step).ceil() as i64, (greatest / step).floor() as i64);
+    let mark = |index: i64| GridMark { value: index as f64 * step, step_size: step };
     (first..=last).map(mark).collect()
 }

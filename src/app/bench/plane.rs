@@ -29,11 +29,7 @@ impl AxisLabel {
 }
 
 fn with_unit(text: &str, unit: &str, between: &str) -> String {
-    if unit.is_empty() {
-        text.to_owned()
-    } else {
-        format!("{text}{between}{unit}")
-    }
+    if unit.is_empty() { text.to_owned() } else { format!("{text}{between}{unit}") }
 }
 
 /// The number at a mark.
@@ -43,13 +39,7 @@ fn word(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
 }
 
 /// A plot of `up` over `across`, `height` points high and as wide as there is room.
-pub fn plane<'a>(
-    ui: &Ui,
-    id: &'static str,
-    across: &AxisLabel,
-    up: &AxisLabel,
-    height: f32,
-) -> Plot<'a> {
+pub fn plane<'a>(ui: &Ui, id: &'static str, across: &AxisLabel, up: &AxisLabel, height: f32) -> Plot<'a> {
     let faint = ui.visuals().weak_text_color();
     let font = egui::TextStyle::Small.resolve(ui.style());
     let hints = |hints: AxisHints<'a>| hints.tick_label_color(faint).tick_label_font(font.clone());
@@ -57,10 +47,7 @@ pub fn plane<'a>(
     let below = hints(AxisHints::new_x())
         .label_spacing(Rangef::new(24.0, 28.0))
         .formatter(move |mark, range| with_unit(&word(mark, range), &unit, " "));
-    let beside = hints(AxisHints::new_y())
-        .min_thickness(46.0)
-        .label_spacing(Rangef::new(14.0, 18.0))
-        .formatter(word);
+    let beside = hints(AxisHints::new_y()).min_thickness(46.0).label_spacing(Rangef::new(14.0, 18.0)).formatter(word);
     let (across, up) = (across.clone(), up.clone());
     Plot::new(id)
         .width(ui.available_width() - 12.0)
@@ -82,20 +69,12 @@ pub fn plane<'a>(
         .grid_color(faint.gamma_multiply(0.35))
         .grid_fade(0.0)
         .label_formatter(move |position| match position {
-            HoverPosition::NearDataPoint {
-                plot_name,
-                position,
-                ..
-            } => {
+            HoverPosition::NearDataPoint { plot_name, position, .. } => {
                 let line = |axis: &AxisLabel, value| {
                     let number = value::number(value, 6);
                     format!("{} {}", axis.name, with_unit(&number, &axis.unit, " "))
                 };
-                Some(format!(
-                    "{plot_name}\n{}\n{}",
-                    line(&up, position.y),
-                    line(&across, position.x)
-                ))
+                Some(format!("{plot_name}\n{}\n{}", line(&up, position.y), line(&across, position.x)))
             }
             HoverPosition::Elsewhere { .. } => None,
         })

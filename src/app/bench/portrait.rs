@@ -34,8 +34,7 @@ impl Portrait {
                 value::scene_line(player.scene(), &[]),
                 value::number(360.0 * player.watch().phase(), 4)
             );
-            ui.label(RichText::new(words).small())
-                .on_hover_text("What the portrait and the section below are of");
+            ui.label(RichText::new(words).small()).on_hover_text("What the portrait and the section below are of");
         });
         title(
             ui,
@@ -61,14 +60,7 @@ impl Portrait {
         }
     }
 
-    fn section(
-        &self,
-        ui: &mut Ui,
-        player: &mut Player,
-        period: f64,
-        across: &AxisLabel,
-        up: &AxisLabel,
-    ) {
+    fn section(&self, ui: &mut Ui, player: &mut Player, period: f64, across: &AxisLabel, up: &AxisLabel) {
         let mark = theme::series(1, ui.visuals().dark_mode);
         title(
             ui,

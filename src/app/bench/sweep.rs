@@ -204,8 +204,7 @@ impl SweepPanel {
     fn swept_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
         let swept = self.swept.as_ref()?;
         reserved(ui, "sweep of", 3, |ui| {
-            ui.label(RichText::new(swept.caption()).small())
-                .on_hover_text("What the diagram below was made of");
+            ui.label(RichText::new(swept.caption()).small()).on_hover_text("What the diagram below was made of");
         });
         let (index, section) = self.diagram.ui(ui, swept, coordinate)?;
         Load::new(
@@ -226,13 +225,8 @@ impl SweepPanel {
         }
         let running = self.running.as_ref().map(|sweeping| &sweeping.task);
         let swept = self.swept.as_ref();
-        let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task))
-        else {
-            let words = if self.is_running() {
-                "Begins…"
-            } else {
-                "Nothing swept yet"
-            };
+        let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task)) else {
+            let words = if self.is_running() { "Begins…" } else { "Nothing swept yet" };
             ui.label(small(words).weak());
             return;
         };
@@ -241,8 +235,7 @@ impl SweepPanel {
             ui.label(small("For the scene shown, with its values").weak());
         } else {
             let words = format!("Not for what is shown. {}", differences.join("; "));
-            theme::warning(ui, words)
-                .on_hover_text("A click on a point asks before it changes this");
+            theme::warning(ui, words).on_hover_text("A click on a point asks before it changes this");
         }
     }
 
@@ -292,17 +285,9 @@ impl SweepPanel {
                 ("To", &mut settings.to, "Last value, with its unit"),
             ] {
                 ui.label(name);
-                ui.add(TextEdit::singleline(text).desired_width(72.0))
-                    .on_hover_text(help)
-                    .accessible_name(name);
+                ui.add(TextEdit::singleline(text).desired_width(72.0)).on_hover_text(help).accessible_name(name);
             }
-            number(
-                ui,
-                "Values",
-                &mut settings.values,
-                1..=2000,
-                "Equally spaced values, both ends included",
-            );
+            number(ui, "Values", &mut settings.values, 1..=2000, "Equally spaced values, both ends included");
         });
         ui.horizontal_wrapped(|ui| {
             let help = "Periods of the drive that each value runs, those discarded included";
@@ -332,10 +317,7 @@ impl SweepPanel {
             );
         });
         let solver = player.wanted().solver;
-        if settings.exponent
-            && solver.method.is_adaptive()
-            && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9)
-        {
+        if settings.exponent && solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9) {
             let words = format!(
                 "At a tolerance of {} integration error hides the exponents; use {} or less",
                 value::power_of_ten(solver.tolerance),
@@ -348,10 +330,7 @@ impl SweepPanel {
     fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
         let running = self.is_running();
         let (name, help) = if running {
-            (
-                "Cancel sweep",
-                "End the sweep; the points that are there stay",
-            )
+            ("Cancel sweep", "End the sweep; the points that are there stay")
         } else {
             (
                 "Start sweep",
@@ -383,13 +362,7 @@ impl SweepPanel {
         {
             self.reveal = true;
             let end = |text: &str| value::completed(text, &parameter.kind);
-            let Settings {
-                key,
-                from,
-                to,
-                values,
-                ..
-            } = settings;
+            let Settings { key, from, to, values, .. } = settings;
             self.asked = Some(SweepTask {
                 scene: SceneSource::of(player.wanted()),
                 vary: vec![format!("{key}={}..{}:{values}", end(from), end(to))],
@@ -409,19 +382,10 @@ impl Sweeping {
         let of = host.workers().max(1);
         let share = |index| {
             let running = host.start(Job::Sweep(task.clone(), Share { index, of }))?;
-            Some(Sharing {
-                running,
-                done: 0.0,
-                finished: false,
-            })
+            Some(Sharing { running, done: 0.0, finished: false })
         };
         let shares: Option<Vec<_>> = (0..of).map(share).collect();
-        Some(Self {
-            shares: shares?,
-            task,
-            begun: false,
-            throttle: Throttle::default(),
-        })
+        Some(Self { shares: shares?, task, begun: false, throttle: Throttle::default() })
     }
 
     /// Fraction of the points that are done, 0 to 1.
@@ -502,17 +466,9 @@ fn varies(player: &Player, parameter: &Parameter) -> bool {
 }
 
 /// An integer field with its label.
-fn number(
-    ui: &mut Ui,
-    name: &str,
-    value: &mut usize,
-    range: std::ops::RangeInclusive<usize>,
-    help: &str,
-) {
+fn number(ui: &mut Ui, name: &str, value: &mut usize, range: std::ops::RangeInclusive<usize>, help: &str) {
     ui.label(name);
-    ui.add(DragValue::new(value).range(range))
-        .on_hover_text(help)
-        .accessible_name(name);
+    ui.add(DragValue::new(value).range(range)).on_hover_text(help).accessible_name(name);
 }
 
 /// The error message without its command-line prefix.

@@ -66,11 +66,7 @@ impl Throttle {
             let shorter = 0.5 * self.rest;
             self.rest = if shorter < SHORTEST { 0.0 } else { shorter };
         } else if rate < LEAST + MARGIN {
-            self.rest = if self.hopeless >= patience {
-                0.0
-            } else {
-                (2.0 * self.rest).clamp(SHORTEST, LONGEST)
-            };
+            self.rest = if self.hopeless >= patience { 0.0 } else { (2.0 * self.rest).clamp(SHORTEST, LONGEST) };
         }
     }
 }
@@ -90,13 +86,7 @@ mod tests {
 
     impl Page {
         fn new(free: f64, busy: f64) -> Self {
-            Self {
-                free,
-                busy,
-                throttle: Throttle::default(),
-                rest: 0.0,
-                now: 0.0,
-            }
+            Self { free, busy, throttle: Throttle::default(), rest: 0.0, now: 0.0 }
         }
 
         /// Draws for `seconds`; returns frames a second.
@@ -116,12 +106,7 @@ mod tests {
     #[test]
     fn a_picture_that_was_fast_enough_stays_so_and_the_sweep_goes_on() {
         // With the rest that this takes: the least power of two r for which (busy + r free) / (1 + r) is enough.
-        for (free, busy, most) in [
-            (23.0, 15.0, 4.0),
-            (40.0, 5.0, 1.0),
-            (60.0, 19.0, 1.0),
-            (21.5, 15.0, 8.0),
-        ] {
+        for (free, busy, most) in [(23.0, 15.0, 4.0), (40.0, 5.0, 1.0), (60.0, 19.0, 1.0), (21.5, 15.0, 8.0)] {
             let mut page = Page::new(free, busy);
             page.draw(7.0);
             let rate = page.draw(60.0);

@@ -19,11 +19,7 @@ const COLOURS: [[u8; 3]; 3] = [[255, 0, 0], [0, 160, 0], [0, 0, 255]];
 /// Largest difference of a pixel that is mostly of a colour.
 const MOSTLY: u8 = 150;
 /// Sizes in points and pixels in a point.
-const SIZES: [([f32; 2], f32); 3] = [
-    ([330.0, 130.0], 1.0),
-    ([700.0, 240.0], 1.0),
-    ([520.0, 300.0], 2.0),
-];
+const SIZES: [([f32; 2], f32); 3] = [([330.0, 130.0], 1.0), ([700.0, 240.0], 1.0), ([520.0, 300.0], 2.0)];
 
 /// Plots of the record's first three channels over `length` seconds and -50 to 750; the picture and the way to its pixels.
 fn drawn(
@@ -37,39 +33,28 @@ fn drawn(
         .enumerate()
         .map(|(channel, [r, g, b])| {
             let mut bins = Vec::new();
-            history.bins(
-                channel,
-                0.0,
-                length,
-                (2.0 * size[0] * scale) as usize,
-                &mut bins,
-            );
-            Trace {
-                bins,
-                colour: Color32::from_rgb(*r, *g, *b),
-            }
+            history.bins(channel, 0.0, length, (2.0 * size[0] * scale) as usize, &mut bins);
+            Trace { bins, colour: Color32::from_rgb(*r, *g, *b) }
         })
         .collect();
     let seen = Rc::new(Cell::new(None));
     let keep = seen.clone();
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_pixels_per_point(scale)
-        .with_theme(Theme::Light)
-        .wgpu()
-        .build_ui(move |ui| {
-            // Its texts have a face from the second pass on.
-            if ui.ctx().cumulative_pass_nr() == 0 {
-                ui.ctx().set_fonts(theme::fonts());
-                return ui.ctx().request_repaint();
-            }
-            let shown = Plot::new("curves").show_grid(false).show(ui, |plot| {
-                plot.set_plot_bounds_x(0.0..=length);
-                plot.set_plot_bounds_y(-50.0..=750.0);
-                plot.add(Curves::new(&traces, [1.0, 1.0]));
-            });
-            keep.set(Some(shown.transform));
-        });
+    let mut harness =
+        Harness::builder().with_size(size).with_pixels_per_point(scale).with_theme(Theme::Light).wgpu().build_ui(
+            move |ui| {
+                // Its texts have a face from the second pass on.
+                if ui.ctx().cumulative_pass_nr() == 0 {
+                    ui.ctx().set_fonts(theme::fonts());
+                    return ui.ctx().request_repaint();
+                }
+                let shown = Plot::new("curves").show_grid(false).show(ui, |plot| {
+                    plot.set_plot_bounds_x(0.0..=length);
+                    plot.set_plot_bounds_y(-50.0..=750.0);
+                    plot.add(Curves::new(&traces, [1.0, 1.0]));
+                });
+                keep.set(Some(shown.transform));
+            },
+        );
     harness.run();
     let image = harness.render().expect("drawn");
     let transform: PlotTransform = seen.get().expect("shown");
@@ -84,10 +69,7 @@ fn drawn(
 fn record(value: impl Fn(u32, usize) -> f64) -> History {
     let mut history = History::new(3, 2e-6);
     for n in 0..=1000 {
-        history.push(
-            f64::from(n) * 1e-4,
-            &[0, 1, 2].map(|channel| value(n, channel)),
-        );
+        history.push(f64::from(n) * 1e-4, &[0, 1, 2].map(|channel| value(n, channel)));
     }
     history
 }
@@ -98,17 +80,9 @@ fn around(x: f64) -> [usize; 4] {
 
 #[test]
 fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
-    let spikes = [
-        (200, 0, 621.0),
-        (430, 1, 333.0),
-        (431, 1, 101.0),
-        (700, 2, 87.0),
-        (1000, 0, 379.0),
-    ];
+    let spikes = [(200, 0, 621.0), (430, 1, 333.0), (431, 1, 101.0), (700, 2, 87.0), (1000, 0, 379.0)];
     let history = record(|n, channel| {
-        let found = spikes
-            .iter()
-            .find(|spike| (spike.0, spike.1) == (n, channel));
+        let found = spikes.iter().find(|spike| (spike.0, spike.1) == (n, channel));
         found.map_or(0.0, |spike| spike.2)
     });
     for (size, scale) in SIZES {
@@ -117,12 +91,8 @@ fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
             let (picture, place) = drawn(&history, length, size, scale);
             for (n, channel, force) in spikes.into_iter().filter(|spike| spike.2 != 101.0) {
                 let [x, y] = place(f64::from(n) * 1e-4, force);
-                let highest =
-                    top(&picture.coloured(around(x), COLOURS[channel], MOSTLY)).expect("drawn");
-                assert!(
-                    (highest as f64 + 0.5 - y).abs() <= 1.0,
-                    "{size:?} {n}: {highest} for {y}"
-                );
+                let highest = top(&picture.coloured(around(x), COLOURS[channel], MOSTLY)).expect("drawn");
+                assert!((highest as f64 + 0.5 - y).abs() <= 1.0, "{size:?} {n}: {highest} for {y}");
             }
         }
     }
@@ -130,12 +100,7 @@ fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
 
 #[test]
 fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
-    for heights in [
-        [621.0, 561.0, 533.0],
-        [533.0, 561.0, 621.0],
-        [400.0; 3],
-        [0.0; 3],
-    ] {
+    for heights in [[621.0, 561.0, 533.0], [533.0, 561.0, 621.0], [400.0; 3], [0.0; 3]] {
         let history = record(|n, channel| if n == 500 { heights[channel] } else { 0.0 });
         for (size, scale) in SIZES {
             let (picture, place) = drawn(&history, 0.1, size, scale);
@@ -148,21 +113,13 @@ fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
                         let ends = (place(0.0, 9.0), place(0.1, -9.0));
                         [ends.0[0], ends.0[1], ends.1[0], ends.1[1]].map(|at| at as usize)
                     }
-                    _ => [
-                        around(x)[0],
-                        0,
-                        around(x)[2],
-                        (place(0.0, 0.0)[1] - 3.0) as usize,
-                    ],
+                    _ => [around(x)[0], 0, around(x)[2], (place(0.0, 0.0)[1] - 3.0) as usize],
                 };
                 let found = picture.coloured(area, colour, 110);
                 assert!(found.len() > 2, "{heights:?} {size:?}: {colour:?}");
                 if heights[0] != heights[1] {
                     let highest = top(&picture.coloured(area, colour, MOSTLY)).expect("drawn");
-                    assert!(
-                        (highest as f64 + 0.5 - y).abs() <= 1.0,
-                        "{heights:?}: {highest} for {y}"
-                    );
+                    assert!((highest as f64 + 0.5 - y).abs() <= 1.0, "{heights:?}: {highest} for {y}");
                 }
             }
         }
@@ -181,18 +138,10 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
         for length in [0.1, 0.01] {
             for channel in 0..3 {
                 let only = |n: u32, other: usize| {
-                    if other == channel {
-                        value(n, channel)
-                    } else {
-                        f64::NAN
-                    }
+                    if other == channel { value(n, channel) } else { f64::NAN }
                 };
                 let (picture, place) = drawn(&record(only), length, size, scale);
-                let (low, high) = if channel == 2 {
-                    (50.0, 150.0)
-                } else {
-                    (50.0, 650.0)
-                };
+                let (low, high) = if channel == 2 { (50.0, 150.0) } else { (50.0, 650.0) };
                 let corners = (place(0.0, 740.0), place(length, -40.0));
                 let (left, right) = (corners.0[0] as usize + 1, corners.1[0] as usize - 1);
                 let frame = [left, corners.0[1] as usize, right, corners.1[1] as usize];
@@ -200,16 +149,9 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
                 // Half the width of the curve where it runs level.
                 let half = f64::from(0.5 * WIDTH * scale) + 0.5;
                 let (top, bottom) = (place(0.0, high)[1] - half, place(0.0, low)[1] + half);
-                assert!(
-                    found
-                        .iter()
-                        .all(|(_, y)| (top..bottom).contains(&(*y as f64 + 0.5)))
-                );
+                assert!(found.iter().all(|(_, y)| (top..bottom).contains(&(*y as f64 + 0.5))));
                 for x in left..right {
-                    assert!(
-                        found.iter().any(|place| place.0 == x),
-                        "{channel} {size:?}: a gap at {x}"
-                    );
+                    assert!(found.iter().any(|place| place.0 == x), "{channel} {size:?}: a gap at {x}");
                 }
             }
         }
@@ -218,15 +160,7 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
 
 #[test]
 fn sharp_corners_have_no_join() {
-    let points = [
-        (0.0, 0.0),
-        (1.0, 0.1),
-        (1.0, 0.1),
-        (2.0, 0.0),
-        (2.5, 50.0),
-        (3.0, 0.0),
-        (4.0, 0.0),
-    ];
+    let points = [(0.0, 0.0), (1.0, 0.1), (1.0, 0.1), (2.0, 0.0), (2.5, 50.0), (3.0, 0.0), (4.0, 0.0)];
     let parts = parts(points.into_iter().map(|(x, y)| pos2(x, y)));
     let ends: Vec<usize> = parts.iter().map(Vec::len).collect();
     assert_eq!(ends, [3, 2, 2, 2]);

@@ -32,8 +32,7 @@ fn is_found_by_others(address: &str) -> bool {
         Some(bare) => bare.split(']').next().unwrap_or(""),
         None => host.split(':').next().unwrap_or(""),
     };
-    let own =
-        name.is_empty() || name == "localhost" || name.ends_with(".localhost") || name == "::1";
+    let own = name.is_empty() || name == "localhost" || name.ends_with(".localhost") || name == "::1";
     matches!(scheme, "http" | "https") && !own && !name.starts_with("127.")
 }
 
@@ -120,12 +119,9 @@ mod tests {
 
     #[test]
     fn an_address_of_this_machine_is_not_found_by_others() {
-        for address in [
-            "http://192.168.0.7:8420/",
-            "https://example.org/lab/",
-            "http://[2001:db8::1]:8420/",
-            "http://room.local/",
-        ] {
+        for address in
+            ["http://192.168.0.7:8420/", "https://example.org/lab/", "http://[2001:db8::1]:8420/", "http://room.local/"]
+        {
             assert!(is_found_by_others(address), "{address}");
         }
         for address in [

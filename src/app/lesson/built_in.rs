@@ -58,10 +58,7 @@ impl Lesson {
                 visible_line(&name.chars().take(60).collect::<String>()),
                 names.join(", ")
             );
-            return Err(SceneError {
-                message,
-                ..SceneError::default()
-            });
+            return Err(SceneError { message, ..SceneError::default() });
         };
         Self::parse(name, text, None).map(Arc::new)
     }

@@ -271,10 +271,7 @@ impl Source<'_> {
     /// An error at `span`; `key` if it is known.
     fn error(&self, span: Range<usize>, key: &str, message: impl Into<String>) -> SceneError {
         let value = self.text.get(span.clone()).unwrap_or_default();
-        let value = value
-            .lines()
-            .next()
-            .filter(|line| *line == value && line.len() < 60);
+        let value = value.lines().next().filter(|line| *line == value && line.len() < 60);
         SceneError::in_text(self.file, self.text, span.start, Some(key), value, message)
     }
 
@@ -311,10 +308,7 @@ impl Lesson {
             .and_then(|file| file.take(LARGEST_FILE + 1).read_to_string(&mut text))
             .map_err(|why| wrong(format!("cannot read this lesson: {why}")))?;
         if text.len() as u64 > LARGEST_FILE {
-            return Err(wrong(format!(
-                "more than {} MiB: no lesson",
-                LARGEST_FILE >> 20
-            )));
+            return Err(wrong(format!("more than {} MiB: no lesson", LARGEST_FILE >> 20)));
         }
         Self::parse(path, &text, Some(path))
     }
@@ -363,19 +357,13 @@ impl Lesson {
     pub fn names(&self) -> Names<'_> {
         let one = |measure: &Measure| Quantity::new(1.0, measure.kind.dimension());
         let all = self.measures.iter();
-        Names::to_come(
-            all.map(|measure| (measure.name.as_str(), one(measure)))
-                .collect(),
-        )
+        Names::to_come(all.map(|measure| (measure.name.as_str(), one(measure))).collect())
     }
 
     /// The last step up to `step` that begins a run: there the machine is set for it.
     pub fn beginning(&self, step: usize) -> usize {
         let before = self.steps[..=step].iter();
-        before
-            .rev()
-            .position(|step| step.begins)
-            .map_or(0, |back| step - back)
+        before.rev().position(|step| step.begins).map_or(0, |back| step - back)
     }
 
     fn step(
@@ -397,14 +385,11 @@ impl Lesson {
         let mut link = Link::parse(&format!("?{}", words.trim_start_matches(['?', '#'])))
             .map_err(|error| wrong(error.to_string()))?;
         if !link.log.entries.is_empty() {
-            let message =
-                "has changes made on the way packed in `log`; write them as `change` of a step";
+            let message = "has changes made on the way packed in `log`; write them as `change` of a step";
             return Err(wrong(message.to_owned()));
         }
         (link.steps, link.hash) = (None, None);
-        let named = words
-            .split(['&', '?'])
-            .any(|word| word.starts_with("scene="));
+        let named = words.split(['&', '?']).any(|word| word.starts_with("scene="));
         let first = self.runs.is_empty();
         let begins = first || named || link.has_instant() || !link.log.base.is_empty();
         if begins {
@@ -416,8 +401,8 @@ impl Lesson {
                     return Err(wrong(message.to_owned()));
                 }
             };
-            let loaded = Scene::load(&argument, &[])
-                .map_err(|error| source.error(scene.span(), "scene", error.to_string()))?;
+            let loaded =
+                Scene::load(&argument, &[]).map_err(|error| source.error(scene.span(), "scene", error.to_string()))?;
             let loaded = match &link.log.base[..] {
                 [] => loaded,
                 base => Scene::load(&argument, base).map_err(|error| wrong(error.to_string()))?,
@@ -431,13 +416,10 @@ impl Lesson {
                 let message = format!("another step is called `{name}`");
                 return Err(source.error(span, &key("name"), message));
             }
-            self.runs.push(Run {
-                name,
-                scene: loaded,
-                changes: Vec::new(),
-            });
+            self.runs.push(Run { name, scene: loaded, changes: Vec::new() });
         } else if row.name.is_some() {
-            let message = "only a step whose state names an instant, a parameter or a scene begins a run that has a name";
+            let message =
+                "only a step whose state names an instant, a parameter or a scene begins a run that has a name";
             return Err(source.error(span, &key("name"), message));
         }
         let index = self.runs.len() - 1;
@@ -446,9 +428,7 @@ impl Lesson {
         if let Some(change) = &row.change {
             let wrong = |message: String| source.error(change.span(), &key("change"), message);
             let Some(time) = link.time.filter(|_| begins) else {
-                return Err(wrong(
-                    "needs a state with an instant, such as `t=20ms`".to_owned(),
-                ));
+                return Err(wrong("needs a state with an instant, such as `t=20ms`".to_owned()));
             };
             let mut changed = scene.clone();
             for (key, value) in change.get_ref() {
@@ -460,22 +440,17 @@ impl Lesson {
         let followed = link.followed(&scene).and(link.under_microscope(&scene));
         followed.map_err(|error| wrong(error.to_string()))?;
         let view = row.view.as_ref().map(|view| {
-            look(view.get_ref(), &scene)
-                .map_err(|message| source.error(view.span(), &key("view"), message))
+            look(view.get_ref(), &scene).map_err(|message| source.error(view.span(), &key("view"), message))
         });
         let view = view.transpose()?;
         if let Some(question) = &row.question {
             let wrong = |message: String| source.error(question.span(), &key("question"), message);
             let count = question.get_ref().choices.len();
             if !(2..=MOST_CHOICES).contains(&count) {
-                return Err(wrong(format!(
-                    "{count} choices; allowed 2 to {MOST_CHOICES}"
-                )));
+                return Err(wrong(format!("{count} choices; allowed 2 to {MOST_CHOICES}")));
             }
             if row.until.is_none() {
-                return Err(wrong(
-                    "needs `until`: the instant at which the answer shows".to_owned(),
-                ));
+                return Err(wrong("needs `until`: the instant at which the answer shows".to_owned()));
             }
         }
         Ok(Step {
@@ -489,19 +464,9 @@ impl Lesson {
             twin: row.twin,
             highlight: row.highlight.clone(),
             until: row.until.as_ref().map(|until| until.get_ref().clone()),
-            question: row
-                .question
-                .as_ref()
-                .map(|question| question.get_ref().clone()),
-            seen: row
-                .seen
-                .as_ref()
-                .map_or(String::new(), |seen| seen.get_ref().clone()),
-            claims: row
-                .claims
-                .iter()
-                .map(|claim| claim.get_ref().clone())
-                .collect(),
+            question: row.question.as_ref().map(|question| question.get_ref().clone()),
+            seen: row.seen.as_ref().map_or(String::new(), |seen| seen.get_ref().clone()),
+            claims: row.claims.iter().map(|claim| claim.get_ref().clone()).collect(),
         })
     }
 
@@ -541,10 +506,7 @@ impl Lesson {
         ];
         let given: Vec<Kind> = given.into_iter().flatten().collect();
         let [kind] = &given[..] else {
-            return Err(format!(
-                "{} of these keys; allowed one: {KINDS}",
-                given.len()
-            ));
+            return Err(format!("{} of these keys; allowed one: {KINDS}", given.len()));
         };
         if matches!(kind, Kind::Impact { number: 0, .. }) {
             return Err("impact = 0: allowed 1 and more; they count from 1".to_owned());
@@ -564,23 +526,12 @@ impl Lesson {
         }
         let run = match run {
             None => 0,
-            Some(name) => self
-                .runs
-                .iter()
-                .position(|run| run.name == name)
-                .ok_or_else(|| {
-                    let names = self
-                        .runs
-                        .iter()
-                        .map(|run| &*run.name)
-                        .filter(|name| !name.is_empty());
-                    let near = suggest(&name, names.clone());
-                    let known: Vec<&str> = names.collect();
-                    format!(
-                        "no step that begins a run is called `{name}`{near}; allowed: {}",
-                        known.join(", ")
-                    )
-                })?,
+            Some(name) => self.runs.iter().position(|run| run.name == name).ok_or_else(|| {
+                let names = self.runs.iter().map(|run| &*run.name).filter(|name| !name.is_empty());
+                let near = suggest(&name, names.clone());
+                let known: Vec<&str> = names.collect();
+                format!("no step that begins a run is called `{name}`{near}; allowed: {}", known.join(", "))
+            })?,
         };
         let scene = &self.runs[run].scene;
         if let Kind::Parameter(key) = kind {
@@ -590,10 +541,7 @@ impl Lesson {
             let mut names = scene.ball_joints.iter().map(|joint| &*joint.name);
             if !names.clone().any(|name| name == joint) {
                 let known: Vec<&str> = names.by_ref().take(12).collect();
-                return Err(format!(
-                    "no ball joint `{joint}`; allowed: any, {}",
-                    known.join(", ")
-                ));
+                return Err(format!("no ball joint `{joint}`; allowed: any, {}", known.join(", ")));
             }
         }
         let or = |text: Option<String>, default: &str| text.unwrap_or_else(|| default.to_owned());
@@ -622,8 +570,7 @@ impl Lesson {
             let condition = |text: &str| {
                 let parts = comparisons(text).ok_or("compares nothing; allowed <, > and =")?;
                 let mut sides = parts.into_iter().flat_map(|(left, _, right)| [left, right]);
-                sides
-                    .try_for_each(|side| names.check(side).map_err(|why| format!("`{side}` {why}")))
+                sides.try_for_each(|side| names.check(side).map_err(|why| format!("`{side}` {why}")))
             };
             let prose = |text: &str| text::fill(text, &names).map(|_| ());
             for (name, text) in [("text", Some(&row.text)), ("seen", row.seen.as_ref())] {
@@ -643,8 +590,7 @@ impl Lesson {
                 checked.map_err(|why| source.error(claim.span(), &key("claims"), why))?;
             }
             if let Some(question) = &row.question {
-                let wrong =
-                    |part: &str, why| source.within(question.span(), part, &key("question"), why);
+                let wrong = |part: &str, why| source.within(question.span(), part, &key("question"), why);
                 let Question { ask, choices } = question.get_ref();
                 prose(ask).map_err(|why| wrong(ask, why))?;
                 for Choice { text, when } in choices {

@@ -26,12 +26,7 @@ pub struct Measured {
 impl Measured {
     /// Nothing is computed yet.
     pub fn new(lesson: Arc<Lesson>) -> Self {
-        Self {
-            values: vec![None; lesson.measures.len()],
-            lesson,
-            pass: None,
-            fault: None,
-        }
+        Self { values: vec![None; lesson.measures.len()], lesson, pass: None, fault: None }
     }
 
     /// What is known so far.
@@ -39,9 +34,7 @@ impl Measured {
         let measures = &self.lesson.measures;
         let known = measures.iter().zip(&self.values);
         let mut names = self.lesson.names();
-        names
-            .known
-            .extend(known.filter_map(|(measure, value)| Some((measure.name.as_str(), (*value)?))));
+        names.known.extend(known.filter_map(|(measure, value)| Some((measure.name.as_str(), (*value)?))));
         names
     }
 
@@ -100,8 +93,7 @@ impl Measured {
             };
             let gauge = pass.gauge(measure, from, to).map_err(wrong)?;
             // A run has one twin at a time: one that begins at another instant is for a later pass.
-            let of_other_twin =
-                |(_, other): &(usize, Gauge)| other.is_apart() && other.from != from;
+            let of_other_twin = |(_, other): &(usize, Gauge)| other.is_apart() && other.from != from;
             if gauge.is_apart() && pass.gauges.iter().any(of_other_twin) {
                 continue;
             }
@@ -148,8 +140,7 @@ impl Gauge {
 
 impl Pass {
     fn new(run: &Run) -> Result<Self, String> {
-        let simulation =
-            Simulation::new(&run.scene).map_err(|error| error.located(&run.scene).to_string())?;
+        let simulation = Simulation::new(&run.scene).map_err(|error| error.located(&run.scene).to_string())?;
         Ok(Self {
             simulation,
             changes: run.changes.iter().rev().cloned().collect(),
@@ -186,10 +177,7 @@ impl Pass {
             kind,
         };
         if let Some(channel) = gauge.kind.channel() {
-            let mut first = Frame {
-                reactions: Some(Vec::new()),
-                ..Frame::default()
-            };
+            let mut first = Frame { reactions: Some(Vec::new()), ..Frame::default() };
             self.simulation.sample(0.0, &mut first);
             let pattern = [channel.to_owned()];
             let (columns, readings) =
@@ -197,10 +185,7 @@ impl Pass {
             // The first is the time.
             let (columns, readings) = (&columns[1..], &readings[1..]);
             let listed = channels_of(&self.scene, &first);
-            let listed: Vec<_> = listed
-                .iter()
-                .filter(|c| columns.contains(&c.column))
-                .collect();
+            let listed: Vec<_> = listed.iter().filter(|c| columns.contains(&c.column)).collect();
             if !matches!(readings.len(), 1 | 3) || listed.iter().any(|c| c.unit != listed[0].unit) {
                 let names: Vec<&str> = listed.iter().map(|channel| &*channel.name).collect();
                 return Err(format!(
@@ -211,12 +196,8 @@ impl Pass {
             }
             gauge.dimension = dimension_of(listed[0].unit);
             // The size of a normal force is known in continuous time.
-            gauge.joint = channel
-                .strip_suffix(".normal")
-                .and_then(|name| self.joint(name).ok());
-            readings
-                .iter()
-                .for_each(|reading| reading.ask(&mut self.frame));
+            gauge.joint = channel.strip_suffix(".normal").and_then(|name| self.joint(name).ok());
+            readings.iter().for_each(|reading| reading.ask(&mut self.frame));
             gauge.readings = readings.to_vec();
         }
         gauge.so_far = match gauge.kind {
@@ -271,15 +252,7 @@ impl Pass {
         }
         self.simulation.take_impacts(&mut self.impacts);
         self.simulation.take_peaks(&mut self.peaks);
-        let Self {
-            simulation,
-            gauges,
-            frame,
-            impacts,
-            peaks,
-            twin,
-            ..
-        } = self;
+        let Self { simulation, gauges, frame, impacts, peaks, twin, .. } = self;
         for (_, gauge) in gauges.iter_mut().filter(|(_, gauge)| gauge.value.is_none()) {
             gauge.step(simulation, frame, impacts, peaks, twin.as_ref());
         }
@@ -299,9 +272,7 @@ impl Gauge {
     ) {
         let (start, end) = (simulation.step_start(), simulation.time());
         let own = |impact: &&Impact| {
-            self.joint.is_none_or(|joint| joint == impact.joint)
-                && impact.start >= self.from
-                && impact.end <= self.to
+            self.joint.is_none_or(|joint| joint == impact.joint) && impact.start >= self.from && impact.end <= self.to
         };
         match &self.kind {
             Kind::Impact { number, its, .. } => {
@@ -367,11 +338,7 @@ impl Gauge {
         let value = |reading: &Reading| reading.read(frame).unwrap_or(f64::NAN);
         match &self.readings[..] {
             [one] => value(one),
-            many => many
-                .iter()
-                .map(|one| value(one) * value(one))
-                .sum::<f64>()
-                .sqrt(),
+            many => many.iter().map(|one| value(one) * value(one)).sum::<f64>().sqrt(),
         }
     }
 }

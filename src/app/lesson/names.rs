@@ -25,21 +25,13 @@ impl<'l> Names<'l> {
         let Err(error) = evaluate(expression, &self.all) else {
             return Ok(());
         };
-        let Fault::Unknown {
-            name,
-            called: false,
-            ..
-        } = &error.fault
-        else {
+        let Fault::Unknown { name, called: false, .. } = &error.fault else {
             return Err(error.to_string());
         };
         let all = || self.all.iter().map(|(name, _)| *name);
         let known: Vec<&str> = all().collect();
         let near = suggest(name, all());
-        Err(format!(
-            "no measure `{name}`{near}; allowed: {}",
-            known.join(", ")
-        ))
+        Err(format!("no measure `{name}`{near}; allowed: {}", known.join(", ")))
     }
 
     /// The instant that `expression` gives, s; `None` if it is still to come or is no time.
@@ -71,10 +63,7 @@ impl<'l> Names<'l> {
 pub fn comparisons(condition: &str) -> Option<Vec<(&str, char, &str)>> {
     let mut out = Vec::new();
     for part in condition.split(" and ") {
-        let signs: Vec<(usize, char)> = part
-            .char_indices()
-            .filter(|(_, c)| matches!(c, '<' | '>' | '='))
-            .collect();
+        let signs: Vec<(usize, char)> = part.char_indices().filter(|(_, c)| matches!(c, '<' | '>' | '=')).collect();
         let ends = signs.iter().map(|(at, _)| *at).chain([part.len()]);
         let mut from = 0;
         let sides: Vec<&str> = ends

@@ -1,8 +1,7 @@
 //! The panel of a lesson: its text, its question, and the buttons that turn its pages.
 
 use eframe::egui::{
-    self, Button, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui,
-    text::LayoutJob,
+    self, Button, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui, text::LayoutJob,
 };
 
 use super::names::Names;
@@ -26,11 +25,7 @@ impl App {
     /// The menu of the built-in lessons.
     pub(in crate::app) fn lesson_menu(&mut self, ui: &mut Ui) {
         for (name, title) in lesson_titles() {
-            if ui
-                .button(title)
-                .on_hover_text(format!("Lesson {name}"))
-                .clicked()
-            {
+            if ui.button(title).on_hover_text(format!("Lesson {name}")).clicked() {
                 self.open_lesson(name);
                 layout::close_menu(ui);
             }
@@ -82,16 +77,9 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
     ui.horizontal(|ui| {
         for (forward, name, help, possible) in [
             (false, "Back", "The step before (Page Up)", course.step > 0),
-            (
-                true,
-                "Next",
-                "The next step (Page Down)",
-                course.step < last,
-            ),
+            (true, "Next", "The next step (Page Down)", course.step < last),
         ] {
-            let button = ui
-                .add_enabled(possible, Button::new(name))
-                .on_hover_text(help);
+            let button = ui.add_enabled(possible, Button::new(name)).on_hover_text(help);
             if button.clicked() {
                 asked = Asked::Turn(forward);
             }
@@ -172,10 +160,7 @@ impl Course {
                 "The machine was changed since this step began: what it says here is of the run as the step sets it.",
             );
             let help = "Puts the machine in the state of this step again";
-            set = ui
-                .button("Set the step again")
-                .on_hover_text(help)
-                .clicked();
+            set = ui.button("Set the step again").on_hover_text(help).clicked();
         }
         if (self.reached || step.until.is_none()) && !step.seen.is_empty() {
             ui.separator();

@@ -43,8 +43,7 @@ impl Spots {
     }
 
     fn find(&mut self, tree: &TreeUpdate) {
-        let named =
-            |node: &Node, name: &str| node.label() == Some(name) || node.value() == Some(name);
+        let named = |node: &Node, name: &str| node.label() == Some(name) || node.value() == Some(name);
         for name in self.wanted.iter() {
             let all = || tree.nodes.iter().filter(|(_, node)| named(node, name));
             let is_text = |node: &Node| matches!(node.role(), Role::Label | Role::TextRun);
@@ -53,12 +52,7 @@ impl Spots {
             let rects = all()
                 .filter(|(_, node)| !controls || !is_text(node))
                 .filter_map(|(_, node)| node.bounds())
-                .map(|b| {
-                    Rect::from_min_max(
-                        pos2(b.x0 as f32, b.y0 as f32),
-                        pos2(b.x1 as f32, b.y1 as f32),
-                    )
-                });
+                .map(|b| Rect::from_min_max(pos2(b.x0 as f32, b.y0 as f32), pos2(b.x1 as f32, b.y1 as f32)));
             if let Some(rect) = rects.reduce(|a, b| a.union(b)) {
                 self.found.push((name.clone(), rect));
             }

@@ -26,35 +26,17 @@ fn written_number(text: &str) -> Option<&str> {
     ]
     .into_iter()
     .flat_map(unit_names)
-    .chain([
-        "µm",
-        "µs",
-        "°",
-        "%",
-        "per",
-        "J",
-        "mJ",
-        "kN",
-        "degrees",
-        "seconds",
-        "milliseconds",
-    ])
+    .chain(["µm", "µs", "°", "%", "per", "J", "mJ", "kN", "degrees", "seconds", "milliseconds"])
     .collect();
-    let outside = text
-        .split('{')
-        .enumerate()
-        .map(|(index, part)| match index {
-            0 => part,
-            _ => part.split_once('}').map_or("", |(_, after)| after),
-        });
+    let outside = text.split('{').enumerate().map(|(index, part)| match index {
+        0 => part,
+        _ => part.split_once('}').map_or("", |(_, after)| after),
+    });
     for part in outside {
         for (at, digit) in part.char_indices().filter(|(_, c)| c.is_ascii_digit()) {
-            let rest = part[at + digit.len_utf8()..]
-                .trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+            let rest = part[at + digit.len_utf8()..].trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
             let rest = rest.trim_start_matches([' ', '\u{a0}', '\u{202f}']);
-            let word = rest
-                .split(|c: char| !(c.is_alphanumeric() || "%°µ".contains(c)))
-                .next();
+            let word = rest.split(|c: char| !(c.is_alphanumeric() || "%°µ".contains(c))).next();
             if word.is_some_and(|word| units.contains(&word)) || rest.starts_with(['°', '%']) {
                 return Some(&part[at..]);
             }
@@ -68,32 +50,15 @@ fn every_lesson_holds_what_it_says() {
     let mut names = std::collections::BTreeSet::new();
     for (name, _) in BUILT_IN_LESSONS {
         let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert!(
-            (5..=10).contains(&lesson.steps.len()),
-            "{name}: {}",
-            lesson.steps.len()
-        );
+        assert!((5..=10).contains(&lesson.steps.len()), "{name}: {}", lesson.steps.len());
         for step in &lesson.steps {
             for text in texts(step) {
                 assert_eq!(written_number(text), None, "{name}: {}", step.title);
             }
         }
-        assert!(
-            lesson
-                .steps
-                .iter()
-                .filter(|step| step.question.is_some())
-                .count()
-                >= 2,
-            "{name}"
-        );
-        assert!(
-            lesson.steps.iter().any(|step| !step.claims.is_empty()),
-            "{name}"
-        );
-        Course::new(lesson, 0)
-            .examine()
-            .unwrap_or_else(|why| panic!("{why}"));
+        assert!(lesson.steps.iter().filter(|step| step.question.is_some()).count() >= 2, "{name}");
+        assert!(lesson.steps.iter().any(|step| !step.claims.is_empty()), "{name}");
+        Course::new(lesson, 0).examine().unwrap_or_else(|why| panic!("{why}"));
         assert!(names.insert(name));
     }
     assert!(written_number("after 7.8 ms").is_some());
@@ -132,131 +97,41 @@ fn fault(old: &str, new: &str) -> String {
 #[test]
 fn what_is_wrong_in_a_lesson_is_said_with_its_place_and_what_is_allowed() {
     for (old, new, said) in [
-        (
-            "title = \"A rod",
-            "titel = \"A rod",
-            &["own.toml:1:1", "titel", "expected one of", "`title`"][..],
-        ),
-        (
-            "scene = \"pendulum\"",
-            "scene = \"pendulun\"",
-            &["own.toml:2:9", "scene", "did you mean `pendulum`?"],
-        ),
-        (
-            "scene = \"pendulum\"",
-            "scene = 3",
-            &["own.toml:2:9", "scene", "expected a string"],
-        ),
-        (
-            "{ impact = 1 }",
-            "{ impact = 0 }",
-            &["own.toml:6:9", "measure.first", "allowed 1 and more"],
-        ),
-        (
-            "{ impact = 1 }",
-            "{ impact = 1, of = \"S9\" }",
-            &["measure.first", "no ball joint `S9`; allowed: any, S1"],
-        ),
-        (
-            "{ impact = 1 }",
-            "{ from = \"0 s\" }",
-            &["measure.first", "allowed one: parameter, instant, impact"],
-        ),
-        (
-            "run = \"wide\"",
-            "run = \"wild\"",
-            &["measure.wide", "did you mean `wide`?", "allowed: wide"],
-        ),
-        (
-            "its = \"approach\"",
-            "its = \"aproach\"",
-            &["unknown variant `aproach`", "`approach`"],
-        ),
-        (
-            "contact.clearance",
-            "contact.clearence",
-            &["measure.clearance", "contact.clearance"],
-        ),
+        ("title = \"A rod", "titel = \"A rod", &["own.toml:1:1", "titel", "expected one of", "`title`"][..]),
+        ("scene = \"pendulum\"", "scene = \"pendulun\"", &["own.toml:2:9", "scene", "did you mean `pendulum`?"]),
+        ("scene = \"pendulum\"", "scene = 3", &["own.toml:2:9", "scene", "expected a string"]),
+        ("{ impact = 1 }", "{ impact = 0 }", &["own.toml:6:9", "measure.first", "allowed 1 and more"]),
+        ("{ impact = 1 }", "{ impact = 1, of = \"S9\" }", &["measure.first", "no ball joint `S9`; allowed: any, S1"]),
+        ("{ impact = 1 }", "{ from = \"0 s\" }", &["measure.first", "allowed one: parameter, instant, impact"]),
+        ("run = \"wide\"", "run = \"wild\"", &["measure.wide", "did you mean `wide`?", "allowed: wide"]),
+        ("its = \"approach\"", "its = \"aproach\"", &["unknown variant `aproach`", "`approach`"]),
+        ("contact.clearance", "contact.clearence", &["measure.clearance", "contact.clearance"]),
         (
             "after {first}",
             "after {frist}",
-            &[
-                "step 1.text",
-                "own.toml:14:7",
-                "no measure `frist` (did you mean `first`?); allowed: clearance, first",
-            ],
+            &["step 1.text", "own.toml:14:7", "no measure `frist` (did you mean `first`?); allowed: clearance, first"],
         ),
-        (
-            "after {first}",
-            "after {first in mm}",
-            &[
-                "step 1",
-                "{first in mm}: not in that unit; allowed: s, ms, us",
-            ],
-        ),
-        (
-            "after {first}",
-            "after {first + speed}",
-            &["step 1", "different dimensions"],
-        ),
-        (
-            "\"first + 0.2 ms\"",
-            "\"first + 0.2 xs\"",
-            &["step 1.until", "own.toml:19:9"],
-        ),
-        (
-            "\"first + 0.2 ms\"",
-            "\"0 s\"",
-            &["step 1", "no instant after its beginning"],
-        ),
-        (
-            "show=microscope.S1",
-            "show=microscope.S7",
-            &["step 1.state", "allowed: S1"],
-        ),
+        ("after {first}", "after {first in mm}", &["step 1", "{first in mm}: not in that unit; allowed: s, ms, us"]),
+        ("after {first}", "after {first + speed}", &["step 1", "different dimensions"]),
+        ("\"first + 0.2 ms\"", "\"first + 0.2 xs\"", &["step 1.until", "own.toml:19:9"]),
+        ("\"first + 0.2 ms\"", "\"0 s\"", &["step 1", "no instant after its beginning"]),
+        ("show=microscope.S1", "show=microscope.S7", &["step 1.state", "allowed: S1"]),
         ("c=1.2mm", "c=1.2kg", &["step 2.state", "wrong unit"]),
-        (
-            "view = \"S1\"",
-            "view = \"S2\"",
-            &["step 1.view", "isometric, front, side, top, S1"],
-        ),
-        (
-            "wide / first < 1.1",
-            "wide / first",
-            &["step 2.question", "allowed <, > and ="],
-        ),
-        (
-            "wide / first < 1.1",
-            "wide / first < 5",
-            &["2 choices are right", "wide / first is 2"],
-        ),
-        (
-            "\"wide > first\"",
-            "\"wide < first\"",
-            &["`wide < first` does not hold", "wide is"],
-        ),
-        (
-            "name = \"wide\"",
-            "",
-            &["measure.wide", "no step that begins a run"],
-        ),
+        ("view = \"S1\"", "view = \"S2\"", &["step 1.view", "isometric, front, side, top, S1"]),
+        ("wide / first < 1.1", "wide / first", &["step 2.question", "allowed <, > and ="]),
+        ("wide / first < 1.1", "wide / first < 5", &["2 choices are right", "wide / first is 2"]),
+        ("\"wide > first\"", "\"wide < first\"", &["`wide < first` does not hold", "wide is"]),
+        ("name = \"wide\"", "", &["measure.wide", "no step that begins a run"]),
     ] {
         let error = fault(old, new);
         for part in said {
             assert!(error.contains(part), "{new}: {error}: no `{part}`");
         }
     }
-    let error = Lesson::load("ratle")
-        .expect_err("no such lesson")
-        .to_string();
+    let error = Lesson::load("ratle").expect_err("no such lesson").to_string();
     assert!(error.contains("did you mean `rattle`?"), "{error}");
-    let error = Lesson::load("/no/such.toml")
-        .expect_err("no such file")
-        .to_string();
-    assert!(
-        error.contains("/no/such.toml: cannot read this lesson"),
-        "{error}"
-    );
+    let error = Lesson::load("/no/such.toml").expect_err("no such file").to_string();
+    assert!(error.contains("/no/such.toml: cannot read this lesson"), "{error}");
 }
 
 #[test]
@@ -269,9 +144,7 @@ fn a_change_belongs_to_an_instant_and_is_measured_where_it_happens() {
         )
     };
     let lesson = Lesson::parse("own", &text("t=20ms"), None).expect("a lesson");
-    Course::new(Arc::new(lesson), 0)
-        .examine()
-        .unwrap_or_else(|why| panic!("{why}"));
+    Course::new(Arc::new(lesson), 0).examine().unwrap_or_else(|why| panic!("{why}"));
     let error = Lesson::parse("own", &text("t=20ms&log=AAAA"), None).expect_err("a log");
     assert!(error.to_string().contains("step 1.state"), "{error}");
 }

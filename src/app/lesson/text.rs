@@ -76,11 +76,7 @@ pub fn blocks(markdown: &str) -> Vec<Block> {
 }
 
 fn pieces(line: &str) -> Vec<Piece> {
-    const MARKS: [(&str, Face); 3] = [
-        ("**", Face::Strong),
-        ("*", Face::Emphasis),
-        ("`", Face::Code),
-    ];
+    const MARKS: [(&str, Face); 3] = [("**", Face::Strong), ("*", Face::Emphasis), ("`", Face::Code)];
     let (mut pieces, mut rest) = (Vec::new(), line);
     let mut push = |text: &str, face| {
         if !text.is_empty() {
@@ -113,10 +109,7 @@ fn pieces(line: &str) -> Vec<Piece> {
 ///
 /// # Errors
 /// The first error of `take`, or a brace without a second one.
-fn replace<E: From<String>>(
-    text: &str,
-    mut take: impl FnMut(&str) -> Result<String, E>,
-) -> Result<String, E> {
+fn replace<E: From<String>>(text: &str, mut take: impl FnMut(&str) -> Result<String, E>) -> Result<String, E> {
     let (mut out, mut rest) = (String::new(), text);
     while let Some((before, behind)) = rest.split_once('{') {
         let Some((inside, after)) = behind.split_once('}') else {
@@ -138,10 +131,9 @@ pub fn fill(text: &str, names: &Names<'_>) -> Result<String, String> {
         let (expression, unit) = split(inside);
         match evaluate(expression, &names.known) {
             Ok(quantity) => words(quantity, unit).map_err(|why| format!("{{{inside}}}: {why}")),
-            Err(_) => names
-                .check(expression)
-                .map(|()| TO_COME.to_owned())
-                .map_err(|why| format!("{{{inside}}}: {why}")),
+            Err(_) => {
+                names.check(expression).map(|()| TO_COME.to_owned()).map_err(|why| format!("{{{inside}}}: {why}"))
+            }
         }
     })
 }
@@ -159,9 +151,7 @@ fn split(inside: &str) -> (&str, Option<&str>) {
 /// # Errors
 /// A unit of another dimension, or a value without a unit.
 pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
-    let powers = quantity
-        .powers()
-        .ok_or("adds or compares quantities of different dimensions")?;
+    let powers = quantity.powers().ok_or("adds or compares quantities of different dimensions")?;
     let (_, units) = UNITS
         .iter()
         .find(|(own, _)| *own == powers)
@@ -174,10 +164,7 @@ pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
         Some(asked) => units.iter().find(|(unit, _)| *unit == asked),
         None if value == 0.0 => units.first(),
         // Rounded, so that 999.9 µm is 1 mm.
-        None => units
-            .iter()
-            .find(|(_, size)| value.abs() * 1.000_6 >= *size)
-            .or(units.last()),
+        None => units.iter().find(|(_, size)| value.abs() * 1.000_6 >= *size).or(units.last()),
     };
     let Some((unit, size)) = chosen else {
         let known: Vec<&str> = units.iter().map(|(unit, _)| *unit).collect();
@@ -203,20 +190,12 @@ mod tests {
 
     #[test]
     fn markdown_has_paragraphs_lists_and_three_faces() {
-        let read =
-            blocks("One *two* **three**\nfour `a*b`.\n\n- first\n  goes on\n- second\n\n2 * 3 = 6");
+        let read = blocks("One *two* **three**\nfour `a*b`.\n\n- first\n  goes on\n- second\n\n2 * 3 = 6");
         let letters = |block: &Block| block.pieces.iter().map(|piece| &*piece.text).collect();
         let words: Vec<(bool, String)> = read.iter().map(|b| (b.entry, letters(b))).collect();
-        let expected = [
-            (false, "One two three four a*b."),
-            (true, "first goes on"),
-            (true, "second"),
-            (false, "2 * 3 = 6"),
-        ];
-        assert_eq!(
-            words,
-            expected.map(|(entry, words)| (entry, words.to_owned()))
-        );
+        let expected =
+            [(false, "One two three four a*b."), (true, "first goes on"), (true, "second"), (false, "2 * 3 = 6")];
+        assert_eq!(words, expected.map(|(entry, words)| (entry, words.to_owned())));
         let faces: Vec<Face> = read[0].pieces.iter().map(|piece| piece.face).collect();
         use Face::{Code, Emphasis, Plain, Strong};
         assert_eq!(faces, [Plain, Emphasis, Plain, Strong, Plain, Code, Plain]);

@@ -1,8 +1,6 @@
 //! The pictures of the microscope: the clearance sphere in a plane, and the contact in section.
 
-use eframe::egui::{
-    Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2,
-};
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::Vec3;
 
 use super::sight::{Patch, Sight};
@@ -152,18 +150,9 @@ pub struct Circle {
 /// The clearance sphere along the line of sight of a plane: path and centre of the ball, contact, velocity, scale. `axes` point
 /// to the right and up; `speed` is the reference speed of the velocity arrow, m/s.
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
-    let Sheet {
-        painter,
-        rect,
-        palette,
-        sight,
-        ..
-    } = sheet;
+    let Sheet { painter, rect, palette, sight, .. } = sheet;
     let report = &sight.report;
-    let circle = Circle {
-        centre: rect.center(),
-        radius: CIRCLE * rect.size().min_elem(),
-    };
+    let circle = Circle { centre: rect.center(), radius: CIRCLE * rect.size().min_elem() };
     let clearance = report.clearance as f32;
     let scale = circle.radius / clearance;
     let flat = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
@@ -260,12 +249,7 @@ fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
 /// Section of ball and wall around the contact point, both undeformed: what lies below the wall line is the elastic penetration
 /// over the contact patch. Depths are exaggerated relative to widths, by the factor shown.
 pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
-    let Sheet {
-        painter,
-        rect,
-        palette,
-        ..
-    } = sheet;
+    let Sheet { painter, rect, palette, .. } = sheet;
     let depth = round_up(1.1 * patch.penetration.max(patch.deepest).max(SHALLOWEST));
     let radius = patch.effective_radius;
     let half = 1.3 * (2.0 * radius * depth).sqrt();
@@ -278,9 +262,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
         pos2((middle + x * wide) as f32, wall + below as f32)
     };
     let steps = 48;
-    let points: Vec<Pos2> = (0..=steps)
-        .map(|i| ball(half * (2.0 * f64::from(i) / f64::from(steps) - 1.0)))
-        .collect();
+    let points: Vec<Pos2> = (0..=steps).map(|i| ball(half * (2.0 * f64::from(i) / f64::from(steps) - 1.0))).collect();
     let contact = colour(palette.normal);
     for pair in points.windows(2) {
         if pair[0].y.max(pair[1].y) > wall {
@@ -327,8 +309,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
 
 /// Words in the middle of an empty picture.
 pub fn empty(ui: &Ui, rect: Rect, words: &str) {
-    ui.painter()
-        .rect_filled(rect, 4.0, ui.visuals().extreme_bg_color);
+    ui.painter().rect_filled(rect, 4.0, ui.visuals().extreme_bg_color);
     let font = FontId::proportional(12.0);
     let ink = ui.visuals().weak_text_color();
     let width = (rect.width() - 16.0).max(40.0);

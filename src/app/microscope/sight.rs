@@ -78,11 +78,8 @@ impl Sight {
             law.sliding(&gap, &read)
         });
         // What the run has computed beyond the displayed instant is not shown.
-        let mut over = player
-            .simulation()
-            .impacts()
-            .rev()
-            .filter(|impact| impact.joint == joint && impact.end <= shown);
+        let mut over =
+            player.simulation().impacts().rev().filter(|impact| impact.joint == joint && impact.end <= shown);
         let impact = over.next().copied();
         let first = over.nth(IMPACTS - 2);
         let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
@@ -125,9 +122,7 @@ mod tests {
             for _ in 0..4000 {
                 player.single_step();
                 let sight = Sight::of(&player, 0).expect("has a joint");
-                let rate = sight
-                    .normal
-                    .map_or(0.0, |normal| normal.dot(&sight.velocity));
+                let rate = sight.normal.map_or(0.0, |normal| normal.dot(&sight.velocity));
                 let reported = sight.report.penetration_rate;
                 assert!((rate - reported).abs() < 1e-12 + 1e-9 * sight.velocity.norm());
                 // The friction law reads none where the normal force is cut off at zero.
@@ -136,10 +131,7 @@ mod tests {
                     continue;
                 };
                 let read = sight.report.slip_speed;
-                assert!(
-                    (sliding.norm() - read).abs() < 1e-12 + 1e-9 * read,
-                    "{velocity}: {sliding} {read}"
-                );
+                assert!((sliding.norm() - read).abs() < 1e-12 + 1e-9 * read, "{velocity}: {sliding} {read}");
                 // Friction pushes the ball against it; near the speed below which there is none, its law is continued.
                 let friction = sight.report.friction_force;
                 assert!(read < 1e-5 || friction.dot(&sliding) < 0.0);
@@ -179,10 +171,7 @@ mod tests {
         let player = player("spcmm", &[]);
         let contact = player.scene().ball_joints[0].contact;
         let sight = Sight::of(&player, 0).expect("has a joint");
-        let patch = Patch {
-            penetration: 3e-6,
-            ..sight.patch.expect("has clearance")
-        };
+        let patch = Patch { penetration: 3e-6, ..sight.patch.expect("has clearance") };
         let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));
         let force = 4.0 / 3.0 * modulus * patch.radius().powi(3) / patch.effective_radius;
         let law = Coefficients::new(&contact, contact.clearance);

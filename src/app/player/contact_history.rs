@@ -74,21 +74,15 @@ impl ContactHistory {
     }
 
     /// The states of ball joint `joint` between two times, s: start, end, state.
-    pub fn states(
-        &self,
-        joint: usize,
-        from: f64,
-        to: f64,
-    ) -> impl Iterator<Item = (f64, f64, ContactState)> {
+    pub fn states(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, ContactState)> {
         let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
         let first = states.partition_point(|(time, _)| *time <= from);
         let all = states[first.saturating_sub(1)..].iter().enumerate();
         let at = first.saturating_sub(1);
-        all.take_while(move |(_, (time, _))| *time < to)
-            .map(move |(index, (time, state))| {
-                let next = states.get(at + index + 1);
-                (*time, next.map_or(self.to, |next| next.0), *state)
-            })
+        all.take_while(move |(_, (time, _))| *time < to).map(move |(index, (time, state))| {
+            let next = states.get(at + index + 1);
+            (*time, next.map_or(self.to, |next| next.0), *state)
+        })
     }
 
     /// Times between two given ones, s, at which ball joint `joint` came into contact.
@@ -97,8 +91,7 @@ impl ContactHistory {
         let first = states.partition_point(|(time, _)| *time < from);
         let pairs = states[first.saturating_sub(1)..].windows(2);
         let touches = |pair: &&[(f64, ContactState)]| {
-            pair[0].1 == ContactState::Free
-                && matches!(pair[1].1, ContactState::Slip | ContactState::Stick)
+            pair[0].1 == ContactState::Free && matches!(pair[1].1, ContactState::Slip | ContactState::Stick)
         };
         pairs
             .filter(touches)
@@ -113,23 +106,17 @@ impl ContactHistory {
         let joints = (0..self.joints.len()).filter(chosen);
         let found = joints.filter_map(|index| {
             if forward {
-                self.touches(index, time, f64::INFINITY)
-                    .find(|at| *at > time)
+                self.touches(index, time, f64::INFINITY).find(|at| *at > time)
             } else {
                 let states = &self.joints[index];
                 let end = states.partition_point(|(at, _)| *at < time);
                 let pairs = states[..end].windows(2).rev();
-                let touch = pairs.into_iter().find(|pair| {
-                    pair[0].1 == ContactState::Free && pair[1].1 != ContactState::Free
-                });
+                let touch =
+                    pairs.into_iter().find(|pair| pair[0].1 == ContactState::Free && pair[1].1 != ContactState::Free);
                 touch.map(|pair| pair[1].0)
             }
         });
-        if forward {
-            found.min_by(f64::total_cmp)
-        } else {
-            found.max_by(f64::total_cmp)
-        }
+        if forward { found.min_by(f64::total_cmp) } else { found.max_by(f64::total_cmp) }
     }
 }
 
@@ -139,14 +126,7 @@ mod tests {
     use crate::simulate::JointReport;
 
     fn frame(time: f64, state: ContactState) -> Frame {
-        Frame {
-            time,
-            joints: vec![JointReport {
-                state,
-                ..JointReport::default()
-            }],
-            ..Frame::default()
-        }
+        Frame { time, joints: vec![JointReport { state, ..JointReport::default() }], ..Frame::default() }
     }
 
     fn history() -> ContactHistory {
@@ -165,13 +145,7 @@ mod tests {
         use ContactState::{Free, Slip, Stick};
         let history = history();
         let all: Vec<_> = history.states(0, 0.0, 9.0).collect();
-        let expected = [
-            (0.0, 2.0, Free),
-            (2.0, 3.0, Slip),
-            (3.0, 4.0, Stick),
-            (4.0, 5.0, Free),
-            (5.0, 6.0, Slip),
-        ];
+        let expected = [(0.0, 2.0, Free), (2.0, 3.0, Slip), (3.0, 4.0, Stick), (4.0, 5.0, Free), (5.0, 6.0, Slip)];
         assert_eq!(all, expected);
         let part: Vec<_> = history.states(0, 2.5, 3.5).collect();
         assert_eq!(part, expected[1..3]);
@@ -204,11 +178,7 @@ mod tests {
         let mut history = ContactHistory::default();
         history.begin(0.0);
         for index in 0..=KEPT + 10 {
-            let state = if index % 2 == 0 {
-                ContactState::Free
-            } else {
-                ContactState::Slip
-            };
+            let state = if index % 2 == 0 { ContactState::Free } else { ContactState::Slip };
             history.record(&frame(index as f64, state));
         }
         let from = history.known_from();

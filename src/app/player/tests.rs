@@ -8,10 +8,7 @@ fn player(scene: &str) -> Player {
 
 fn recorded(player: &Player, quantity: Quantity, to: f64) -> Vec<[f64; 2]> {
     let list = player.channels().list();
-    let channel = list
-        .iter()
-        .position(|c| c.quantity == quantity)
-        .expect("recorded");
+    let channel = list.iter().position(|c| c.quantity == quantity).expect("recorded");
     let mut bins = Vec::new();
     player.history().bins(channel, 0.0, to, 400, &mut bins);
     let points = bins.iter().map(|b| [0.5 * (b.from + b.to), b.greatest]);
@@ -39,10 +36,7 @@ fn a_long_step_is_recorded_as_a_curve() {
     let last = points[points.len() - 1];
     for point in points {
         let fall = last[1] * (point[0] / last[0]).powi(2);
-        assert!(
-            (point[1] - fall).abs() < 0.03 * last[1],
-            "{point:?}: {fall}"
-        );
+        assert!((point[1] - fall).abs() < 0.03 * last[1], "{point:?}: {fall}");
     }
 }
 
@@ -149,9 +143,7 @@ fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
     // The run goes on as if it had been changed there by itself.
     let mut straight = Simulation::new(other.scene()).expect("starts");
     straight.restore(&other.simulation().snapshot());
-    straight
-        .set("contact.clearance", "0.6 mm")
-        .expect("in range");
+    straight.set("contact.clearance", "0.6 mm").expect("in range");
     assert_eq!(player.simulation().state_hash(), straight.state_hash());
     let mut frames = 0;
     loop {
@@ -169,9 +161,7 @@ fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
     assert_eq!(player.frame().joints[0].clearance, 0.6e-3);
     let mut clearances = Vec::new();
     let channel = player.clearances().start;
-    player
-        .history()
-        .bins(channel, 0.0, 1.0, 400, &mut clearances);
+    player.history().bins(channel, 0.0, 1.0, 400, &mut clearances);
     let (first, last) = (clearances[0], clearances[clearances.len() - 1]);
     assert!((first.greatest - 0.3e-3).abs() < 1e-9 && (last.greatest - 0.6e-3).abs() < 1e-9);
 }
@@ -188,10 +178,7 @@ fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
     // Ten minutes at 1:50 would be 12 s of simulated time.
     player.advance(600.0);
     let leap = player.pacer.shown() - before;
-    assert!(
-        leap <= 0.02 * crate::simulate::LONGEST_FRAME + 1e-12,
-        "{leap}"
-    );
+    assert!(leap <= 0.02 * crate::simulate::LONGEST_FRAME + 1e-12, "{leap}");
     assert!(player.steps() - steps < 20_000);
     let before = player.pacer.shown();
     for _ in 0..30 {
@@ -206,10 +193,7 @@ fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
 fn another_number_of_links_is_recorded_after_the_reset() {
     let mut player = player("chain");
     let before = player.channels().len();
-    assert_eq!(
-        player.set("chain.links", "3").expect("in range"),
-        Effect::AtReset
-    );
+    assert_eq!(player.set("chain.links", "3").expect("in range"), Effect::AtReset);
     assert!(player.is_waiting("chain.links") && player.has_waiting());
     assert_eq!(player.channels().len(), before);
     player.reset().expect("starts");
@@ -242,21 +226,8 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
     }
     let before = recorded(&player, Quantity::Position, 8e-3);
     player.pick(&names(&["crank.reaction", "crank.angle"]));
-    let listed: Vec<&str> = player
-        .channels()
-        .picked()
-        .iter()
-        .map(|c| &*c.name)
-        .collect();
-    assert_eq!(
-        listed,
-        [
-            "crank.angle",
-            "crank.reaction.x",
-            "crank.reaction.y",
-            "crank.reaction.z"
-        ]
-    );
+    let listed: Vec<&str> = player.channels().picked().iter().map(|c| &*c.name).collect();
+    assert_eq!(listed, ["crank.angle", "crank.reaction.x", "crank.reaction.y", "crank.reaction.z"]);
     assert!(recorded(&player, Quantity::Position, 8e-3) == before);
     // At once the instant on show, and the past not at all.
     let first = picked(&player, "crank.angle", 1.0);
@@ -265,21 +236,14 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
         player.run_to(16e-3);
         player.advance(0.0);
     }
-    assert_eq!(
-        player.simulation().state_hash(),
-        straight.simulation().state_hash()
-    );
+    assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
     let end = player.history().span().expect("recorded").1;
     let angle = picked(&player, "crank.angle", end);
     assert!(angle.len() > 5 && angle[0][0] > 7.9e-3);
     let now = player.frame().coordinates[0][0];
     assert!((angle[angle.len() - 1][1] - now).abs() < 1e-2);
     let weight = picked(&player, "crank.reaction.z", end);
-    assert!(
-        weight
-            .iter()
-            .all(|point| point[1] != 0.0 && point[1].is_finite())
-    );
+    assert!(weight.iter().all(|point| point[1] != 0.0 && point[1].is_finite()));
     // The other way round they keep their past; what is no longer picked is gone.
     player.pick(&names(&["crank.angle", "rod.pose.x"]));
     assert!(picked(&player, "crank.angle", end) == angle);
@@ -325,10 +289,7 @@ fn only_so_many_picked_channels_are_recorded() {
     assert_eq!(player.history().channels(), before + most);
     assert_eq!(player.clearances().len(), 8);
     player.pick(&names(&["no.such.channel"]));
-    assert_eq!(
-        (player.picked().len(), player.history().channels()),
-        (0, before)
-    );
+    assert_eq!((player.picked().len(), player.history().channels()), (0, before));
     player.run_to(1e-3);
 }
 
@@ -369,10 +330,7 @@ struct Uniform(u64);
 
 impl Uniform {
     fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
@@ -433,12 +391,7 @@ fn a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
     let mut player = Player::new(&scene).expect("starts");
     let mut hashes = Vec::new();
     let impacts = |player: &Player| {
-        let of = |joint| {
-            player
-                .contact_history()
-                .touches(joint, 0.0, f64::INFINITY)
-                .count()
-        };
+        let of = |joint| player.contact_history().touches(joint, 0.0, f64::INFINITY).count();
         (0..3).map(of).sum::<usize>()
     };
     while impacts(&player) < 1000 {
@@ -505,10 +458,7 @@ fn ten_minutes_stay_within_reach() {
         player.go_to(600.0 * random.next());
         longest = longest.max(clock() - start);
     }
-    println!(
-        "{} steps, {bytes} bytes, longest jump {longest:.4} s",
-        player.steps()
-    );
+    println!("{} steps, {bytes} bytes, longest jump {longest:.4} s", player.steps());
     assert!(bytes < 64 << 20);
 }
 
@@ -578,18 +528,12 @@ fn time_runs_backwards_through_the_same_states_to_the_start() {
     assert!((59..=61).contains(&frames), "{frames}");
     assert_eq!(player.simulation().time(), 0.0);
     let start = self::player("spcmm");
-    assert_eq!(
-        player.simulation().state_hash(),
-        start.simulation().state_hash()
-    );
+    assert_eq!(player.simulation().state_hash(), start.simulation().state_hash());
     // And forwards again over the same.
     player.go_to(20e-3);
     let mut straight = self::player("spcmm");
     straight.run_to(20e-3);
-    assert_eq!(
-        player.simulation().state_hash(),
-        straight.simulation().state_hash()
-    );
+    assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
 }
 
 #[test]
@@ -599,11 +543,7 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
     assert_eq!(player.flags().count(), 2);
     player.go_to(0.08);
     assert_eq!(player.wanted().contact.friction, FRICTION);
-    assert_eq!(
-        player.log().entries.len(),
-        1,
-        "the link knows what was done until here"
-    );
+    assert_eq!(player.log().entries.len(), 1, "the link knows what was done until here");
     player.set_playing(true);
     let left = player.abandoned_future().expect("left");
     assert_eq!((left.from, left.to), (0.08, 0.15_f64.max(left.to)));
@@ -613,10 +553,7 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
     let mut straight = self::player("spcmm");
     let _ = run_with(&mut straight, &CHANGES[..1], 0.08);
     straight.run_to(0.16);
-    assert_eq!(
-        player.simulation().state_hash(),
-        straight.simulation().state_hash()
-    );
+    assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
 }
 
 #[test]
@@ -719,9 +656,7 @@ fn a_refused_value_changes_nothing() {
     assert!(player.set("contact.clearence", "1 mm").is_err());
     assert_eq!(player.wanted().contact, before);
     player.set("contact.clearance", "0.7 mm").expect("in range");
-    player
-        .set_original("contact.clearance")
-        .expect("the scene's own");
+    player.set_original("contact.clearance").expect("the scene's own");
     assert_eq!(player.wanted().contact, before);
 }
 

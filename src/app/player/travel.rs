@@ -89,10 +89,7 @@ impl Player {
         let times = self.event_times.iter().enumerate();
         times
             .filter(move |(at, _)| !goes_on(*at))
-            .map(|(at, time)| Flag {
-                time: *time,
-                words: entries[at].event.words(),
-            })
+            .map(|(at, time)| Flag { time: *time, words: entries[at].event.words() })
     }
 
     /// Appends what was recorded of `channel` from `from` to `to`, s, to `out`, as by [`History::bins`]: where possible from
@@ -369,11 +366,7 @@ impl Player {
         (self.reached, self.most_steps) = (start, start_steps);
         self.restore(start, false);
         self.retrace(|player| player.steps() >= steps, shown);
-        if self
-            .twin
-            .as_ref()
-            .is_some_and(|twin| twin.begins() > self.simulation.time())
-        {
+        if self.twin.as_ref().is_some_and(|twin| twin.begins() > self.simulation.time()) {
             self.restart_twin();
         }
         self.arrive(shown);

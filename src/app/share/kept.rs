@@ -20,9 +20,7 @@ impl Link {
             return link;
         }
         let files = self.beside.iter();
-        let files: serde_json::Map<_, _> = files
-            .map(|(name, text)| (name.clone(), json!(**text)))
-            .collect();
+        let files: serde_json::Map<_, _> = files.map(|(name, text)| (name.clone(), json!(**text))).collect();
         let kept = json!({ "link": link, "files": files });
         format!("{PREFIX}{}", pack(&kept.to_string()))
     }
@@ -35,9 +33,7 @@ pub(super) fn read(packed: &str) -> Result<Link, LinkError> {
     let kept: Value = serde_json::from_str(&text).map_err(|_| damaged())?;
     let link = kept["link"].as_str().ok_or_else(damaged)?;
     let files = kept["files"].as_object().ok_or_else(damaged)?;
-    let beside = files
-        .iter()
-        .map(|(name, text)| Some((name.clone(), text.as_str()?.into())));
+    let beside = files.iter().map(|(name, text)| Some((name.clone(), text.as_str()?.into())));
     let beside: Texts = beside.collect::<Option<_>>().ok_or_else(damaged)?;
     // As a fragment: a bare text is one without a `?` too early in it.
     let link = Link::read(&format!("#{link}"))?;

@@ -14,10 +14,7 @@ const LONGEST_NAME: usize = 120;
 
 const IDEAL: &str = "ideal";
 const MICROSCOPE: &str = "microscope.";
-const WEAR: [(&str, WearMap); 2] = [
-    ("wear-impulse", WearMap::Impulse),
-    ("wear-friction-work", WearMap::FrictionWork),
-];
+const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-friction-work", WearMap::FrictionWork)];
 
 /// Instruments that are on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -57,11 +54,7 @@ impl Instruments {
     /// The reverse of [`Self::read`].
     pub fn write(&self) -> String {
         let mut words: Vec<String> = Vec::new();
-        words.extend(
-            self.microscope
-                .iter()
-                .map(|joint| format!("{MICROSCOPE}{joint}")),
-        );
+        words.extend(self.microscope.iter().map(|joint| format!("{MICROSCOPE}{joint}")));
         words.extend(self.ideal.then(|| IDEAL.to_owned()));
         let wear = WEAR.iter().filter(|(_, map)| *map == self.wear);
         words.extend(wear.map(|(word, _)| (*word).to_owned()));
@@ -86,10 +79,7 @@ pub fn read_plots(text: &str) -> Result<Vec<Quantity>, String> {
             None if part == "none" => {}
             None => {
                 let known: Vec<String> = Quantity::ALL.map(word).to_vec();
-                return Err(format!(
-                    "no plot `{part}`; allowed, separated by commas: {}, none",
-                    known.join(", ")
-                ));
+                return Err(format!("no plot `{part}`; allowed, separated by commas: {}, none", known.join(", ")));
             }
         }
     }
@@ -125,9 +115,7 @@ pub fn read_channels(text: &str) -> Result<Vec<String>, String> {
     }
     match names.len() {
         0..=MOST_PICKED => Ok(names),
-        many => Err(format!(
-            "{many} names of channels; allowed at most {MOST_PICKED}"
-        )),
+        many => Err(format!("{many} names of channels; allowed at most {MOST_PICKED}")),
     }
 }
 
@@ -177,9 +165,7 @@ pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
     };
     found.ok_or_else(|| {
         let joints = joints().map(|name| format!("joint.{name}"));
-        let known: Vec<String> = joints
-            .chain(bodies().map(|name| format!("body.{name}")))
-            .collect();
+        let known: Vec<String> = joints.chain(bodies().map(|name| format!("body.{name}"))).collect();
         format!("no such part; allowed: {}", known.join(", "))
     })
 }
@@ -200,8 +186,5 @@ pub fn name_followed(scene: &Scene, picked: Picked) -> Option<String> {
 pub fn changed(plots: &Plots) -> (Option<Vec<Quantity>>, Option<Window>) {
     let first = Plots::default();
     let chosen = (plots.chosen != first.chosen).then(|| plots.chosen.clone());
-    (
-        chosen,
-        (plots.window != first.window).then_some(plots.window),
-    )
+    (chosen, (plots.window != first.window).then_some(plots.window))
 }

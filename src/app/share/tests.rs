@@ -29,13 +29,9 @@ impl Chance {
     }
 
     fn text(&mut self, most: u64) -> String {
-        const LETTERS: [char; 14] = [
-            'a', 'Z', '0', ' ', '&', '=', '#', '?', '+', '%', '"', 'µ', '\n', '🦀',
-        ];
+        const LETTERS: [char; 14] = ['a', 'Z', '0', ' ', '&', '=', '#', '?', '+', '%', '"', 'µ', '\n', '🦀'];
         let length = 1 + self.below(most);
-        (0..length)
-            .map(|_| LETTERS[self.below(LETTERS.len() as u64) as usize])
-            .collect()
+        (0..length).map(|_| LETTERS[self.below(LETTERS.len() as u64) as usize]).collect()
     }
 
     fn link(&mut self) -> Link {
@@ -79,10 +75,7 @@ impl Chance {
             follow: self.maybe(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
             plots: self.maybe(|c| {
                 let one = Quantity::ALL[c.below(16) as usize];
-                Quantity::ALL
-                    .into_iter()
-                    .filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0)
-                    .collect()
+                Quantity::ALL.into_iter().filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0).collect()
             }),
             channels: self.maybe(|c| {
                 let names = 0..c.below(4);
@@ -126,16 +119,9 @@ fn every_link_reads_back_to_the_same_bits() {
         ] {
             let read = Link::parse(&form).unwrap_or_else(|error| panic!("{error}\n{form}"));
             assert_eq!(read, link, "{form}");
-            assert_eq!(
-                read.time.map(f64::to_bits),
-                link.time.map(f64::to_bits),
-                "{form}"
-            );
+            assert_eq!(read.time.map(f64::to_bits), link.time.map(f64::to_bits), "{form}");
         }
-        assert!(
-            text.is_ascii() && !text.contains(['#', '?', ' ', '"']),
-            "{text}"
-        );
+        assert!(text.is_ascii() && !text.contains(['#', '?', ' ', '"']), "{text}");
     }
 }
 
@@ -166,15 +152,11 @@ fn no_text_whatever_makes_it_panic() {
 
 #[test]
 fn a_link_by_hand_takes_short_names_and_full_keys() {
-    let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
-        .expect("a link");
+    let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50").expect("a link");
     let scene = link.load().expect("the scene has these");
     assert_eq!(scene.name, "pendulum");
     assert_eq!(scene.contact.clearance, 0.5e-3);
-    assert_eq!(
-        (scene.contact.friction, scene.contact.restitution),
-        (0.2, 0.8)
-    );
+    assert_eq!((scene.contact.friction, scene.contact.restitution), (0.2, 0.8));
     assert_eq!(link.time, Some(0.02));
     assert_eq!(link.time_scale, Some(0.02));
     assert!(link.has_instant());
@@ -198,10 +180,7 @@ fn a_link_by_hand_takes_short_names_and_full_keys() {
 #[test]
 fn what_is_wrong_in_a_link_is_said() {
     for (text, words) in [
-        (
-            "clearance=0.5mm",
-            "link: clearance: unknown word (did you mean `contact.clearance`?); allowed:",
-        ),
+        ("clearance=0.5mm", "link: clearance: unknown word (did you mean `contact.clearance`?); allowed:"),
         ("clearence=0.5mm", "(did you mean `contact.clearance`?)"),
         ("scael=0.5", "(did you mean `scale`?)"),
         ("scale=2", "link: scale = 2: allowed 0.0001 to 1"),
@@ -213,23 +192,14 @@ fn what_is_wrong_in_a_link_is_said() {
         ("camera=0,0,1,0,0,0,0", "is not a camera"),
         ("camera=0,0,nan,0,0,0", "is not a camera"),
         ("magnification=1000", "allowed 1 to 100"),
-        (
-            "plots=speed",
-            "no plot `speed`; allowed, separated by commas: normal-force,",
-        ),
-        (
-            "channels=S1.force+rod/1",
-            "no names of channels; allowed, separated by commas, are such as",
-        ),
+        ("plots=speed", "no plot `speed`; allowed, separated by commas: normal-force,"),
+        ("channels=S1.force+rod/1", "no names of channels; allowed, separated by commas, are such as"),
         (
             "show=telescope",
             "no instrument `telescope`; allowed, separated by commas: microscope.JOINT, ideal, wear-impulse,",
         ),
         ("window=5", "link: window = 5: needs a unit"),
-        (
-            "window=0",
-            "allowed automatic, everything, and 1 us to 10000 s",
-        ),
+        ("window=0", "allowed automatic, everything, and 1 us to 10000 s"),
         ("c=0,5mm&window=0,5s", "has a decimal comma; write a point"),
         ("play=yes", "allowed 0 (paused) and 1 (playing)"),
         ("text=%%%", "does not unpack"),
@@ -244,10 +214,7 @@ fn what_is_wrong_in_a_link_is_said() {
         ("scene=pendulun", "did you mean `pendulum`?"),
         ("c=0.5", "contact.clearance = 0.5: needs a unit"),
         ("c=-1mm", "out of range"),
-        (
-            "scene=pendulum&spcmm.frequency=1Hz",
-            "the scene `pendulum` has no such key",
-        ),
+        ("scene=pendulum&spcmm.frequency=1Hz", "the scene `pendulum` has no such key"),
         ("contact.clearence=1mm", "did you mean `contact.clearance`?"),
     ] {
         let error = Link::parse(text).expect("well formed").load();
@@ -266,23 +233,14 @@ fn a_small_bomb_does_not_unpack() {
     let long = |length: usize| format!("?scene={}", "x".repeat(length - "?scene=".len()));
     assert!(Link::parse(&long(LONGEST_LINK)).is_ok());
     let error = Link::parse(&long(LONGEST_LINK + 1)).expect_err("too long");
-    assert!(
-        error.to_string().contains("allowed at most 32000"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("allowed at most 32000"), "{error}");
 }
 
 #[test]
 fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
     let mut chance = Chance(3);
-    let scene =
-        Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())]).expect("built in");
-    let mut link = Link {
-        scene: SceneText::of(&scene),
-        steps: Some(1 << 40),
-        hash: Some(7),
-        ..Link::default()
-    };
+    let scene = Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())]).expect("built in");
+    let mut link = Link { scene: SceneText::of(&scene), steps: Some(1 << 40), hash: Some(7), ..Link::default() };
     for index in 0..8000 {
         let value = format!("{} mm", chance.unit());
         link.log.set(index, "contact.clearance", &value);
@@ -294,13 +252,8 @@ fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
     assert_eq!(start.log.base, scene.changes);
     assert!(!start.has_instant() && start.hash.is_none());
 
-    let noise: String = (0..40_000)
-        .map(|_| char::from(b'a' + chance.below(26) as u8))
-        .collect();
-    link.scene = SceneText::File {
-        name: "mine.toml".to_owned(),
-        text: noise,
-    };
+    let noise: String = (0..40_000).map(|_| char::from(b'a' + chance.below(26) as u8)).collect();
+    link.scene = SceneText::File { name: "mine.toml".to_owned(), text: noise };
     let error = link.format_short(&scene).expect_err("does not fit");
     assert!(error.contains("too large for a link"), "{error}");
 }
@@ -314,8 +267,7 @@ fn what_no_address_holds_is_kept_and_read_back() {
         let fragment = link.format();
         assert_eq!(link.keep(), fragment);
         plain += 1;
-        link.beside
-            .insert("a lift.csv".to_owned(), "time_s,y_mm\n0,0\n".into());
+        link.beside.insert("a lift.csv".to_owned(), "time_s,y_mm\n0,0\n".into());
         assert_eq!(link.format(), fragment, "no link carries a file");
         let kept = link.keep();
         assert!(kept.starts_with("kept:"));
@@ -323,36 +275,22 @@ fn what_no_address_holds_is_kept_and_read_back() {
         packed += 1;
     }
     assert_eq!((plain, packed), (100, 100));
-    let noise: String = (0..60_000)
-        .map(|_| char::from(b'a' + chance.below(26) as u8))
-        .collect();
+    let noise: String = (0..60_000).map(|_| char::from(b'a' + chance.below(26) as u8)).collect();
     let (name, text) = ("mine.toml".to_owned(), noise);
-    let large = Link {
-        scene: SceneText::File { name, text },
-        ..Link::default()
-    };
+    let large = Link { scene: SceneText::File { name, text }, ..Link::default() };
     assert!(Link::parse(&format!("#{}", large.format())).is_err());
     let kept = large.keep();
     assert_eq!(Link::parse(&kept).expect("reads"), large);
     let error = Link::parse(&kept[..kept.len() / 2]).expect_err("cut");
-    assert!(
-        error.to_string().contains("cut short or damaged"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("cut short or damaged"), "{error}");
     let error = Link::parse("#kept=1").expect_err("elsewhere");
-    assert!(
-        error.to_string().contains("open the scene file here"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("open the scene file here"), "{error}");
 }
 
 #[test]
 fn a_built_in_scene_is_named_and_any_other_travels() {
     let scene = Scene::load("chain", &[]).expect("built in");
-    assert_eq!(
-        SceneText::of(&scene),
-        SceneText::BuiltIn("chain".to_owned())
-    );
+    assert_eq!(SceneText::of(&scene), SceneText::BuiltIn("chain".to_owned()));
     let text = format!("{}\n# mine\n", scene.source.text);
     let mine = Scene::parse(&text, Some("/home/me/chain.toml"), &[]).expect("reads");
     let name = "chain.toml".to_owned();

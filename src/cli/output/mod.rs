@@ -39,10 +39,7 @@ impl Format {
     /// # Errors
     /// Any other ending than the three.
     pub fn of(path: &Path) -> Result<Self, Failure> {
-        let ending = path
-            .extension()
-            .and_then(|e| e.to_str())
-            .unwrap_or_default();
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         match ending.to_ascii_lowercase().as_str() {
             "csv" => Ok(Self::Csv),
             "json" => Ok(Self::Json),
@@ -76,11 +73,7 @@ impl RowsFile {
             Format::Csv => Some(claim_account(path, force)?),
             Format::Json | Format::Npz => None,
         };
-        Ok(Self {
-            format,
-            rows,
-            beside,
-        })
+        Ok(Self { format, rows, beside })
     }
 
     /// The files that `option` with `path` writes, for [`check_distinct`].
@@ -101,11 +94,7 @@ impl RowsFile {
     ///
     /// # Errors
     /// Whatever the file system reports.
-    pub fn fill(
-        self,
-        table: &Table,
-        mut meta: Map<String, Json>,
-    ) -> Result<Vec<PendingFile>, Failure> {
+    pub fn fill(self, table: &Table, mut meta: Map<String, Json>) -> Result<Vec<PendingFile>, Failure> {
         let mut checksum = String::new();
         let rows = self.rows.fill(|file| match self.format {
             Format::Csv => {

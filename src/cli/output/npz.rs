@@ -53,9 +53,7 @@ mod tests {
             let work = || {
                 OutputFile::claim(&path, true)?.write(|file| {
                     let mut archive = NpzWriter::new(file);
-                    let added = archive
-                        .add_array("a", &values)
-                        .and_then(|()| archive.add_array("b", &values));
+                    let added = archive.add_array("a", &values).and_then(|()| archive.add_array("b", &values));
                     failed = added.is_err();
                     // As the archive does when dropped, complaining about any error.
                     let ended = archive.finish().map(|_| ());

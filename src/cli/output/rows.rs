@@ -23,13 +23,7 @@ pub struct Rows {
 impl Rows {
     /// No rows yet, of `width` values each.
     pub fn new(width: usize) -> Self {
-        Self {
-            width,
-            rows_per_block: (BLOCK / width).max(1),
-            block: Vec::new(),
-            spool: None,
-            spooled: 0,
-        }
+        Self { width, rows_per_block: (BLOCK / width).max(1), block: Vec::new(), spool: None, spooled: 0 }
     }
 
     /// From now on full blocks go to `spool`; without it all rows stay in memory.
@@ -77,9 +71,7 @@ impl Rows {
             let values = self.read(block, 0, self.width * n)?;
             for k in 0..n {
                 let of_row = values[k..].iter().step_by(n);
-                row.iter_mut()
-                    .zip(of_row)
-                    .for_each(|(to, from)| *to = *from);
+                row.iter_mut().zip(of_row).for_each(|(to, from)| *to = *from);
                 each(&row)?;
             }
         }
@@ -90,11 +82,7 @@ impl Rows {
     ///
     /// # Errors
     /// A disk error, or that of `each`.
-    pub fn column(
-        &self,
-        column: usize,
-        mut each: impl FnMut(f64) -> io::Result<()>,
-    ) -> io::Result<()> {
+    pub fn column(&self, column: usize, mut each: impl FnMut(f64) -> io::Result<()>) -> io::Result<()> {
         let n = self.rows_per_block;
         for block in 0..self.spooled {
             let values = self.read(block, column * n, n)?;
@@ -130,8 +118,7 @@ mod tests {
         rows.spool_to(target.spool().unwrap());
         let value = |k: usize, column: usize| (10 * k + column) as f64;
         for k in 0..11 {
-            rows.push(&[0, 1, 2].map(|column| value(k, column)))
-                .unwrap();
+            rows.push(&[0, 1, 2].map(|column| value(k, column))).unwrap();
         }
         assert_eq!((rows.len(), rows.spooled, rows.block.len()), (11, 2, 9));
         let mut k = 0;
@@ -153,10 +140,6 @@ mod tests {
             assert_eq!(all, expected);
         }
         #[cfg(unix)]
-        assert_eq!(
-            std::fs::read_dir(folder.path()).unwrap().count(),
-            0,
-            "nameless"
-        );
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nameless");
     }
 }

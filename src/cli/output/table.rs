@@ -46,21 +46,12 @@ impl Table {
     ///
     /// # Errors
     /// A pattern without a match.
-    pub fn of_channels(
-        scene: &Scene,
-        first: &Frame,
-        patterns: &[String],
-    ) -> Result<Self, NoChannel> {
+    pub fn of_channels(scene: &Scene, first: &Frame, patterns: &[String]) -> Result<Self, NoChannel> {
         chosen_columns(scene, first, patterns).map(Self::of_columns)
     }
 
     fn of_columns((names, readings): (Vec<String>, Vec<Reading>)) -> Self {
-        Self {
-            rows: Rows::new(names.len()),
-            names,
-            readings,
-            values: Vec::new(),
-        }
+        Self { rows: Rows::new(names.len()), names, readings, values: Vec::new() }
     }
 
     /// A table of rows other than those of a run.
@@ -132,11 +123,7 @@ impl Table {
         for (reading, column) in self.readings.iter().zip(&self.names) {
             let value = reading.read(frame);
             if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return Err(NoRow::NotFinite {
-                    column: column.clone(),
-                    value,
-                    time: frame.time,
-                });
+                return Err(NoRow::NotFinite { column: column.clone(), value, time: frame.time });
             }
             // After the ideal mechanism has come to its end there is no probe error.
             self.values.push(value.unwrap_or(f64::NAN));

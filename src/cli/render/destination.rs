@@ -50,11 +50,7 @@ impl Destination {
         let film = Film::new(format, size, rate).map_err(unfilmable)?;
         let file = OutputFile::claim(path, arguments.force)?;
         let account = claim_account(path, arguments.force)?;
-        Ok(Self::Film {
-            film: Box::new(film),
-            file,
-            account,
-        })
+        Ok(Self::Film { film: Box::new(film), file, account })
     }
 
     /// Takes frame `number`, and returns what is said of it. `meta` is the provenance of all.
@@ -71,13 +67,8 @@ impl Destination {
         match self {
             Self::Pictures(folder) => {
                 let labels = labels(meta);
-                let labels: Vec<(&str, &str)> = labels
-                    .iter()
-                    .map(|(key, text)| (*key, text.as_str()))
-                    .collect();
-                let png = image
-                    .png(&labels)
-                    .map_err(|error| Failure::io(error.to_string()))?;
+                let labels: Vec<(&str, &str)> = labels.iter().map(|(key, text)| (*key, text.as_str())).collect();
+                let png = image.png(&labels).map_err(|error| Failure::io(error.to_string()))?;
                 let file = format!("frame_{number:05}.png");
                 folder.write(&file, &png)?;
                 told.insert("file".into(), json!(file));
@@ -106,16 +97,9 @@ impl Destination {
             Self::Pictures(folder) => {
                 folder.finish(manifest)?;
                 let place = arguments.out.as_deref().unwrap_or(Path::new(""));
-                print(&format!(
-                    "{written} and {MANIFEST} in {}\n",
-                    place.display()
-                ))
+                print(&format!("{written} and {MANIFEST} in {}\n", place.display()))
             }
-            Self::Film {
-                film,
-                file,
-                account,
-            } => {
+            Self::Film { film, file, account } => {
                 let bytes = film.finish().map_err(unfilmable)?;
                 let checksum = format!("{:08x}", crc32fast::hash(&bytes));
                 manifest.insert("film_crc32".into(), json!(checksum));

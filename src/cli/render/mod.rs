@@ -31,15 +31,8 @@ pub(super) struct Times {
 impl Times {
     pub(super) fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
         let (Some(duration), Some(fps)) = (&arguments.duration, arguments.fps) else {
-            let instants = arguments
-                .at
-                .iter()
-                .map(|at| quantity::duration("--at", at))
-                .collect::<Result<_, _>>()?;
-            return Ok(Self {
-                instants,
-                time_scale: None,
-            });
+            let instants = arguments.at.iter().map(|at| quantity::duration("--at", at)).collect::<Result<_, _>>()?;
+            return Ok(Self { instants, time_scale: None });
         };
         let duration = quantity::duration("--duration", duration)?;
         options::positive("--fps", fps, 10_000.0)?;
@@ -55,9 +48,7 @@ impl Times {
             )));
         }
         Ok(Self {
-            instants: (0..=last as u64)
-                .map(|k| (k as f64 / rate).min(duration))
-                .collect(),
+            instants: (0..=last as u64).map(|k| (k as f64 / rate).min(duration)).collect(),
             time_scale: Some(1.0 / arguments.slow),
         })
     }
@@ -113,11 +104,7 @@ pub(super) fn fill(
     for (done, number) in times.in_order().into_iter().enumerate() {
         let instant = times.instants[number];
         if let Err(stop) = studio.go_to(instant) {
-            status = if stop.code == Failure::INTERRUPTED {
-                Status::Interrupted
-            } else {
-                Status::Diverged
-            };
+            status = if stop.code == Failure::INTERRUPTED { Status::Interrupted } else { Status::Diverged };
             failure = Some(stop);
             break;
         }
@@ -131,9 +118,7 @@ pub(super) fn fill(
         bar.set_position(done as u64 + 1);
     }
     bar.finish_and_clear();
-    if let (Destination::Film { .. }, Status::Interrupted, Some(stop)) =
-        (&destination, status, &failure)
-    {
+    if let (Destination::Film { .. }, Status::Interrupted, Some(stop)) = (&destination, status, &failure) {
         return Err(stop.clone());
     }
 
@@ -174,11 +159,7 @@ fn common_reference(
         }
         simulation.sample(instant, &mut frame);
         simulation.take_peaks(&mut peaks);
-        let since: &[Peak] = if times.time_scale.is_some() && arrows.peaks {
-            &peaks
-        } else {
-            &[]
-        };
+        let since: &[Peak] = if times.time_scale.is_some() && arrows.peaks { &peaks } else { &[] };
         // Nothing fades: the largest forces stay.
         marks.update(&frame, since, f64::INFINITY);
     }
@@ -187,8 +168,5 @@ fn common_reference(
 
 /// Provenance of a picture, as texts inside it: a frame that has lost its manifest still carries it.
 fn labels(meta: &Map<String, Json>) -> Vec<(&'static str, String)> {
-    vec![
-        ("Software", format!("jointplay {}", crate::VERSION)),
-        ("Description", Json::Object(meta.clone()).to_string()),
-    ]
+    vec![("Software", format!("jointplay {}", crate::VERSION)), ("Description", Json::Object(meta.clone()).to_string())]
 }

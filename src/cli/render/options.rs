@@ -1,15 +1,11 @@
 //! Options of a picture: point of view, arrows, colours.
 
 use crate::app::plate;
-use crate::cli::args::{
-    ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice, WearChoice,
-};
+use crate::cli::args::{ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice, WearChoice};
 use crate::cli::{Failure, quantity};
 use crate::scene::Scene;
 use crate::simulate::Frame;
-use crate::view::{
-    ArrowOptions, Camera, Preset, Quality, Scaling, SceneView, Theme, ViewOptions, WearMap,
-};
+use crate::view::{ArrowOptions, Camera, Preset, Quality, Scaling, SceneView, Theme, ViewOptions, WearMap};
 
 /// Point of view requested by `arguments`, at the frame of t = 0.
 ///
@@ -38,21 +34,10 @@ pub fn camera(
     }
     match &arguments.close_up {
         Some(name) => {
-            let joint = scene
-                .ball_joints
-                .iter()
-                .position(|joint| joint.name == *name)
-                .ok_or_else(|| {
-                    let names: Vec<&str> = scene
-                        .ball_joints
-                        .iter()
-                        .map(|joint| joint.name.as_str())
-                        .collect();
-                    Failure::usage(format!(
-                        "--close-up {name}: no such ball joint; there are {}",
-                        names.join(", ")
-                    ))
-                })?;
+            let joint = scene.ball_joints.iter().position(|joint| joint.name == *name).ok_or_else(|| {
+                let names: Vec<&str> = scene.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+                Failure::usage(format!("--close-up {name}: no such ball joint; there are {}", names.join(", ")))
+            })?;
             view.close_up(&mut camera, joint, scene, frame, options);
         }
         None => {
@@ -78,9 +63,7 @@ pub fn camera(
 pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure> {
     let magnification = arguments.magnification.unwrap_or(1.0);
     if !(1.0..=100.0).contains(&magnification) {
-        return Err(Failure::usage(format!(
-            "--magnification {magnification}: allowed 1 to 100"
-        )));
+        return Err(Failure::usage(format!("--magnification {magnification}: allowed 1 to 100")));
     }
     let shown = |thing| !arguments.hide.contains(&thing);
     Ok(ViewOptions {
@@ -128,7 +111,5 @@ pub fn positive(option: &str, value: f64, most: f64) -> Result<(), Failure> {
     if value > 0.0 && value <= most {
         return Ok(());
     }
-    Err(Failure::usage(format!(
-        "{option} {value}: must be greater than 0 and at most {most}"
-    )))
+    Err(Failure::usage(format!("{option} {value}: must be greater than 0 and at most {most}")))
 }

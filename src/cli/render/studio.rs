@@ -9,9 +9,7 @@ use crate::cli::{Failure, interrupt, start};
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation};
-use crate::view::{
-    Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, WearMap, to_f32,
-};
+use crate::view::{Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, WearMap, to_f32};
 
 /// A simulation and what draws it.
 pub trait Studio {
@@ -69,11 +67,7 @@ impl SceneStudio {
     ///
     /// # Errors
     /// A scene that cannot start, bad options, no adapter.
-    pub fn new(
-        scene: &Scene,
-        options: ViewOptions,
-        arguments: &RenderArguments,
-    ) -> Result<Self, Failure> {
+    pub fn new(scene: &Scene, options: ViewOptions, arguments: &RenderArguments) -> Result<Self, Failure> {
         let mut simulation = start(scene)?;
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
@@ -86,9 +80,7 @@ impl SceneStudio {
         }
         // Magnified play and wear colours are never shown unlabelled.
         let screen = if arguments.overlay || options.magnification != 1.0 || wear {
-            Screen::Written(Box::new(
-                Headless::new().map_err(|error| no_adapter(&error))?,
-            ))
+            Screen::Written(Box::new(Headless::new().map_err(|error| no_adapter(&error))?))
         } else {
             let offscreen = Offscreen::new().map_err(|error| no_adapter(&error))?;
             offscreen.check_size(size).map_err(|error| failed(&error))?;
@@ -118,9 +110,7 @@ impl Studio for SceneStudio {
             if interrupt::asked() {
                 return Err(interrupted(self.simulation.time()));
             }
-            self.simulation
-                .step()
-                .map_err(|stopped| Failure::new(Failure::DIVERGED, stopped.to_string()))?;
+            self.simulation.step().map_err(|stopped| Failure::new(Failure::DIVERGED, stopped.to_string()))?;
         }
         Ok(())
     }
@@ -134,8 +124,7 @@ impl Studio for SceneStudio {
                 self.marks.update(&self.frame, &self.peaks, fade);
                 if let Some((body, tip)) = self.probe {
                     let motion = &self.frame.bodies[body];
-                    self.trail
-                        .push(to_f32(&(motion.position + motion.rotation * tip)));
+                    self.trail.push(to_f32(&(motion.position + motion.rotation * tip)));
                 }
             }
             None => {
@@ -162,10 +151,7 @@ impl Studio for SceneStudio {
         match &mut self.screen {
             Screen::Plain(offscreen) => offscreen.render(&self.list),
             Screen::Written(headless) => {
-                let mut overlay = Overlay {
-                    time: Some(instant),
-                    ..Overlay::default()
-                };
+                let mut overlay = Overlay { time: Some(instant), ..Overlay::default() };
                 if self.overlay {
                     overlay.notes = force_notes(self.simulation.scene(), &self.frame);
                     overlay.legend = true;
@@ -208,28 +194,18 @@ impl ApplicationStudio {
     ///
     /// # Errors
     /// A scene that cannot start, no adapter.
-    pub fn new(
-        scene: &Scene,
-        options: ViewOptions,
-        arguments: &RenderArguments,
-    ) -> Result<Self, Failure> {
+    pub fn new(scene: &Scene, options: ViewOptions, arguments: &RenderArguments) -> Result<Self, Failure> {
         let headless = Headless::new().map_err(|error| no_adapter(&error))?;
         let mut begin = AppOptions::new(scene.clone());
         begin.playing = false;
-        begin.view = ViewOptions {
-            magnification: arguments.magnification.unwrap_or(begin.view.magnification),
-            ..options
-        };
+        begin.view =
+            ViewOptions { magnification: arguments.magnification.unwrap_or(begin.view.magnification), ..options };
         begin.theme = match arguments.theme {
             ThemeChoice::Light => eframe::egui::ThemePreference::Light,
             ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
         };
         let app = headless.app(begin).map_err(|error| error.located(scene))?;
-        Ok(Self {
-            headless,
-            app,
-            size: [arguments.size.0, arguments.size.1],
-        })
+        Ok(Self { headless, app, size: [arguments.size.0, arguments.size.1] })
     }
 }
 
@@ -259,9 +235,7 @@ impl Studio for ApplicationStudio {
             }
             None => self.app.run_to(instant),
         }
-        self.headless
-            .app_frame(&mut self.app, self.size, 1.0)
-            .map_err(|error| failed(&error))
+        self.headless.app_frame(&mut self.app, self.size, 1.0).map_err(|error| failed(&error))
     }
 
     // The window scales its arrows by its own forces.
@@ -288,8 +262,5 @@ fn failed(error: &RenderError) -> Failure {
 }
 
 fn interrupted(time: f64) -> Failure {
-    Failure::new(
-        Failure::INTERRUPTED,
-        format!("interrupted at t = {time:.6e} s"),
-    )
+    Failure::new(Failure::INTERRUPTED, format!("interrupted at t = {time:.6e} s"))
 }

@@ -17,21 +17,14 @@ use crate::cli::{Failure, interrupt};
 ///
 /// # Errors
 /// Ctrl-C; the file system; a run that fails: of those begun, the first in job order.
-pub(super) fn compute(
-    work: Agenda,
-    kept: &mut Kept,
-    threads: usize,
-    bar: &ProgressBar,
-) -> Result<Report, Failure> {
+pub(super) fn compute(work: Agenda, kept: &mut Kept, threads: usize, bar: &ProgressBar) -> Result<Report, Failure> {
     let mut outcomes: Vec<Option<Outcome>> = (0..work.jobs()).map(|_| None).collect();
     for (job, outcome) in kept.found(&work)? {
         outcomes[job] = Some(outcome);
         bar.inc(work.length(job).round() as u64);
     }
     bar.reset_eta();
-    let left: Vec<usize> = (0..work.jobs())
-        .filter(|&job| outcomes[job].is_none())
-        .collect();
+    let left: Vec<usize> = (0..work.jobs()).filter(|&job| outcomes[job].is_none()).collect();
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let mut done: Vec<(usize, Result<Outcome, Failure>)> = Vec::new();

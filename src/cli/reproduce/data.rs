@@ -18,9 +18,8 @@ use crate::files::Folder;
 /// # Errors
 /// The file system.
 pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
-    let put = |name: String, content: &[u8]| -> Result<(), Failure> {
-        Ok(folder.write(&format!("data/{name}"), content)?)
-    };
+    let put =
+        |name: String, content: &[u8]| -> Result<(), Failure> { Ok(folder.write(&format!("data/{name}"), content)?) };
     let put_run = |run: &RecordedRun| {
         put(format!("{}.csv", run.name), samples(run).as_bytes())?;
         put(format!("{}.npz", run.name), &rows(run, report)?)
@@ -33,14 +32,8 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
     for found in [&report.corrected, &report.printed] {
         let prefix = &found.variant.prefix;
         put(format!("{prefix}numbers.csv"), numbers(found).as_bytes())?;
-        put(
-            format!("{prefix}statements.csv"),
-            verdicts(found).as_bytes(),
-        )?;
-        put(
-            format!("{prefix}settled_curves.csv"),
-            curves(found).as_bytes(),
-        )?;
+        put(format!("{prefix}statements.csv"), verdicts(found).as_bytes())?;
+        put(format!("{prefix}settled_curves.csv"), curves(found).as_bytes())?;
         for run in found.runs.iter().chain([&found.lagrange]) {
             put_run(run)?;
         }
@@ -57,12 +50,7 @@ fn numbers(found: &Findings) -> String {
     csv(
         "figure,clearance_mm,friction,quantity,unit,paper,full,sampled,ratio,sampled_ratio,agreement",
         found.comparisons().iter().map(|c| {
-            let Published {
-                figure,
-                case,
-                quantity,
-                value,
-            } = c.published;
+            let Published { figure, case, quantity, value } = c.published;
             vec![
                 figure.clone(),
                 case.clearance.to_string(),
@@ -101,10 +89,7 @@ fn samples(run: &RecordedRun) -> String {
     let columns = COLUMNS.len() - 1;
     let names = COLUMNS.map(|c| c.name);
     let rows = run.samples().into_iter();
-    csv(
-        &names[..columns].join(","),
-        rows.map(|row| row[..columns].iter().map(|v| number(*v)).collect()),
-    )
+    csv(&names[..columns].join(","), rows.map(|row| row[..columns].iter().map(|v| number(*v)).collect()))
 }
 
 /// A run at every examined instant.
@@ -113,8 +98,7 @@ fn rows(run: &RecordedRun, report: &Report) -> Result<Vec<u8>, Failure> {
     meta.insert("run".into(), json!(run.name));
     meta.insert("clearance_mm".into(), json!(run.case.clearance));
     meta.insert("friction".into(), json!(run.case.friction));
-    let failed =
-        |e: ndarray_npy::WriteNpzError| Failure::io(format!("cannot write {}: {e}", run.name));
+    let failed = |e: ndarray_npy::WriteNpzError| Failure::io(format!("cannot write {}: {e}", run.name));
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut archive = NpzWriter::new(&mut bytes);
     for (k, Column { name, .. }) in COLUMNS.into_iter().enumerate() {
@@ -142,10 +126,7 @@ fn curves(found: &Findings) -> String {
             row
         })
     });
-    csv(
-        "clearance_mm,friction,phase,x_m,vx_m_s,beta_rad,beta_rate_rad_s",
-        rows,
-    )
+    csv("clearance_mm,friction,phase,x_m,vx_m_s,beta_rad,beta_rate_rad_s", rows)
 }
 
 /// One row per point of a sweep, without its sections.
@@ -183,10 +164,7 @@ impl Source for Records<'_> {
 /// A sweep in the format that `sweep` writes.
 fn archive(folder: &Folder, data: &SweepData) -> Result<(), Failure> {
     let meta: Map<String, Json> = meta(&data.sweep);
-    let mut source = Records {
-        records: &data.records,
-        length: data.sweep.layout().record_length(),
-    };
+    let mut source = Records { records: &data.records, length: data.sweep.layout().record_length() };
     let target = folder.file(&format!("data/{}.npz", data.file_name()))?;
     Archive::of_sweep(meta, &data.sweep, None).write(target, &mut source)
 }

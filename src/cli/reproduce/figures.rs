@@ -3,12 +3,8 @@
 use super::text::{NO_REGIME, capital, typeset};
 use crate::analysis::paper::{Case, Coordinate, PAPER, Series, SeriesRow, Shows, Variant};
 use crate::analysis::regime::Regime;
-use crate::analysis::reproduction::{
-    COLUMNS, Column, Findings, RecordedRun, SettledPoint, column_of, derivative,
-};
-use crate::chart::{
-    Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series as Curve, Sheet,
-};
+use crate::analysis::reproduction::{COLUMNS, Column, Findings, RecordedRun, SettledPoint, column_of, derivative};
+use crate::chart::{Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series as Curve, Sheet};
 use crate::cli::output::significant;
 
 /// Width of a sheet and height of a row of charts, pixels.
@@ -26,11 +22,7 @@ pub(super) fn all(found: &Findings) -> Vec<(String, Sheet)> {
     figures
         .map(|figure| {
             let charts = match figure.shows {
-                Shows::Response {
-                    to,
-                    ref whole,
-                    ref early,
-                } => response(found, to, whole, early),
+                Shows::Response { to, ref whole, ref early } => response(found, to, whole, early),
                 Shows::Forces(case) => forces(found.run(case)),
                 Shows::Verification(ref columns) => verification(found, columns),
                 Shows::Drift => drift(found),
@@ -54,28 +46,15 @@ pub(super) fn picture_name(variant: &Variant, name: &str) -> String {
 /// Charts in rows of two.
 fn sheet(charts: Vec<Chart>) -> Sheet {
     let rows = charts.len().div_ceil(2) as u32;
-    Sheet {
-        title: String::new(),
-        charts,
-        columns: 2,
-        size: (WIDTH, ROW * rows + 34),
-        note: String::new(),
-    }
+    Sheet { title: String::new(), charts, columns: 2, size: (WIDTH, ROW * rows + 34), note: String::new() }
 }
 
 fn axis(label: &str, unit: &str) -> Axis {
-    Axis {
-        label: label.to_owned(),
-        unit: unit.to_owned(),
-        ..Axis::default()
-    }
+    Axis { label: label.to_owned(), unit: unit.to_owned(), ..Axis::default() }
 }
 
 fn logarithmic(label: &str, unit: &str) -> Axis {
-    Axis {
-        scale: Scale::Logarithmic,
-        ..axis(label, unit)
-    }
+    Axis { scale: Scale::Logarithmic, ..axis(label, unit) }
 }
 
 fn of_column(column: usize) -> Axis {
@@ -89,39 +68,20 @@ fn parameter(series: Series) -> Axis {
 }
 
 fn line(label: &str, points: Points, colour: Colour) -> Curve {
-    Curve {
-        label: label.to_owned(),
-        points,
-        colour,
-        line: true,
-        marker: None,
-    }
+    Curve { label: label.to_owned(), points, colour, line: true, marker: None }
 }
 
 fn dots(label: &str, points: Points, colour: Colour, marker: Marker) -> Curve {
-    Curve {
-        line: false,
-        marker: Some(marker),
-        ..line(label, points, colour)
-    }
+    Curve { line: false, marker: Some(marker), ..line(label, points, colour) }
 }
 
 fn chart(title: &str, x: Axis, y: Axis, series: Vec<Curve>) -> Chart {
-    Chart {
-        title: title.to_owned(),
-        x,
-        y,
-        series,
-        ..Chart::default()
-    }
+    Chart { title: title.to_owned(), x, y, series, ..Chart::default() }
 }
 
 /// Curves over the first `to` seconds.
 fn over_time(title: &str, to: f64, y: Axis, series: Vec<Curve>) -> Chart {
-    let time = Axis {
-        range: Some((0.0, to)),
-        ..axis("Time", "s")
-    };
+    let time = Axis { range: Some((0.0, to)), ..axis("Time", "s") };
     chart(title, time, y, series)
 }
 
@@ -134,14 +94,8 @@ fn columns(runs: &[(String, &RecordedRun, usize)], to: f64, title: &str, colour:
     over_time(title, to, of_column(runs[0].2), series.collect())
 }
 
-fn of_series(
-    found: &Findings,
-    series: Series,
-    column: usize,
-) -> [(String, &RecordedRun, usize); 3] {
-    series
-        .cases()
-        .map(|case| (series.run_name(case), found.run(case), column))
+fn of_series(found: &Findings, series: Series, column: usize) -> [(String, &RecordedRun, usize); 3] {
+    series.cases().map(|case| (series.run_name(case), found.run(case), column))
 }
 
 /// The whole run above, its beginning below.
@@ -150,20 +104,13 @@ fn response(found: &Findings, to: Series, whole: &[String], early: &[String]) ->
         let chart = |name: &String| columns(&of_series(found, to, column_of(name)), end, title, 1);
         names.iter().map(chart).collect()
     };
-    [
-        row(whole, PAPER.period, "One period"),
-        row(early, EARLY, "While the balls bounce"),
-    ]
-    .concat()
+    [row(whole, PAPER.period, "One period"), row(early, EARLY, "While the balls bounce")].concat()
 }
 
 fn forces(run: &RecordedRun) -> Vec<Chart> {
     let joints = ["S1", "S2", "S3"];
     let joints = joints.map(|j| (j.to_owned(), run, column_of(&format!("{j}_normal_N"))));
-    vec![
-        columns(&joints, PAPER.period, "One period", 1),
-        columns(&joints, EARLY, "While the balls bounce", 1),
-    ]
+    vec![columns(&joints, PAPER.period, "One period", 1), columns(&joints, EARLY, "While the balls bounce", 1)]
 }
 
 fn verification(found: &Findings, names: &[String]) -> Vec<Chart> {
@@ -215,10 +162,7 @@ fn phases(coordinate: Coordinate, title: &str, series: Vec<Curve>) -> Chart {
 }
 
 /// Points of values in thousandths of SI units.
-fn pairs<'a>(
-    values: impl IntoIterator<Item = &'a f64>,
-    rates: impl IntoIterator<Item = &'a f64>,
-) -> Points {
+fn pairs<'a>(values: impl IntoIterator<Item = &'a f64>, rates: impl IntoIterator<Item = &'a f64>) -> Points {
     let pairs = values.into_iter().zip(rates);
     pairs.map(|(value, rate)| (value * 1e3, *rate)).collect()
 }
@@ -226,28 +170,18 @@ fn pairs<'a>(
 fn portraits(found: &Findings, series: Series) -> Vec<Chart> {
     let each = |points: &dyn Fn(usize, Case) -> Points| {
         let cases = series.cases().into_iter().enumerate();
-        cases
-            .map(|(n, case)| line(&series.run_name(case), points(n, case), PALETTE[n + 1]))
-            .collect()
+        cases.map(|(n, case)| line(&series.run_name(case), points(n, case), PALETTE[n + 1])).collect()
     };
     let settled = Coordinate::ALL.map(|c| {
         let loops = found.loops(series);
-        let points = |n: usize, _| {
-            pairs(
-                &loops[n].coordinates[c as usize],
-                &loops[n].rates[c as usize],
-            )
-        };
+        let points = |n: usize, _| pairs(&loops[n].coordinates[c as usize], &loops[n].rates[c as usize]);
         phases(c, "Settled", each(&points))
     });
     let first = Coordinate::ALL.map(|c| {
         let [value, rate] = [0, 1].map(|nth| derivative(c, nth));
         let points = |_, case| {
             let rows = &found.run(case).rows;
-            pairs(
-                rows.iter().map(|row| &row[value]),
-                rows.iter().map(|row| &row[rate]),
-            )
+            pairs(rows.iter().map(|row| &row[value]), rows.iter().map(|row| &row[rate]))
         };
         phases(c, "First period, with its impacts", each(&points))
     });
@@ -262,9 +196,7 @@ fn sections(found: &Findings, series: Series) -> Vec<Chart> {
             let column = &COLUMNS[derivative(c, nth)];
             data.values(&format!("section_{}", column.name))
         });
-        let looks = [Marker::Disc, Marker::Square, Marker::Triangle]
-            .into_iter()
-            .enumerate();
+        let looks = [Marker::Disc, Marker::Square, Marker::Triangle].into_iter().enumerate();
         let dots = looks.zip(series.cases()).map(|((n, marker), case)| {
             let part = n * kept..(n + 1) * kept;
             let points = seen(pairs(&values[part.clone()], &rates[part]));
@@ -279,10 +211,7 @@ fn sections(found: &Findings, series: Series) -> Vec<Chart> {
 fn seen(points: Points) -> Points {
     let mut cells = std::collections::HashSet::new();
     let cell = |v: f64| format!("{v:.6}");
-    points
-        .into_iter()
-        .filter(|p| cells.insert((cell(p.0), cell(p.1))))
-        .collect()
+    points.into_iter().filter(|p| cells.insert((cell(p.0), cell(p.1)))).collect()
 }
 
 fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
@@ -294,15 +223,10 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
         ("followed downward", PALETTE[6], Marker::Dot),
     ];
     let diagram = |c: Coordinate| {
-        let dots = all
-            .iter()
-            .zip(looks)
-            .map(|(points, (start, colour, marker))| {
-                let points = points
-                    .iter()
-                    .flat_map(|p| p.sections[c as usize].iter().map(|s| (p.value, s * 1e3)));
-                dots(start, points.collect(), colour, marker)
-            });
+        let dots = all.iter().zip(looks).map(|(points, (start, colour, marker))| {
+            let points = points.iter().flat_map(|p| p.sections[c as usize].iter().map(|s| (p.value, s * 1e3)));
+            dots(start, points.collect(), colour, marker)
+        });
         let value = of_column(derivative(c, 0));
         let title = format!("Sections in {}", value.label);
         chart(&title, parameter(series), value, dots.collect())
@@ -315,9 +239,7 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
         };
         let apart = |branch: usize| {
             let label = format!("{} against cold", looks[branch].0);
-            along(&label, branch + 4, &|k, cold| {
-                (cold.latest(c) - all[branch][k].latest(c)).abs()
-            })
+            along(&label, branch + 4, &|k, cold| (cold.latest(c) - all[branch][k].latest(c)).abs())
         };
         let spread = along("spread of the sections of a point", 0, &|_, p| p.spread(c));
         let (name, unit) = [("x", "µm"), ("β", "µrad")][c as usize];
@@ -348,9 +270,7 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
     let kept = data.sweep.layout().kept();
     let running = data.values("exponent_running_per_s");
     let discard = data.sweep.plan().discard;
-    let legible: Vec<usize> = (0..points.len())
-        .filter(|&k| points[k].exponent.0 > LEAST_EXPONENT)
-        .collect();
+    let legible: Vec<usize> = (0..points.len()).filter(|&k| points[k].exponent.0 > LEAST_EXPONENT).collect();
     let chosen = 5.min(legible.len());
     let convergence = (0..chosen).map(|n| {
         let k = legible[n * (legible.len() - 1) / (chosen - 1).max(1)];
@@ -361,29 +281,13 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
     });
     let most = points.iter().map(|p| p.exponent.0).fold(0.0, f64::max);
     let exponents = |title: &str, x: Axis, lines: Vec<Curve>| {
-        let y = Axis {
-            range: Some((LEAST_EXPONENT, 1.1 * most + 1.0)),
-            ..axis("Largest Lyapunov exponent", "1/s")
-        };
-        Chart {
-            levels: vec![Level {
-                y: 0.0,
-                text: "chaos lies above".to_owned(),
-            }],
-            ..chart(title, x, y, lines)
-        }
+        let y = Axis { range: Some((LEAST_EXPONENT, 1.1 * most + 1.0)), ..axis("Largest Lyapunov exponent", "1/s") };
+        Chart { levels: vec![Level { y: 0.0, text: "chaos lies above".to_owned() }], ..chart(title, x, y, lines) }
     };
-    let along = Curve {
-        marker: Some(Marker::Dot),
-        ..line("exponent", along, PALETTE[0])
-    };
+    let along = Curve { marker: Some(Marker::Dot), ..line("exponent", along, PALETTE[0]) };
     vec![
         exponents("Along the sweep", parameter(series), vec![along]),
-        exponents(
-            "How it converges",
-            axis("Periods run", ""),
-            convergence.collect(),
-        ),
+        exponents("How it converges", axis("Periods run", ""), convergence.collect()),
     ]
 }
 
@@ -398,12 +302,7 @@ fn map(found: &Findings) -> Vec<Chart> {
             scale,
             names,
         }),
-        ..chart(
-            title,
-            parameter(Series::Clearance),
-            parameter(Series::Friction),
-            Vec::new(),
-        )
+        ..chart(title, parameter(Series::Clearance), parameter(Series::Friction), Vec::new())
     };
     let regimes = data.values("regime");
     let mut codes: Vec<i64> = regimes.iter().map(|r| *r as i64).collect();
@@ -421,21 +320,9 @@ fn map(found: &Findings) -> Vec<Chart> {
     let size = |title: &str, values: Vec<f64>, scale: Axis| heat(title, values, scale, Vec::new());
     vec![
         heat("Regime", regimes.clone(), Axis::default(), names.collect()),
-        size(
-            "Peak contact force of any joint",
-            hardest.collect(),
-            axis("", "N"),
-        ),
-        size(
-            "Largest probe error, settled",
-            data.values("probe_error_max_um"),
-            axis("", "µm"),
-        ),
-        size(
-            "Time in which a disturbance falls to 1/e",
-            memory.collect(),
-            logarithmic("", "s"),
-        ),
+        size("Peak contact force of any joint", hardest.collect(), axis("", "N")),
+        size("Largest probe error, settled", data.values("probe_error_max_um"), axis("", "µm")),
+        size("Time in which a disturbance falls to 1/e", memory.collect(), logarithmic("", "s")),
     ]
 }
 
@@ -446,18 +333,10 @@ fn probe(found: &Findings) -> Vec<Chart> {
         line(label, values.collect(), PALETTE[colour])
     };
     let error = column_of("probe_error_m");
-    let settled = vec![
-        along("largest", "probe_error_max_um", 4),
-        along("root mean square", "probe_error_rms_um", 0),
-    ];
+    let settled = vec![along("largest", "probe_error_max_um", 4), along("root mean square", "probe_error_rms_um", 0)];
     let first = of_series(found, Series::Clearance, error);
     vec![
-        chart(
-            "Settled, against clearance",
-            parameter(Series::Clearance),
-            of_column(error),
-            settled,
-        ),
+        chart("Settled, against clearance", parameter(Series::Clearance), of_column(error), settled),
         columns(&first, PAPER.period, "The first period", 1),
     ]
 }

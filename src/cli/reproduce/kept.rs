@@ -25,17 +25,11 @@ impl Kept {
         let mut name = out.components().as_path().as_os_str().to_owned();
         name.push(".partial");
         let folder = PathBuf::from(name);
-        create_folders(&folder)
-            .map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
+        create_folders(&folder).map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
         let part = |data: &crate::analysis::reproduction::SweepData| {
             let blocks: Vec<usize> = (0..data.sweep.grid().blocks()).collect();
             let settings = meta(&data.sweep);
-            Partial::open(
-                &folder.join(data.file_name()),
-                &settings,
-                &data.sweep,
-                &blocks,
-            )
+            Partial::open(&folder.join(data.file_name()), &settings, &data.sweep, &blocks)
         };
         let parts = work.sweeps().iter().map(part);
         let parts = parts.collect::<Result<_, Failure>>()?;
@@ -72,12 +66,7 @@ impl Kept {
     ///
     /// # Errors
     /// The file system.
-    pub(super) fn keep(
-        &mut self,
-        work: &Agenda,
-        job: usize,
-        outcome: &Outcome,
-    ) -> Result<(), Failure> {
+    pub(super) fn keep(&mut self, work: &Agenda, job: usize, outcome: &Outcome) -> Result<(), Failure> {
         match (work.block(job), outcome) {
             (Some((s, b)), Outcome::Block(records)) => self.parts[s].append(b, records),
             _ => Ok(()),
@@ -88,10 +77,7 @@ impl Kept {
     pub(super) fn remove(self) {
         self.parts.into_iter().for_each(Partial::remove);
         if let Err(error) = remove_empty_folder(&self.folder) {
-            warn(&format!(
-                "{} is not needed any more and could not be removed: {error}",
-                self.folder.display()
-            ));
+            warn(&format!("{} is not needed any more and could not be removed: {error}", self.folder.display()));
         }
     }
 }

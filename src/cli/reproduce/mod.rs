@@ -28,11 +28,7 @@ use crate::files::Folder;
 pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     // From here on there is a scratch folder, which an interrupted run removes.
     interrupt::listen();
-    let extent = if arguments.quick {
-        Extent::QUICK
-    } else {
-        Extent::FULL
-    };
+    let extent = if arguments.quick { Extent::QUICK } else { Extent::FULL };
     let threads = threads(arguments.threads);
     let started = Instant::now();
     let folder = Folder::claim(&arguments.out, arguments.force)?;
@@ -42,20 +38,11 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
 }
 
 /// Computes a report into `folder`, which becomes `out`.
-fn make(
-    folder: Folder,
-    out: &Path,
-    extent: Extent,
-    threads: usize,
-    quiet: bool,
-) -> Result<Report, Failure> {
+fn make(folder: Folder, out: &Path, extent: Extent, threads: usize, quiet: bool) -> Result<Report, Failure> {
     let work = Agenda::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
     let mut kept = Kept::open(out, &work)?;
     if kept.is_begun() && !quiet {
-        warn(&format!(
-            "going on where {} stopped",
-            kept.folder().display()
-        ));
+        warn(&format!("going on where {} stopped", kept.folder().display()));
     }
     let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
     let bar = progress::bar(!quiet, length.ceil() as u64);
@@ -69,15 +56,9 @@ fn make(
 }
 
 /// Writes all files into `folder`; returns their provenance.
-fn fill(
-    folder: &Folder,
-    report: &Report,
-    kept: &Kept,
-) -> Result<serde_json::Map<String, Json>, Failure> {
+fn fill(folder: &Folder, report: &Report, kept: &Kept) -> Result<serde_json::Map<String, Json>, Failure> {
     data::write(folder, report)?;
-    let drawn = [&report.corrected, &report.printed]
-        .map(figures::all)
-        .concat();
+    let drawn = [&report.corrected, &report.printed].map(figures::all).concat();
     let mut pictures = page::Pictures::new();
     for (name, sheet) in drawn {
         if interrupt::asked() {
@@ -115,10 +96,7 @@ fn command(report: &Report) -> &'static str {
 fn interrupted(kept: &Kept) -> Failure {
     Failure::new(
         Failure::INTERRUPTED,
-        format!(
-            "interrupted; no report was written, and the same command goes on from {}",
-            kept.folder().display()
-        ),
+        format!("interrupted; no report was written, and the same command goes on from {}", kept.folder().display()),
     )
 }
 

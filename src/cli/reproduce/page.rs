@@ -7,9 +7,7 @@ use super::figures::picture_name;
 use super::statements::words;
 use super::text::{self, NONE, capital, escape, shown, typeset};
 use super::{Score, command, meta, scatter};
-use crate::analysis::paper::{
-    Agreement, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows, Variant,
-};
+use crate::analysis::paper::{Agreement, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows, Variant};
 use crate::analysis::reproduction::{Extent, Findings, Report, SettledPoint, Statement};
 use crate::analysis::response::Response;
 use crate::cli::output::significant;
@@ -52,11 +50,7 @@ fn contents() -> String {
     let mut out = String::new();
     for section in &PAPER.sections {
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "<li><a href=\"#{}\">{}</a><ol>",
-            section.id, section.title
-        );
+        let _ = writeln!(out, "<li><a href=\"#{}\">{}</a><ol>", section.id, section.title);
         for Figure { name, heading, .. } in &section.figures {
             let _ = writeln!(out, "<li><a href=\"#{name}\">{heading}</a></li>");
         }
@@ -68,11 +62,7 @@ fn contents() -> String {
 /// Every figure of a model, section by section, with the tables that belong to it.
 fn figures(found: &Findings, pictures: &Pictures) -> String {
     let comparisons = found.comparisons();
-    let (level, of) = if *found.variant == PAPER.variants.corrected {
-        (2, "")
-    } else {
-        (3, ", (13) as printed")
-    };
+    let (level, of) = if *found.variant == PAPER.variants.corrected { (2, "") } else { (3, ", (13) as printed") };
     let mut out = String::new();
     for section in &PAPER.sections {
         let (id, title) = (picture_name(found.variant, &section.id), &section.title);
@@ -87,15 +77,9 @@ fn figures(found: &Findings, pictures: &Pictures) -> String {
 
 fn figure(entry: &Figure, variant: &Variant, pictures: &Pictures) -> String {
     let name = picture_name(variant, &entry.name);
-    let Figure {
-        heading, caption, ..
-    } = entry;
+    let Figure { heading, caption, .. } = entry;
     // The height follows the width of the page.
-    let svg = pictures[&name].replacen(
-        "<svg ",
-        &format!("<svg role=\"img\" aria-label=\"{heading}\" "),
-        1,
-    );
+    let svg = pictures[&name].replacen("<svg ", &format!("<svg role=\"img\" aria-label=\"{heading}\" "), 1);
     format!(
         "<h3 id=\"{name}\">{heading}</h3>\n<figure>\n<div class=\"plot\">{}</div>\n<figcaption>{caption} <a href=\"plots/{name}.svg\">SVG</a>, \
          <a href=\"plots/{name}.png\">PNG</a>.</figcaption>\n</figure>\n",
@@ -107,11 +91,7 @@ fn figure(entry: &Figure, variant: &Variant, pictures: &Pictures) -> String {
 fn after(figure: &Figure, comparisons: &[Comparison], found: &Findings) -> String {
     let own = |c: &&Comparison| figure.contains(&c.published.figure);
     let own: Vec<&Comparison> = comparisons.iter().filter(own).collect();
-    let numbers = if own.is_empty() {
-        String::new()
-    } else {
-        numbers(&own)
-    };
+    let numbers = if own.is_empty() { String::new() } else { numbers(&own) };
     let more = match figure.shows {
         Shows::Verification(_) => verification(found),
         Shows::Drift => drift(found),
@@ -135,11 +115,7 @@ fn badge(agreement: Agreement) -> String {
 
 /// Two decimals, or two digits of a small number.
 fn ratio(value: f64) -> String {
-    if value < 0.1 {
-        typeset(&significant(value, 2))
-    } else {
-        format!("{value:.2}")
-    }
+    if value < 0.1 { typeset(&significant(value, 2)) } else { format!("{value:.2}") }
 }
 
 /// Clearance and friction of the run, as tables name it.
@@ -174,9 +150,8 @@ fn numbers(rows: &[&Comparison]) -> String {
 /// The largest force of any joint, which depends less on which joint happens to be hit first.
 fn strongest(comparisons: &[Comparison], figures: &[String]) -> String {
     let row = |figure: &String| {
-        let own = |c: &&Comparison| {
-            c.published.figure == *figure && FigureValue::NORMAL.contains(&c.published.quantity)
-        };
+        let own =
+            |c: &&Comparison| c.published.figure == *figure && FigureValue::NORMAL.contains(&c.published.quantity);
         let own: Vec<&Comparison> = comparisons.iter().filter(own).collect();
         let most = |of: fn(&Comparison) -> f64| own.iter().map(|c| of(c)).fold(0.0, f64::max);
         let (paper, here) = (most(|c| c.published.value), most(|c| c.full));
@@ -203,17 +178,10 @@ fn verification(found: &Findings) -> String {
         let of = |run: &Response| [shown(quantity.of(run)), shown(quantity.sampled(run))];
         let mut row = vec![figure.to_owned(), what(quantity)];
         row.extend(paper.map(shown));
-        row.extend(
-            [&found.runs[0], &found.lagrange]
-                .map(|run| of(&run.response))
-                .concat(),
-        );
+        row.extend([&found.runs[0], &found.lagrange].map(|run| of(&run.response)).concat());
         row
     };
-    let peaks = PAPER
-        .verification
-        .iter()
-        .map(|v| row(&v.figure, v.quantity, [Some(v.own), Some(v.commercial)]));
+    let peaks = PAPER.verification.iter().map(|v| row(&v.figure, v.quantity, [Some(v.own), Some(v.commercial)]));
     let forces = FigureValue::NORMAL.map(|quantity| row("", quantity, [None, None]));
     format!(
         "<p>The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:</p>\n{}",
@@ -247,11 +215,8 @@ fn runs(found: &Findings, series: Series) -> String {
         ),
         found.sections(series).iter().map(|run| {
             let (exponent, error) = run.exponent;
-            let mut row = vec![
-                shown(run.value),
-                text::regime(run.regime),
-                format!("{} ± {}", shown(exponent), two(error)),
-            ];
+            let mut row =
+                vec![shown(run.value), text::regime(run.regime), format!("{} ± {}", shown(exponent), two(error))];
             for c in Coordinate::ALL {
                 row.push(typeset(&format!("{:.4}", run.latest(c) * 1e3)));
                 row.push(two(run.spread(c) * 1e6));
@@ -266,9 +231,7 @@ fn branches(found: &Findings, series: Series) -> String {
     let most = |other: &[SettledPoint]| {
         Coordinate::ALL.map(|c| {
             let pairs = cold.iter().zip(other);
-            pairs
-                .map(|(a, b)| (a.latest(c) - b.latest(c)).abs() * 1e6)
-                .fold(0.0, f64::max)
+            pairs.map(|(a, b)| (a.latest(c) - b.latest(c)).abs() * 1e6).fold(0.0, f64::max)
         })
     };
     let (up, down) = (most(up), most(down));
@@ -301,12 +264,7 @@ fn probe(found: &Findings) -> String {
         (0..rows).map(|n| {
             let k = n * (data.points.len() - 1) / (rows - 1).max(1);
             let clearance = data.points[k].value;
-            vec![
-                shown(clearance),
-                shown(largest[k]),
-                shown(rms[k]),
-                significant(largest[k] / (clearance * 1e3), 3),
-            ]
+            vec![shown(clearance), shown(largest[k]), shown(rms[k]), significant(largest[k] / (clearance * 1e3), 3)]
         }),
     )
 }
@@ -325,10 +283,7 @@ fn statement_table(statements: &[Statement]) -> String {
                     escape(&typeset(&criterion)),
                     escape(&typeset(&evidence))
                 ),
-                format!(
-                    "<span class=\"{class}\">{}</span>",
-                    text::verdict(s.confirmed)
-                ),
+                format!("<span class=\"{class}\">{}</span>", text::verdict(s.confirmed)),
             ]
         }),
     )
@@ -379,10 +334,7 @@ mod tests {
         let claim = Claim {
             place: hostile.clone(),
             says: hostile.clone(),
-            test: Test::Hardest {
-                joint: 1,
-                run: PAPER.runs[0],
-            },
+            test: Test::Hardest { joint: 1, run: PAPER.runs[0] },
         };
         let statement = Statement {
             claim: Box::leak(Box::new(claim)),

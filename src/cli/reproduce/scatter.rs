@@ -30,11 +30,7 @@ fn models(report: &Report) -> Vec<Model<'_>> {
     let both = [&report.corrected, &report.printed].into_iter();
     let both = both.map(|found| {
         let runs = Series::Clearance.cases().map(|case| found.run(case));
-        (
-            found.variant,
-            runs.to_vec(),
-            found.sections(Series::Clearance),
-        )
+        (found.variant, runs.to_vec(), found.sections(Series::Clearance))
     });
     let combined = report.combinations.iter();
     let combined = combined.map(|c| (c.variant, c.runs.iter().collect(), &c.sections.points[..]));
@@ -47,42 +43,18 @@ fn models(report: &Report) -> Vec<Model<'_>> {
 }
 
 /// What is compared: a heading, the value for a run and its sections, and the paper's quantity if it prints one.
-type Measure = (
-    &'static str,
-    fn(&RecordedRun, &SettledPoint) -> f64,
-    Option<FigureValue>,
-);
+type Measure = (&'static str, fn(&RecordedRun, &SettledPoint) -> f64, Option<FigureValue>);
 
 const MEASURES: [Measure; 6] = {
     use Coordinate::{Beta, X};
     use FigureValue::{LastSeparation, RateBeta};
     [
-        (
-            "Section in x, from 203 mm (µm)",
-            |_, s| (s.latest(X) - MEAN_X) * 1e6,
-            None,
-        ),
-        (
-            "Spread of the sections in x (µm)",
-            |_, s| s.spread(X) * 1e6,
-            None,
-        ),
-        (
-            "Spread of the sections in β (µrad)",
-            |_, s| s.spread(Beta) * 1e6,
-            None,
-        ),
+        ("Section in x, from 203 mm (µm)", |_, s| (s.latest(X) - MEAN_X) * 1e6, None),
+        ("Spread of the sections in x (µm)", |_, s| s.spread(X) * 1e6, None),
+        ("Spread of the sections in β (µrad)", |_, s| s.spread(Beta) * 1e6, None),
         ("Largest Lyapunov exponent (1/s)", |_, s| s.exponent.0, None),
-        (
-            "Last separation in the first period (s)",
-            |run, _| LastSeparation.of(&run.response),
-            Some(LastSeparation),
-        ),
-        (
-            "Largest angular rate of β (rad/s)",
-            |run, _| RateBeta.of(&run.response),
-            Some(RateBeta),
-        ),
+        ("Last separation in the first period (s)", |run, _| LastSeparation.of(&run.response), Some(LastSeparation)),
+        ("Largest angular rate of β (rad/s)", |run, _| RateBeta.of(&run.response), Some(RateBeta)),
     ]
 };
 
@@ -95,9 +67,7 @@ fn clearances(models: &[Model]) -> String {
     let mut rows = Vec::new();
     for (what, of, quantity) in MEASURES {
         if let Some(quantity) = quantity {
-            let values = Series::Clearance
-                .cases()
-                .map(|case| printed(case, quantity));
+            let values = Series::Clearance.cases().map(|case| printed(case, quantity));
             rows.push(row(what, "the paper", values));
         }
         for model in models {
@@ -105,13 +75,8 @@ fn clearances(models: &[Model]) -> String {
             rows.push(row(what, model.title, values));
         }
     }
-    let heads = Series::Clearance
-        .cases()
-        .map(|case| Series::Clearance.run_name(case));
-    html(
-        &format!("Quantity .what | Model | {} .n", heads.join(" .n | ")),
-        rows,
-    )
+    let heads = Series::Clearance.cases().map(|case| Series::Clearance.run_name(case));
+    html(&format!("Quantity .what | Model | {} .n", heads.join(" .n | ")), rows)
 }
 
 fn sweeps(report: &Report) -> String {
@@ -149,26 +114,16 @@ type Both<'a> = (&'a Statement, &'a Statement);
 /// Statements whose verdict changes with (13) as printed.
 fn turned_table(turned: &[Both]) -> String {
     if turned.is_empty() {
-        return "<p>No statement of the paper comes out otherwise with (13) as printed.</p>\n"
-            .to_owned();
+        return "<p>No statement of the paper comes out otherwise with (13) as printed.</p>\n".to_owned();
     }
     let cell = |s: &Statement| {
-        format!(
-            "{}<br><span class=\"evidence\">{}</span>",
-            text::verdict(s.confirmed),
-            escape(&typeset(&words(s).1))
-        )
+        format!("{}<br><span class=\"evidence\">{}</span>", text::verdict(s.confirmed), escape(&typeset(&words(s).1)))
     };
     format!(
         "<p>Statements of the paper that come out otherwise:</p>\n{}",
         html(
             "Place | Statement | As corrected | (13) as printed",
-            turned.iter().map(|(a, b)| vec![
-                escape(&a.claim.place),
-                escape(&typeset(&a.claim.says)),
-                cell(a),
-                cell(b)
-            ])
+            turned.iter().map(|(a, b)| vec![escape(&a.claim.place), escape(&typeset(&a.claim.says)), cell(a), cell(b)])
         )
     )
 }
@@ -193,12 +148,8 @@ pub(super) fn gaps(report: &Report, statements: &[Statement]) -> Vec<(&'static s
     let models = models(report);
     let mut nearest = Vec::new();
     for measure in MEASURES.into_iter().filter(|m| m.2.is_some()) {
-        let each = models
-            .iter()
-            .filter_map(|m| Some((m.title, off(m, measure)?)));
-        let each: Vec<String> = each
-            .map(|(title, off)| format!("{} {}", escape(title), significant(off, 3)))
-            .collect();
+        let each = models.iter().filter_map(|m| Some((m.title, off(m, measure)?)));
+        let each: Vec<String> = each.map(|(title, off)| format!("{} {}", escape(title), significant(off, 3))).collect();
         nearest.push(format!("<li>{}: {}</li>", measure.0, each.join("; ")));
     }
     let told_apart = |model: &Model| {

@@ -14,15 +14,12 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
             let (at, unit) = (Series::Clearance.run_name(run), unit(coordinate));
             let (most, share) = (found[0].0 * 1e3, percent(found[0].1, 1));
             (
-                format!(
-                    "at {at}, {coordinate} leaves the ideal motion by less than {little} % of its amplitude"
-                ),
+                format!("at {at}, {coordinate} leaves the ideal motion by less than {little} % of its amplitude"),
                 format!("{at}: at most {most:.3} m{unit}, {share} of the amplitude"),
             )
         }
         (&Test::Grows { of, with }, Values(values)) => (
-            "larger at each of the three values than at the one before, in continuous time"
-                .to_owned(),
+            "larger at each of the three values than at the one before, in continuous time".to_owned(),
             each(with, values, |v| format!("{} {}", digits(*v, 6), of.unit())),
         ),
         (Test::AllGrow(_), Count(held, of)) => (
@@ -32,12 +29,8 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
         (&Test::Exceeds { of, that, over }, Pairs(pairs)) => {
             let (unit, other) = (of.unit(), that.unit());
             (
-                format!(
-                    "its peak is the larger number, {unit} against {other}, at all three {over}s"
-                ),
-                each(over, pairs, |(large, small)| {
-                    format!("{large:.0} {unit} and {small:.0} {other}")
-                }),
+                format!("its peak is the larger number, {unit} against {other}, at all three {over}s"),
+                each(over, pairs, |(large, small)| format!("{large:.0} {unit} and {small:.0} {other}")),
             )
         }
         (&Test::NoRule { of, with }, Values(values)) => (
@@ -47,9 +40,7 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
         (&Test::DiffersMore { of, than, with }, Values(shares)) => {
             let listed = [of, than].into_iter().zip(shares);
             (
-                format!(
-                    "over the three {with}s the {of} differs by a larger share of its mean than the {than}"
-                ),
+                format!("over the three {with}s the {of} differs by a larger share of its mean than the {than}"),
                 join(listed.map(|(of, share)| format!("{of}: {}", percent(*share, 1)))),
             )
         }
@@ -66,18 +57,10 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
         ),
         (Test::Hardest { .. }, Joints(forces)) => (
             "that joint has the largest peak force, in continuous time".to_owned(),
-            join(
-                forces
-                    .iter()
-                    .map(|(name, force)| format!("{name}: {force:.1} N")),
-            ),
+            join(forces.iter().map(|(name, force)| format!("{name}: {force:.1} N"))),
         ),
         (Test::Coincide { columns, from, .. }, Values(shares)) => {
-            let when = if *from > 0.0 {
-                format!("from {from} s on")
-            } else {
-                "over the whole period".to_owned()
-            };
+            let when = if *from > 0.0 { format!("from {from} s on") } else { "over the whole period".to_owned() };
             let labels = columns.iter().map(|name| COLUMNS[column_of(name)].label);
             (
                 format!(
@@ -122,10 +105,7 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
             each(over, latest, |v| format!("{:.4} m{}", v * 1e3, unit(of))),
         ),
         (&Test::SectionsSpread { of, over }, Resolved(spreads, resolution)) => (
-            format!(
-                "their spread is above the resolution of {} and grows",
-                size(*resolution, of)
-            ),
+            format!("their spread is above the resolution of {} and grows", size(*resolution, of)),
             each(over, spreads, |s| size(*s, of)),
         ),
         (&Test::SectionsCrowd(over), Crowds(crowds)) => (
@@ -143,9 +123,9 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
                 Sections::Runs => {
                     format!("they lie within {little} % of the amplitude of each other")
                 }
-                Sections::Sweep => format!(
-                    "over the whole range the sections move by less than {little} % of the amplitude"
-                ),
+                Sections::Sweep => {
+                    format!("over the whole range the sections move by less than {little} % of the amplitude")
+                }
             },
             listed(Coordinate::ALL.map(Coordinate::word), shares),
         ),
@@ -166,10 +146,9 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
                 .to_owned(),
             each(over, runs, |run| regime(*run)),
         ),
-        (Test::AllPeriodic(_), Regimes(points, exponents)) => (
-            "every point is periodic 1".to_owned(),
-            format!("{}; {}", regimes(points), measured(*exponents)),
-        ),
+        (Test::AllPeriodic(_), Regimes(points, exponents)) => {
+            ("every point is periodic 1".to_owned(), format!("{}; {}", regimes(points), measured(*exponents)))
+        }
         (Test::PeriodicToChaotic(over), Regimes(points, exponents)) => (
             format!(
                 "the smallest {over} is periodic, the largest chaotic (exponent above 0 by more than its uncertainty)"
@@ -179,9 +158,7 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
         (Test::ChaosGrows(over), Halves([(below, narrow), (above, wide)])) => {
             let [narrow, wide] = [narrow, wide].map(|spread| size(*spread, Coordinate::Beta));
             (
-                format!(
-                    "more chaotic points in the upper half of the {over}s than in the lower half"
-                ),
+                format!("more chaotic points in the upper half of the {over}s than in the lower half"),
                 format!(
                     "{below} chaotic points below, {above} above; largest spread of beta {narrow} below, {wide} above"
                 ),
@@ -192,10 +169,7 @@ pub(super) fn words(statement: &Statement) -> (String, String) {
             let (chaotic, all) = (chaotic.count(), points.len());
             (
                 format!("either every {over} is chaotic or none is"),
-                format!(
-                    "{chaotic} of {all} points chaotic; {}",
-                    measured(*exponents)
-                ),
+                format!("{chaotic} of {all} points chaotic; {}", measured(*exponents)),
             )
         }
         other => unreachable!("a test has grounds of its kind: {other:?}"),
@@ -262,12 +236,9 @@ mod tests {
 
     #[test]
     fn numbers_have_as_many_digits_as_asked() {
-        for (value, text) in [
-            (0.154_943_9, "0.154944"),
-            (827.324_51, "827.325"),
-            (-1.0, "-1.00000"),
-            (3e-9, "3.00000e-9"),
-        ] {
+        for (value, text) in
+            [(0.154_943_9, "0.154944"), (827.324_51, "827.325"), (-1.0, "-1.00000"), (3e-9, "3.00000e-9")]
+        {
             assert_eq!(digits(value, 6), text);
         }
         assert_eq!(digits(1.0, 1), "1");

@@ -6,9 +6,7 @@ use crate::analysis::reproduction::{Findings, Report, SweepData};
 use crate::cli::output::significant;
 
 pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Shown where there is no number.
@@ -25,31 +23,21 @@ pub(super) fn typeset(text: &str) -> String {
     let all: Vec<char> = text.chars().collect();
     let is = |at: usize, test: fn(char) -> bool| all.get(at).is_some_and(|&c| test(c));
     let after = |at: usize, test: fn(char) -> bool| at > 0 && is(at - 1, test);
-    let digits = |from: usize| {
-        (from..)
-            .take_while(|&k| is(k, |c| c.is_ascii_digit()))
-            .count()
-    };
+    let digits = |from: usize| (from..).take_while(|&k| is(k, |c| c.is_ascii_digit())).count();
     let mut out = String::with_capacity(text.len());
     let mut at = 0;
     while let Some(&c) = all.get(at) {
         let sign = usize::from(is(at + 1, |c| c == '-' || c == '+'));
         let length = digits(at + 1 + sign);
         let end = at + 1 + sign + length;
-        if c == 'e'
-            && length > 0
-            && after(at, |c| c.is_ascii_digit())
-            && !is(end, char::is_alphanumeric)
-        {
+        if c == 'e' && length > 0 && after(at, |c| c.is_ascii_digit()) && !is(end, char::is_alphanumeric) {
             out.push_str("·10");
             if sign == 1 && all[at + 1] == '-' {
                 out.push('⁻');
             }
             let power = all[at + 1 + sign..end].iter().collect::<String>();
-            let raised = |c: char| {
-                c.to_digit(10)
-                    .map(|d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize])
-            };
+            let raised =
+                |c: char| c.to_digit(10).map(|d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize]);
             out.extend(power.trim_start_matches('0').chars().filter_map(raised));
             at = end;
             continue;
@@ -62,8 +50,7 @@ pub(super) fn typeset(text: &str) -> String {
             at += 4;
             continue;
         }
-        let minus =
-            c == '-' && is(at + 1, |c| c.is_ascii_digit()) && !after(at, |c| c != ' ' && c != '(');
+        let minus = c == '-' && is(at + 1, |c| c.is_ascii_digit()) && !after(at, |c| c != ' ' && c != '(');
         out.push(if minus { '\u{2212}' } else { c });
         at += 1;
     }
@@ -74,19 +61,13 @@ pub(super) fn typeset(text: &str) -> String {
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     match (letters.next(), text.split(' ').next()) {
-        (Some(first), Some(word)) if !["x", "beta"].contains(&word) => {
-            first.to_uppercase().chain(letters).collect()
-        }
+        (Some(first), Some(word)) if !["x", "beta"].contains(&word) => first.to_uppercase().chain(letters).collect(),
         _ => text.to_owned(),
     }
 }
 
 pub(super) fn verdict(confirmed: bool) -> &'static str {
-    if confirmed {
-        "confirmed"
-    } else {
-        "not confirmed"
-    }
+    if confirmed { "confirmed" } else { "not confirmed" }
 }
 
 /// Word for the regime of a motion that did not reach its end.
@@ -123,10 +104,7 @@ pub(super) fn simulated(report: &Report) -> f64 {
     };
     let combinations = report.combinations.iter();
     let combinations = combinations.map(|c| c.runs.len() + of_sweep(&c.sections));
-    let periods = 1
-        + of_findings(&report.corrected)
-        + of_findings(&report.printed)
-        + combinations.sum::<usize>();
+    let periods = 1 + of_findings(&report.corrected) + of_findings(&report.printed) + combinations.sum::<usize>();
     PAPER.period * periods as f64
 }
 
@@ -138,16 +116,10 @@ mod tests {
     fn numbers_and_names_are_set_as_in_print() {
         for (text, set) in [
             ("9.06117e-4 rad", "9.06117·10⁻⁴ rad"),
-            (
-                "-1.305e-05 and -18.26 to -0.89 1/s",
-                "−1.305·10⁻⁵ and −18.26 to −0.89 1/s",
-            ),
+            ("-1.305e-05 and -18.26 to -0.89 1/s", "−1.305·10⁻⁵ and −18.26 to −0.89 1/s"),
             ("2e+12, 3e7", "2·10¹², 3·10⁷"),
             ("rate of beta, beta", "rate of β, β"),
-            (
-                "betas, alphabeta, 0-1 test, 12 edges, 4e",
-                "betas, alphabeta, 0-1 test, 12 edges, 4e",
-            ),
+            ("betas, alphabeta, 0-1 test, 12 edges, 4e", "betas, alphabeta, 0-1 test, 12 edges, 4e"),
             ("", ""),
         ] {
             assert_eq!(typeset(text), set);
@@ -156,11 +128,7 @@ mod tests {
 
     #[test]
     fn sentences_begin_with_a_capital_but_for_coordinates() {
-        for (text, set) in [
-            ("rate of beta", "Rate of beta"),
-            ("x", "x"),
-            ("beta less ideal", "beta less ideal"),
-        ] {
+        for (text, set) in [("rate of beta", "Rate of beta"), ("x", "x"), ("beta less ideal", "beta less ideal")] {
             assert_eq!(capital(text), set);
         }
     }

@@ -42,16 +42,11 @@ pub const SHARD: &str = "shard";
 /// # Errors
 /// Usage.
 pub fn check_ending(path: &Path) -> Result<(), Failure> {
-    let npz = path
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
+    let npz = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
     if npz {
         return Ok(());
     }
-    Err(Failure::usage(format!(
-        "--out {}: a sweep is written as a NumPy archive; use the ending .npz",
-        path.display()
-    )))
+    Err(Failure::usage(format!("--out {}: a sweep is written as a NumPy archive; use the ending .npz", path.display())))
 }
 
 impl Archive {
@@ -61,9 +56,10 @@ impl Archive {
         let layout = sweep.layout();
         let axes = grid.axes().iter();
         let axes = axes.map(|axis| (axis.key().to_owned(), axis.values().collect()));
-        let columns = layout.columns().iter().map(|column| {
-            json!({"name": column.name, "whole": column.whole, "per_section": column.per_section})
-        });
+        let columns = layout
+            .columns()
+            .iter()
+            .map(|column| json!({"name": column.name, "whole": column.whole, "per_section": column.per_section}));
         meta.insert("kept".into(), json!(layout.kept()));
         meta.insert("arrays".into(), Json::Array(columns.collect()));
         let points = shard.map(|shard| {
@@ -71,13 +67,7 @@ impl Archive {
             let blocks = (0..grid.blocks()).filter(|&b| shard.has(b));
             blocks.flat_map(|b| grid.block(b)).collect()
         });
-        Self {
-            meta,
-            axes: axes.collect(),
-            columns: layout.columns().to_vec(),
-            kept: layout.kept(),
-            points,
-        }
+        Self { meta, axes: axes.collect(), columns: layout.columns().to_vec(), kept: layout.kept(), points }
     }
 
     /// The archive of a whole sweep as its shards describe it; `None` if `meta` is not that of a sweep.
@@ -91,13 +81,7 @@ impl Archive {
             })
         };
         let columns = meta.get("arrays")?.as_array()?.iter().map(column);
-        Some(Self {
-            columns: columns.collect::<Option<Vec<_>>>()?,
-            meta,
-            axes,
-            kept,
-            points: None,
-        })
+        Some(Self { columns: columns.collect::<Option<Vec<_>>>()?, meta, axes, kept, points: None })
     }
 
     /// Provenance.
@@ -116,9 +100,7 @@ impl Archive {
     /// Name of each array, whether it holds integers, and its number of values per point.
     pub fn names(&self) -> Vec<(String, bool, usize)> {
         let columns = self.columns.iter();
-        columns
-            .map(|c| (c.name.clone(), c.whole, self.length(c)))
-            .collect()
+        columns.map(|c| (c.name.clone(), c.whole, self.length(c))).collect()
     }
 
     /// All values of the array called `name`; empty if there is none.

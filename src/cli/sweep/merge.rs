@@ -53,19 +53,13 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
                 "{} and {} are shards of different sweeps: {}",
                 parts[0].path.display(),
                 part.path.display(),
-                super::partial::difference(
-                    &Json::Object(meta.clone()),
-                    &Json::Object(part.meta.clone())
-                ),
+                super::partial::difference(&Json::Object(meta.clone()), &Json::Object(part.meta.clone())),
             )));
         }
     }
     let archive = Archive::of_meta(meta, axes).ok_or_else(|| no_shard(&parts[0].path))?;
     check_points(&parts, archive.count())?;
-    let mut shards = Shards {
-        names: archive.names(),
-        parts,
-    };
+    let mut shards = Shards { names: archive.names(), parts };
     let summary = super::summarise(&archive, &mut shards)?;
     archive.write(target, &mut shards)?;
     super::report(&archive, &summary, &arguments.out, arguments.summary)
@@ -96,10 +90,7 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
         return Ok(());
     }
     // They can be named if all shards are parts of the same number.
-    let numbers: Vec<_> = parts
-        .iter()
-        .filter_map(|p| options::shard(&p.shard).ok())
-        .collect();
+    let numbers: Vec<_> = parts.iter().filter_map(|p| options::shard(&p.shard).ok()).collect();
     let of = numbers[0].of;
     let names: Vec<String> = if numbers.iter().all(|shard| shard.of == of) {
         let there = |k: &usize| numbers.iter().any(|shard| shard.number == *k);
@@ -108,31 +99,20 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     } else {
         Vec::new()
     };
-    let which = if names.is_empty() {
-        String::new()
-    } else {
-        format!("; shards not given: {}", names.join(", "))
-    };
-    Err(Failure::usage(format!(
-        "{missing} of {count} points are in none of the files{which}"
-    )))
+    let which = if names.is_empty() { String::new() } else { format!("; shards not given: {}", names.join(", ")) };
+    Err(Failure::usage(format!("{missing} of {count} points are in none of the files{which}")))
 }
 
 fn no_shard(path: &Path) -> Failure {
-    Failure::usage(format!(
-        "{} is not a shard of a sweep (jointplay sweep … --shard K/M writes them)",
-        path.display()
-    ))
+    Failure::usage(format!("{} is not a shard of a sweep (jointplay sweep … --shard K/M writes them)", path.display()))
 }
 
 impl OpenShard {
     fn open(path: &Path) -> Result<Self, Failure> {
-        let file = File::open(path)
-            .map_err(|error| Failure::io(format!("cannot read {}: {error}", path.display())))?;
+        let file = File::open(path).map_err(|error| Failure::io(format!("cannot read {}: {error}", path.display())))?;
         let mut part = Self {
             path: path.to_owned(),
-            reader: NpzReader::new(BufReader::new(file))
-                .map_err(|error| unreadable(path, &error))?,
+            reader: NpzReader::new(BufReader::new(file)).map_err(|error| unreadable(path, &error))?,
             meta: Map::new(),
             shard: String::new(),
             points: Vec::new(),
@@ -149,9 +129,7 @@ impl OpenShard {
         (part.meta, part.shard) = (meta, shard);
         let points: ArrayD<i64> = part.array("point")?;
         let points = points.iter().map(|&point| usize::try_from(point));
-        part.points = points
-            .collect::<Result<_, _>>()
-            .map_err(|_| no_shard(path))?;
+        part.points = points.collect::<Result<_, _>>().map_err(|_| no_shard(path))?;
         Ok(part)
     }
 
@@ -175,10 +153,7 @@ impl OpenShard {
 }
 
 fn unreadable(path: &Path, error: &ReadNpzError) -> Failure {
-    Failure::io(format!(
-        "cannot read {} as a shard of a sweep: {error}",
-        path.display()
-    ))
+    Failure::io(format!("cannot read {} as a shard of a sweep: {error}", path.display()))
 }
 
 /// All shards of a sweep as one source.
@@ -212,9 +187,7 @@ impl Source for Shards {
             }
             for (point, values) in part.points.iter().zip(values.exact_chunks(length)) {
                 let out = &mut out[point * length..(point + 1) * length];
-                out.iter_mut()
-                    .zip(values)
-                    .for_each(|(out, value)| *out = *value);
+                out.iter_mut().zip(values).for_each(|(out, value)| *out = *value);
             }
         }
         Ok(())

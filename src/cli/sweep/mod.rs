@@ -48,29 +48,20 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
         None => None,
     };
     let archive = Archive::of_sweep(meta(&sweep), &sweep, shard.as_ref());
-    let blocks: Vec<usize> = (0..sweep.grid().blocks())
-        .filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b)))
-        .collect();
+    let blocks: Vec<usize> =
+        (0..sweep.grid().blocks()).filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b))).collect();
     if !arguments.quiet {
         warnings(&sweep).iter().for_each(|warning| warn(warning));
     }
     let mut partial = Partial::open(&arguments.out, archive.meta(), &sweep, &blocks)?;
-    let todo: Vec<usize> = blocks
-        .iter()
-        .copied()
-        .filter(|b| !partial.has(*b))
-        .collect();
+    let todo: Vec<usize> = blocks.iter().copied().filter(|b| !partial.has(*b)).collect();
     let points = |blocks: &[usize]| -> u64 {
         let lengths = blocks.iter().map(|&b| sweep.grid().block(b).len() as u64);
         lengths.sum()
     };
     let (all, left) = (points(&blocks), points(&todo));
     if left < all && !arguments.quiet {
-        warn(&format!(
-            "going on where {} stopped: {} of {all} points are done",
-            partial.path().display(),
-            all - left
-        ));
+        warn(&format!("going on where {} stopped: {} of {all} points are done", partial.path().display(), all - left));
     }
     interrupt::listen();
     let bar = progress::bar(!arguments.quiet, all);
@@ -83,12 +74,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     outcome?;
     if todo.iter().any(|b| !partial.has(*b)) {
-        let left = points(
-            &blocks
-                .into_iter()
-                .filter(|b| !partial.has(*b))
-                .collect::<Vec<_>>(),
-        );
+        let left = points(&blocks.into_iter().filter(|b| !partial.has(*b)).collect::<Vec<_>>());
         return Err(Failure::new(
             Failure::INTERRUPTED,
             format!(
@@ -109,10 +95,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
 fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
     let scene = load(&arguments.scene)?;
     let usage = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
-    let axes = arguments
-        .vary
-        .iter()
-        .map(|text| ParameterRange::parse(&scene, text));
+    let axes = arguments.vary.iter().map(|text| ParameterRange::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>().map_err(|e| usage(&e))?;
     let grid = Grid::new(&scene, axes, arguments.start).map_err(|e| usage(&e))?;
     let plan = Plan {
@@ -143,10 +126,8 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
         drive_period(&scene).ok()
     });
     let period = period.filter(|_| period == other);
-    let mut words: Map<String, Json> = Regime::ALL
-        .iter()
-        .map(|regime| (regime.code().to_string(), json!(regime.word())))
-        .collect();
+    let mut words: Map<String, Json> =
+        Regime::ALL.iter().map(|regime| (regime.code().to_string(), json!(regime.word()))).collect();
     words.insert("-1".to_owned(), json!("none"));
     let own = json!({
         "scene_crc32": format!("{:08x}", crc32fast::hash(scene.source.text.as_bytes())),
@@ -214,8 +195,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         ));
     }
     let solver = &sweep.scene().solver;
-    let loose =
-        solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
+    let loose = solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
     if loose && sweep.plan().exponent {
         all.push(format!(
             "solver.tolerance {:e}: integration error alone separates two runs at this tolerance, so exponents and the \
@@ -279,14 +259,8 @@ fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, 
     let with = |values: &[f64], code: i64| values.iter().filter(|v| **v == code as f64).count();
     let mut summary = Map::new();
     summary.insert("points".into(), json!(statuses.len()));
-    summary.insert(
-        "diverged".into(),
-        json!(with(&statuses, Status::Diverged.code())),
-    );
-    summary.insert(
-        "no_start".into(),
-        json!(with(&statuses, Status::NoStart.code())),
-    );
+    summary.insert("diverged".into(), json!(with(&statuses, Status::Diverged.code())));
+    summary.insert("no_start".into(), json!(with(&statuses, Status::NoStart.code())));
     let words = archive.meta().get("regimes").and_then(Json::as_object);
     let counts: Map<String, Json> = words
         .into_iter()
@@ -322,19 +296,14 @@ fn report(
         }
     }
     let regimes = summary.get("regimes").and_then(Json::as_object);
-    let mut regimes: Vec<String> = regimes
-        .into_iter()
-        .flatten()
-        .map(|(word, number)| format!("{number} {word}"))
-        .collect();
+    let mut regimes: Vec<String> =
+        regimes.into_iter().flatten().map(|(word, number)| format!("{number} {word}")).collect();
     if regimes.is_empty() {
         // Happens in a shard of a sweep with fewer points than shards.
         regimes.push("none".to_owned());
     }
     let wall = summary.get("wall_s").and_then(Json::as_f64);
-    let wall = wall.map_or_else(String::new, |wall| {
-        format!("\nWall time         {wall:.1} s")
-    });
+    let wall = wall.map_or_else(String::new, |wall| format!("\nWall time         {wall:.1} s"));
     text += &format!(
         "\nRegimes           {}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
         regimes.join(", "),

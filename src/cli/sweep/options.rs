@@ -28,11 +28,7 @@ pub fn shard(text: &str) -> Result<Shard, Failure> {
         let (number, of) = (number.trim().parse().ok()?, of.trim().parse().ok()?);
         (number >= 1 && number <= of).then_some(Shard { number, of })
     };
-    parse().ok_or_else(|| {
-        Failure::usage(format!(
-            "--shard {text}: expected K/M with K from 1 to M, e.g. 3/16"
-        ))
-    })
+    parse().ok_or_else(|| Failure::usage(format!("--shard {text}: expected K/M with K from 1 to M, e.g. 3/16")))
 }
 
 /// Reads a drive phase: a fraction of the period, or an angle with its unit.
@@ -69,11 +65,7 @@ mod tests {
         for bad in ["1", "-0.1", "360deg", "2s", "", "nan", "soon"] {
             let failure = phase(bad).unwrap_err();
             assert_eq!(failure.code, Failure::USAGE, "{bad}");
-            assert!(
-                failure.message.starts_with("--phase"),
-                "{}",
-                failure.message
-            );
+            assert!(failure.message.starts_with("--phase"), "{}", failure.message);
         }
     }
 

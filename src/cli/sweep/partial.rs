@@ -48,24 +48,15 @@ impl Partial {
     ///
     /// # Errors
     /// Input/output: unreadable, damaged, in use; usage: begun with other settings.
-    pub fn open(
-        out: &Path,
-        settings: &Map<String, Json>,
-        sweep: &Sweep,
-        blocks: &[usize],
-    ) -> Result<Self, Failure> {
+    pub fn open(out: &Path, settings: &Map<String, Json>, sweep: &Sweep, blocks: &[usize]) -> Result<Self, Failure> {
         let path = Self::path_of(out);
-        let failed =
-            |error: std::io::Error| Failure::io(format!("cannot use {}: {error}", path.display()));
+        let failed = |error: std::io::Error| Failure::io(format!("cannot use {}: {error}", path.display()));
         let settings = Json::Object(settings.clone());
         let file = open_or_create(&path, &beginning(&settings)).map_err(failed)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                return Err(Failure::io(format!(
-                    "{} is in use: another run writes the same output",
-                    path.display()
-                )));
+                return Err(Failure::io(format!("{} is in use: another run writes the same output", path.display())));
             }
             // A file system without locks: avoiding two runs of one output is then up to the user.
             Err(TryLockError::Error(error)) => log::warn!("no lock: {error}"),
@@ -126,8 +117,7 @@ impl Partial {
     /// Reader positioned at the first block.
     fn reader(&self) -> Result<impl Read, Failure> {
         let mut file = &self.file;
-        file.seek(SeekFrom::Start(self.start))
-            .map_err(self.failed())?;
+        file.seek(SeekFrom::Start(self.start)).map_err(self.failed())?;
         Ok(BufReader::new(file.take(self.end - self.start)))
     }
 
@@ -139,13 +129,10 @@ impl Partial {
         let mut bytes = Vec::with_capacity(20 + 8 * records.len());
         bytes.extend((b as u64).to_le_bytes());
         bytes.extend((records.len() as u64).to_le_bytes());
-        records
-            .iter()
-            .for_each(|value| bytes.extend(value.to_le_bytes()));
+        records.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
         let mut file = &self.file;
-        file.seek(SeekFrom::Start(self.end))
-            .map_err(self.failed())?;
+        file.seek(SeekFrom::Start(self.end)).map_err(self.failed())?;
         let written = file.write_all(&bytes).and_then(|()| file.sync());
         if let Err(error) = written {
             // Best effort: a torn block is recognised as such.
@@ -160,10 +147,7 @@ impl Partial {
     /// Removes the file: its content is in the output.
     pub fn remove(self) {
         if let Err(error) = remove_file(&self.path) {
-            warn(&format!(
-                "{} is not needed any more and could not be removed: {error}",
-                self.path.display()
-            ));
+            warn(&format!("{} is not needed any more and could not be removed: {error}", self.path.display()));
         }
     }
 
@@ -173,10 +157,7 @@ impl Partial {
     }
 
     fn damaged(&self, what: &str) -> Failure {
-        Failure::io(format!(
-            "{} is damaged ({what}) and not used; delete it to start again",
-            self.path.display()
-        ))
+        Failure::io(format!("{} is damaged ({what}) and not used; delete it to start again", self.path.display()))
     }
 
     fn length(&self) -> Result<u64, Failure> {
@@ -209,8 +190,7 @@ impl Partial {
         if read_u32(&mut reader).map_err(cut)? != crc32fast::hash(&text) {
             return Err(self.damaged("its settings do not match their checksum"));
         }
-        let own: Json = serde_json::from_slice(&text)
-            .map_err(|_| self.damaged("its settings cannot be read"))?;
+        let own: Json = serde_json::from_slice(&text).map_err(|_| self.damaged("its settings cannot be read"))?;
         if own != *settings {
             return Err(Failure::usage(format!(
                 "{} was begun with other settings ({}); finish that sweep, delete the file, or choose another --out",
@@ -247,11 +227,7 @@ impl Partial {
     }
 
     /// Number and records of the next block; `None` if the file ends first.
-    fn next_block(
-        &self,
-        reader: &mut impl Read,
-        records: &mut Vec<f64>,
-    ) -> Result<Option<usize>, Failure> {
+    fn next_block(&self, reader: &mut impl Read, records: &mut Vec<f64>) -> Result<Option<usize>, Failure> {
         let foreign = || self.damaged("a block does not belong to this sweep");
         // Each number must be valid as far as it is there: foreign data is not taken for a torn block.
         let Some(b) = self.number(reader)? else {
@@ -334,11 +310,7 @@ pub fn difference(own: &Json, wanted: &Json) -> String {
     let differing = keys.find(|key| own.get(*key) != wanted.get(*key));
     let show = |value: Option<&Json>| value.map_or("none".to_owned(), Json::to_string);
     differing.map_or("in their order".to_owned(), |key| {
-        format!(
-            "{key}: {} there, {} now",
-            show(own.get(key)),
-            show(wanted.get(key))
-        )
+        format!("{key}: {} there, {} now", show(own.get(key)), show(wanted.get(key)))
     })
 }
 
@@ -369,12 +341,7 @@ mod tests {
         let scene = Scene::load("spcmm", &[]).unwrap();
         let axis = ParameterRange::parse(&scene, "contact.clearance=0.2mm..0.3mm:3").unwrap();
         let grid = Grid::new(&scene, vec![axis], Start::Cold).unwrap();
-        let plan = Plan {
-            periods: 1,
-            discard: 0,
-            phase: 0.0,
-            exponent: false,
-        };
+        let plan = Plan { periods: 1, discard: 0, phase: 0.0, exponent: false };
         let sweep = Sweep::new(scene, grid, plan).unwrap();
         let mut settings = Map::new();
         settings.insert("periods".into(), 1.into());
@@ -396,10 +363,7 @@ mod tests {
             let mut partial = open().unwrap_or_else(|e| panic!("cut at {cut}: {e}"));
             let blocks = (cut - begin) / block;
             let left: Vec<usize> = [2, 0, 1][..blocks].to_vec();
-            assert!(
-                (0..3).all(|b| partial.has(b) == left.contains(&b)),
-                "cut at {cut}"
-            );
+            assert!((0..3).all(|b| partial.has(b) == left.contains(&b)), "cut at {cut}");
             // It continues after the last whole block.
             for b in [2, 0, 1].into_iter().skip(blocks) {
                 partial.append(b, &vec![b as f64; length]).unwrap();
@@ -412,10 +376,7 @@ mod tests {
             let Err(failure) = open() else {
                 panic!("taken");
             };
-            assert!(
-                failure.message.contains("a.npz.partial is damaged"),
-                "{failure}"
-            );
+            assert!(failure.message.contains("a.npz.partial is damaged"), "{failure}");
             assert!(std::fs::read(&path).unwrap() == bytes, "left as it was");
         };
         for cut in (1..begin).step_by(97) {

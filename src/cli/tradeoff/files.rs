@@ -13,23 +13,10 @@ use crate::scene::Scene;
 const PNG_SCALE: f32 = 2.0;
 
 /// Columns of the CSV file of one phase, each after its name.
-const OF_PHASE: [&str; 8] = [
-    "end",
-    "simulated_s",
-    "wall_s",
-    "ratio",
-    "steps",
-    "evaluations",
-    "rejected",
-    "front",
-];
+const OF_PHASE: [&str; 8] = ["end", "simulated_s", "wall_s", "ratio", "steps", "evaluations", "rejected", "front"];
 
 /// Writes all files into `folder`; returns their provenance.
-pub(super) fn fill(
-    folder: &Folder,
-    found: &WorkPrecision,
-    scene: &Scene,
-) -> Result<Map<String, Json>, Failure> {
+pub(super) fn fill(folder: &Folder, found: &WorkPrecision, scene: &Scene) -> Result<Map<String, Json>, Failure> {
     let sheet = picture(found, false, &machine::name());
     let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
     let mut meta = provenance::meta(scene);
@@ -59,12 +46,7 @@ pub(super) fn fill(
 /// The reference.
 fn reference(found: &WorkPrecision) -> Result<Json, Failure> {
     let reference = &found.reference;
-    let names: Vec<&str> = reference
-        .scene()
-        .ball_joints
-        .iter()
-        .map(|j| j.name.as_str())
-        .collect();
+    let names: Vec<&str> = reference.scene().ball_joints.iter().map(|j| j.name.as_str()).collect();
     let slots: Vec<Json> = reference
         .slots
         .iter()
@@ -112,8 +94,8 @@ fn cells(phase: &Phase) -> [String; OF_PHASE.len()] {
 }
 
 fn csv(found: &WorkPrecision) -> String {
-    let [impacts, settled] = ["impacts", "settled"]
-        .map(|phase| OF_PHASE.map(|name| format!("{phase}_{name}")).join(","));
+    let [impacts, settled] =
+        ["impacts", "settled"].map(|phase| OF_PHASE.map(|name| format!("{phase}_{name}")).join(","));
     let head = format!(
         "method,step_s,tolerance,preset,{impacts},peak_error,position_error_m,energy_error,{settled},settled_error"
     );

@@ -13,9 +13,7 @@ use std::path::Path;
 
 use super::args::TradeoffArguments;
 use super::{Failure, interrupt, load, measuring, print, warn};
-use crate::analysis::{
-    RunContext, WorkBudget, WorkPrecision, model_costs, presets, work_precision,
-};
+use crate::analysis::{RunContext, WorkBudget, WorkPrecision, model_costs, presets, work_precision};
 use crate::cli::args::SceneArguments;
 use crate::files::Folder;
 use crate::scene::{BUILT_IN, Scene};
@@ -25,25 +23,16 @@ use crate::scene::{BUILT_IN, Scene};
 /// # Errors
 /// Bad input before it starts; a scene without a reference, Ctrl-C and the file system afterwards.
 pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
-    let budget = if arguments.quick {
-        WorkBudget::QUICK
-    } else {
-        WorkBudget::FULL
-    };
+    let budget = if arguments.quick { WorkBudget::QUICK } else { WorkBudget::FULL };
     match (&arguments.scene, &arguments.write) {
         (Some(scene), _) => one(scene, arguments, &budget),
         (None, Some(root)) => all(root, arguments.quiet, &budget),
-        (None, None) => Err(Failure::usage(
-            "name a scene, or write --all --write FOLDER",
-        )),
+        (None, None) => Err(Failure::usage("name a scene, or write --all --write FOLDER")),
     }
 }
 
 fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Result<(), Failure> {
-    let scene = load(&SceneArguments {
-        scene: name.to_owned(),
-        changes: arguments.changes.clone(),
-    })?;
+    let scene = load(&SceneArguments { scene: name.to_owned(), changes: arguments.changes.clone() })?;
     // From here on there is a scratch folder, which an interrupted run removes.
     interrupt::listen();
     let folder = match &arguments.out {
@@ -67,9 +56,7 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Resu
 }
 
 fn measure(scene: &Scene, budget: &WorkBudget, quiet: bool) -> Result<WorkPrecision, Failure> {
-    measuring::measure(quiet, Some(scene), |context| {
-        work_precision(scene, budget, context)
-    })
+    measuring::measure(quiet, Some(scene), |context| work_precision(scene, budget, context))
 }
 
 /// Measures everything that the documentation states, and writes it in one go at the end.

@@ -29,14 +29,8 @@ impl Targets {
     /// A folder that is not the program's source, or cannot be written.
     pub(super) fn claim(root: &Path) -> Result<Self, Failure> {
         let claim = |name: &str| Ok::<_, Failure>(OutputFile::claim(&root.join(name), true)?);
-        let diagrams = BUILT_IN
-            .iter()
-            .map(|name| claim(&format!("docs/{}", diagram(name))));
-        Ok(Self {
-            page: claim(PAGE)?,
-            record: claim(RECORD)?,
-            diagrams: diagrams.collect::<Result<_, _>>()?,
-        })
+        let diagrams = BUILT_IN.iter().map(|name| claim(&format!("docs/{}", diagram(name))));
+        Ok(Self { page: claim(PAGE)?, record: claim(RECORD)?, diagrams: diagrams.collect::<Result<_, _>>()? })
     }
 
     /// Writes everything; all texts are made before the first file changes.
@@ -56,12 +50,9 @@ impl Targets {
             let svg = picture(found, true, &machine).svg();
             drawn.push(svg.map_err(|error| Failure::io(error.to_string()))?);
         }
-        let put =
-            |target: OutputFile, text: &str| target.fill(|file| file.write_all(text.as_bytes()));
+        let put = |target: OutputFile, text: &str| target.fill(|file| file.write_all(text.as_bytes()));
         let diagrams = self.diagrams.into_iter().zip(&drawn);
-        let mut files = diagrams
-            .map(|(target, svg)| put(target, svg))
-            .collect::<Result<Vec<_>, _>>()?;
+        let mut files = diagrams.map(|(target, svg)| put(target, svg)).collect::<Result<Vec<_>, _>>()?;
         files.push(put(self.page, &page)?);
         files.push(put(self.record, &format!("{record}\n"))?);
         Ok(publish(files)?)
@@ -77,9 +68,7 @@ fn record(found: &[WorkPrecision], paces: &[(&str, f64)], machine: &str) -> Reco
     let paces = paces.iter();
     let mut record = Record {
         machine: machine.to_owned(),
-        pace: paces
-            .map(|(scene, pace)| ((*scene).to_owned(), *pace))
-            .collect(),
+        pace: paces.map(|(scene, pace)| ((*scene).to_owned(), *pace)).collect(),
         ..Record::default()
     };
     for found in found {
@@ -87,36 +76,22 @@ fn record(found: &[WorkPrecision], paces: &[(&str, f64)], machine: &str) -> Reco
         for preset in Preset::ALL {
             if let Some(point) = found.preset(preset) {
                 measured.insert(preset.word().to_owned(), Measured::of(point));
-                let setting = (
-                    point.setting.method.word().to_owned(),
-                    point.setting.value(),
-                );
+                let setting = (point.setting.method.word().to_owned(), point.setting.value());
                 record.points.insert(preset.word().to_owned(), setting);
             }
         }
-        record
-            .scenes
-            .insert(found.reference.scene().name.clone(), measured);
+        record.scenes.insert(found.reference.scene().name.clone(), measured);
     }
     record
 }
 
 /// The page on `scenes` with its headings, diagrams and table heads, but nothing measured.
 pub fn skeleton(scenes: &[&str]) -> String {
-    let scenes: String = scenes
-        .iter()
-        .map(|name| scene(name, &[], &[], Vec::new()))
-        .collect();
+    let scenes: String = scenes.iter().map(|name| scene(name, &[], &[], Vec::new())).collect();
     page("", &[], &[], &scenes, &[])
 }
 
-fn page(
-    machine: &str,
-    found: &[WorkPrecision],
-    paces: &[(&str, f64)],
-    scenes: &str,
-    costs: &[CaseCost],
-) -> String {
+fn page(machine: &str, found: &[WorkPrecision], paces: &[(&str, f64)], scenes: &str, costs: &[CaseCost]) -> String {
     let rows = found.iter().flat_map(|found| {
         let presets = Preset::ALL.into_iter();
         presets.filter_map(|preset| Some(preset_row(found, found.preset(preset)?, preset)))
@@ -139,21 +114,9 @@ fn page(
                     rows,
                 ),
             ),
-            (
-                "paces",
-                markdown(
-                    "Scene | Speed | Keeps up",
-                    paces.iter().map(|(scene, pace)| pace_row(scene, *pace)),
-                ),
-            ),
+            ("paces", markdown("Scene | Speed | Keeps up", paces.iter().map(|(scene, pace)| pace_row(scene, *pace)))),
             ("scenes", scenes.to_owned()),
-            (
-                "costs",
-                markdown(
-                    "Scene | With | An evaluation | A simulated second",
-                    cost_rows(costs),
-                ),
-            ),
+            ("costs", markdown("Scene | With | An evaluation | A simulated second", cost_rows(costs))),
         ],
     )
 }
@@ -175,17 +138,10 @@ fn scene(name: &str, against: &[String], reading: &[String], rows: Vec<Vec<Strin
 
 fn measured_scene(found: &WorkPrecision) -> String {
     let against = reference(&found.reference).into_iter();
-    let against: Vec<String> = against
-        .map(|(label, value)| format!("{label}: {value}"))
-        .collect();
+    let against: Vec<String> = against.map(|(label, value)| format!("{label}: {value}")).collect();
     let told = found.points.iter().filter(|point| is_told(point));
     let rows = told.map(|point| point_row(found, point)).collect();
-    scene(
-        &found.reference.scene().name,
-        &against,
-        &reading(found),
-        rows,
-    )
+    scene(&found.reference.scene().name, &against, &reading(found), rows)
 }
 
 /// Whether the preset `real-time` keeps up with a scene.
@@ -263,8 +219,7 @@ fn point_row(found: &WorkPrecision, point: &Point) -> Vec<String> {
 /// What the numbers show, in words.
 fn reading(found: &WorkPrecision) -> Vec<String> {
     let mut told = Vec::new();
-    let setting =
-        |point: &Point| format!("`{}` at {}", point.setting.method, value(&point.setting));
+    let setting = |point: &Point| format!("`{}` at {}", point.setting.method, value(&point.setting));
     for limit in [0.05, 0.01, 1e-4, 1e-6] {
         let words = match found.fastest_within(limit) {
             Some(point) => format!("{}, ratio {}", setting(point), times(point.impacts.ratio)),
@@ -274,22 +229,12 @@ fn reading(found: &WorkPrecision) -> Vec<String> {
     }
     if let Some(point) = found.fastest_settled_within(0.01) {
         let ratio = point.settled.as_ref().and_then(|phase| phase.ratio);
-        told.push(format!(
-            "Settled forces within 1e-2, fastest: {}, ratio {}.",
-            setting(point),
-            times(ratio)
-        ));
+        told.push(format!("Settled forces within 1e-2, fastest: {}, ratio {}.", setting(point), times(ratio)));
     }
-    let stopped = found
-        .points
-        .iter()
-        .filter(|point| point.impacts.end.fault().is_some());
+    let stopped = found.points.iter().filter(|point| point.impacts.end.fault().is_some());
     let stopped: Vec<String> = stopped.map(setting).collect();
     if !stopped.is_empty() {
-        told.push(format!(
-            "Stopped by the divergence guard, or refused: {}.",
-            stopped.join(", ")
-        ));
+        told.push(format!("Stopped by the divergence guard, or refused: {}.", stopped.join(", ")));
     }
     told
 }

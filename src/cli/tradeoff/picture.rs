@@ -30,11 +30,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
     let mut charts = vec![diagram(
         found,
         relative,
-        if found.reference.impacts == 0 {
-            "Reactions"
-        } else {
-            "First impacts"
-        },
+        if found.reference.impacts == 0 { "Reactions" } else { "First impacts" },
         "Largest relative error of a peak force",
         Point::in_impacts,
         floor.peak,
@@ -59,22 +55,11 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
     }
 }
 
-fn diagram(
-    found: &WorkPrecision,
-    relative: bool,
-    title: &str,
-    error: &str,
-    view: View,
-    floor: Option<f64>,
-) -> Chart {
+fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view: View, floor: Option<f64>) -> Chart {
     let floor = floor.filter(|floor| *floor > 0.0);
     let place = |point: &Point| {
         let (phase, error) = view(point)?;
-        let cost = if relative {
-            1.0 / phase.ratio?
-        } else {
-            phase.cost()?
-        };
+        let cost = if relative { 1.0 / phase.ratio? } else { phase.cost()? };
         // Errors below the floor cannot be resolved: the point lies on it.
         let error = error.max(floor.unwrap_or(0.0));
         (error <= WORST).then_some((cost, error))
@@ -83,9 +68,7 @@ fn diagram(
     for (n, method) in Method::ALL.into_iter().enumerate() {
         let own = found.points.iter().filter(|p| p.setting.method == method);
         // A gap where a point has no place: the line does not cross it.
-        let points = own
-            .map(|p| place(p).unwrap_or((f64::NAN, f64::NAN)))
-            .collect();
+        let points = own.map(|p| place(p).unwrap_or((f64::NAN, f64::NAN))).collect();
         series.push(Series {
             label: method.word().to_owned(),
             points,
@@ -97,12 +80,7 @@ fn diagram(
     let on_front = |p: &&Point| view(p).is_some_and(|(phase, _)| phase.front);
     series.push(Series {
         label: FRONT.to_owned(),
-        points: found
-            .points
-            .iter()
-            .filter(on_front)
-            .filter_map(place)
-            .collect(),
+        points: found.points.iter().filter(on_front).filter_map(place).collect(),
         colour: (90, 90, 90),
         line: false,
         marker: Some(Marker::Ring),
@@ -118,39 +96,21 @@ fn diagram(
                 }
                 None => return None,
             };
-            Some(Label {
-                at: place(point)?,
-                text,
-            })
+            Some(Label { at: place(point)?, text })
         })
         .collect();
     Chart {
         title: title.to_owned(),
         x: Axis {
             label: "Time for a simulated second".to_owned(),
-            unit: if relative {
-                "that of rk4 at 10 us is 1"
-            } else {
-                "s"
-            }
-            .to_owned(),
+            unit: if relative { "that of rk4 at 10 us is 1" } else { "s" }.to_owned(),
             scale: Scale::Logarithmic,
             range: None,
         },
-        y: Axis {
-            label: error.to_owned(),
-            scale: Scale::Logarithmic,
-            ..Axis::default()
-        },
+        y: Axis { label: error.to_owned(), scale: Scale::Logarithmic, ..Axis::default() },
         series,
         labels,
-        levels: floor
-            .map(|y| Level {
-                y,
-                text: "less cannot be told".to_owned(),
-            })
-            .into_iter()
-            .collect(),
+        levels: floor.map(|y| Level { y, text: "less cannot be told".to_owned() }).into_iter().collect(),
         map: None,
     }
 }

@@ -14,19 +14,12 @@ pub fn times(value: Option<f64>) -> String {
 
 /// A relative error as a percentage with two digits.
 pub fn percent(value: Option<f64>) -> String {
-    value.map_or_else(
-        || "-".to_owned(),
-        |value| format!("{} %", significant(100.0 * value, 2)),
-    )
+    value.map_or_else(|| "-".to_owned(), |value| format!("{} %", significant(100.0 * value, 2)))
 }
 
 /// A step with its unit, or a tolerance.
 pub fn value(setting: &Setting) -> String {
-    if setting.adaptive {
-        format!("{:e}", setting.tolerance)
-    } else {
-        format_quantity(setting.step_s, "us")
-    }
+    if setting.adaptive { format!("{:e}", setting.tolerance) } else { format_quantity(setting.step_s, "us") }
 }
 
 /// An error with two digits; one below `floor` is shown as less than `floor`.
@@ -62,11 +55,7 @@ pub(super) fn end(phase: &Phase) -> &'static str {
 pub(super) fn reference(reference: &ReferenceSolution) -> Vec<(&'static str, String)> {
     let ms = |time: f64| format!("{} ms", significant(1e3 * time, 5));
     let floor = &reference.floor;
-    let names: Vec<&str> = reference
-        .slots
-        .iter()
-        .map(|slot| joint(reference, slot.joint))
-        .collect();
+    let names: Vec<&str> = reference.slots.iter().map(|slot| joint(reference, slot.joint)).collect();
     let mut lines = vec![
         (
             "Reference",
@@ -82,18 +71,9 @@ pub(super) fn reference(reference: &ReferenceSolution) -> Vec<(&'static str, Str
         (
             "First impacts",
             if reference.impacts == 0 {
-                format!(
-                    "none: the largest reactions of {} within {}",
-                    names.join(", "),
-                    ms(reference.span)
-                )
+                format!("none: the largest reactions of {} within {}", names.join(", "), ms(reference.span))
             } else {
-                format!(
-                    "{} within {}: {}",
-                    reference.impacts,
-                    ms(reference.span),
-                    names.join(", ")
-                )
+                format!("{} within {}: {}", reference.impacts, ms(reference.span), names.join(", "))
             },
         ),
     ];
@@ -107,7 +87,11 @@ pub(super) fn reference(reference: &ReferenceSolution) -> Vec<(&'static str, Str
     lines.push((
         "Settled",
         match &reference.settled {
-            Some(span) => format!("mean contact forces from {} to {}, all methods from the same state", ms(span.from), ms(span.to)),
+            Some(span) => format!(
+                "mean contact forces from {} to {}, all methods from the same state",
+                ms(span.from),
+                ms(span.to)
+            ),
             None => "its contacts do not stay closed for 150 ms within the first 1.2 s: nothing to average".to_owned(),
         },
     ));
@@ -145,11 +129,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
         |point| Some(&point.impacts),
         &["peak error", "position error (m)", "energy error"],
         |Point { errors, .. }| {
-            vec![
-                error(errors.peak, floor.peak),
-                error(errors.position_m, floor.position_m),
-                error(errors.energy, None),
-            ]
+            vec![error(errors.peak, floor.peak), error(errors.position_m, floor.position_m), error(errors.energy, None)]
         },
     );
     if found.reference.settled.is_some() {
@@ -163,12 +143,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     }
     for point in &found.points {
         if let Some(why) = point.impacts.end.fault() {
-            let _ = writeln!(
-                out,
-                "{} {}: {why}",
-                point.setting.method,
-                value(&point.setting)
-            );
+            let _ = writeln!(out, "{} {}: {why}", point.setting.method, value(&point.setting));
         }
     }
     out.push('\n');
@@ -182,10 +157,8 @@ fn phase_table(
     errors: &[&str],
     error: impl Fn(&Point) -> Vec<String>,
 ) -> String {
-    let mut head = "method,value,preset,speed,ratio,steps,evaluations,rejected"
-        .split(',')
-        .map(str::to_owned)
-        .collect::<Vec<_>>();
+    let mut head =
+        "method,value,preset,speed,ratio,steps,evaluations,rejected".split(',').map(str::to_owned).collect::<Vec<_>>();
     head.extend(errors.iter().map(|&name| name.to_owned()));
     head.push(String::new());
     let mut rows = vec![head];
@@ -215,10 +188,7 @@ pub(super) fn costs(costs: &[CaseCost]) -> String {
     let head = ["scene", "with", "an evaluation", "a simulated second"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(cost_rows(costs));
-    format!(
-        "Cost of the parts of the model, the first row being 1\n{}",
-        grid(&rows)
-    )
+    format!("Cost of the parts of the model, the first row being 1\n{}", grid(&rows))
 }
 
 /// Scene and name of each part, with its costs per evaluation and per simulated second relative to those of the first.
@@ -243,10 +213,7 @@ pub fn grid(rows: &[Vec<String>]) -> String {
     };
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let looks = (0..columns).map(|c| {
-        let width = rows
-            .iter()
-            .filter_map(|row| row.get(c))
-            .map(|text| text.chars().count());
+        let width = rows.iter().filter_map(|row| row.get(c)).map(|text| text.chars().count());
         let mut body = rows.iter().skip(1).filter_map(|row| row.get(c));
         let right = rows.len() > 1 && body.all(|text| is_number(text));
         (width.max().unwrap_or(0), right)
@@ -257,11 +224,7 @@ pub fn grid(rows: &[Vec<String>]) -> String {
         let mut line = String::new();
         for (text, (width, right)) in row.iter().zip(&looks) {
             // Writing to a String cannot fail.
-            let _ = if *right {
-                write!(line, "{text:>width$}  ")
-            } else {
-                write!(line, "{text:<width$}  ")
-            };
+            let _ = if *right { write!(line, "{text:>width$}  ") } else { write!(line, "{text:<width$}  ") };
         }
         out.push_str(line.trim_end());
         out.push('\n');
@@ -276,10 +239,7 @@ mod tests {
     #[test]
     fn columns_line_up() {
         let rows = [["a", "number"], ["word", "1"], ["b", "-"]];
-        let rows: Vec<Vec<String>> = rows
-            .iter()
-            .map(|row| row.map(str::to_owned).to_vec())
-            .collect();
+        let rows: Vec<Vec<String>> = rows.iter().map(|row| row.map(str::to_owned).to_vec()).collect();
         assert_eq!(grid(&rows), "a     number\nword       1\nb          -\n");
     }
 

@@ -15,14 +15,8 @@ struct Formula {
 }
 
 pub(super) fn make(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    let DriveData::Formula(program, scale) = &drive.data else {
-        unreachable!("a formula is read with its expression")
-    };
-    Arc::new(Formula {
-        program: program.clone(),
-        scale: *scale,
-        resolve: drive.number("resolve"),
-    })
+    let DriveData::Formula(program, scale) = &drive.data else { unreachable!("a formula is read with its expression") };
+    Arc::new(Formula { program: program.clone(), scale: *scale, resolve: drive.number("resolve") })
 }
 
 impl Law for Formula {

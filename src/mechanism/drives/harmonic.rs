@@ -51,37 +51,26 @@ struct Harmonics {
 }
 
 pub(super) fn make_sum(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    let DriveData::Terms(terms) = &drive.data else {
-        unreachable!("harmonics are read with their terms")
-    };
+    let DriveData::Terms(terms) = &drive.data else { unreachable!("harmonics are read with their terms") };
     Arc::new(Harmonics {
         mean: drive.number("mean"),
-        terms: terms
-            .iter()
-            .copied()
-            .filter(|term| term[0] != 0.0)
-            .collect(),
+        terms: terms.iter().copied().filter(|term| term[0] != 0.0).collect(),
     })
 }
 
 impl Law for Harmonics {
     fn at(&self, t: f64) -> Jet {
         let terms = self.terms.iter();
-        terms.fold(
-            Jet::constant(self.mean),
-            |sum, &[amplitude, frequency, phase]| sum + swing(amplitude, frequency, phase, t),
-        )
+        terms.fold(Jet::constant(self.mean), |sum, &[amplitude, frequency, phase]| {
+            sum + swing(amplitude, frequency, phase, t)
+        })
     }
 
     fn period(&self) -> f64 {
         let frequencies = self.terms.iter().map(|term| term[1]);
         let lowest = frequencies.clone().fold(f64::INFINITY, f64::min);
         let base = frequencies.reduce(common).unwrap_or(0.0);
-        if base * MOST_SWINGS >= lowest {
-            1.0 / base
-        } else {
-            f64::INFINITY
-        }
+        if base * MOST_SWINGS >= lowest { 1.0 / base } else { f64::INFINITY }
     }
 
     fn swing(&self) -> f64 {

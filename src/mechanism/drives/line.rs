@@ -14,11 +14,7 @@ struct Line {
 }
 
 pub(super) fn make(drive: &Drive, turns: bool) -> Arc<dyn Law> {
-    Arc::new(Line {
-        position: drive.number("position"),
-        velocity: drive.number("velocity"),
-        turns,
-    })
+    Arc::new(Line { position: drive.number("position"), velocity: drive.number("velocity"), turns })
 }
 
 impl Law for Line {
@@ -28,10 +24,6 @@ impl Law for Line {
 
     /// Of a hinge: a turn.
     fn period(&self) -> f64 {
-        if self.turns {
-            std::f64::consts::TAU / self.velocity.abs()
-        } else {
-            f64::INFINITY
-        }
+        if self.turns { std::f64::consts::TAU / self.velocity.abs() } else { f64::INFINITY }
     }
 }

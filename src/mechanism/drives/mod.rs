@@ -74,10 +74,8 @@ pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
     if let Some(coordinate) = drive.slider() {
         return Course::ClosedForm(coordinate);
     }
-    let (_, make) = LAWS
-        .iter()
-        .find(|(word, _)| *word == drive.kind.word)
-        .expect("every law of the scene format has its motion");
+    let (_, make) =
+        LAWS.iter().find(|(word, _)| *word == drive.kind.word).expect("every law of the scene format has its motion");
     Course::Own(make(drive, turns))
 }
 
@@ -85,9 +83,7 @@ pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
 pub fn periods_of(scene: &Scene, joint: &Joint) -> impl Iterator<Item = f64> {
     joint.drives().map(|(freedom, drive)| {
         let course = course_of(drive, freedom.turns());
-        course
-            .law()
-            .map_or_else(|| closed_period(scene), |law| law.period())
+        course.law().map_or_else(|| closed_period(scene), |law| law.period())
     })
 }
 
@@ -102,25 +98,18 @@ impl Course {
 
     /// As [`Law::swing`].
     pub(super) fn swing(&self, scene: &Scene) -> f64 {
-        self.law()
-            .map_or_else(|| closed_period(scene), |law| law.swing())
+        self.law().map_or_else(|| closed_period(scene), |law| law.swing())
     }
 }
 
 /// Period of the closed form of `scene`, s.
 fn closed_period(scene: &Scene) -> f64 {
-    scene.spcmm.map_or(f64::INFINITY, |spcmm| {
-        period_if(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency)
-    })
+    scene.spcmm.map_or(f64::INFINITY, |spcmm| period_if(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency))
 }
 
 /// Period of a swing with these amplitudes, s.
 fn period_if(amplitudes: &[f64], frequency: f64) -> f64 {
-    if amplitudes.iter().any(|amplitude| *amplitude != 0.0) {
-        1.0 / frequency
-    } else {
-        f64::INFINITY
-    }
+    if amplitudes.iter().any(|amplitude| *amplitude != 0.0) { 1.0 / frequency } else { f64::INFINITY }
 }
 
 /// Latest end of a step from `t` for a motion that lasts from `start` to `end`.

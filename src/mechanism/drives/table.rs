@@ -21,18 +21,12 @@ struct Table {
 }
 
 pub(super) fn make(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    let DriveData::Points { points, repeats } = &drive.data else {
-        unreachable!("a table is read with its points")
-    };
+    let DriveData::Points { points, repeats } = &drive.data else { unreachable!("a table is read with its points") };
     let ends = match repeats {
         true => Ends::Joined,
         false => Ends::Level,
     };
-    Arc::new(Table {
-        spline: Spline::new(points, ends),
-        end: points[points.len() - 1][1],
-        repeats: *repeats,
-    })
+    Arc::new(Table { spline: Spline::new(points, ends), end: points[points.len() - 1][1], repeats: *repeats })
 }
 
 impl Table {
@@ -69,11 +63,7 @@ impl Law for Table {
         let [first, last] = self.spline.ends();
         let cubics = &self.spline.cubics;
         let moves = cubics.iter().any(|cubic| cubic[1..] != [0.0; 3]);
-        if self.repeats && moves {
-            last - first
-        } else {
-            f64::INFINITY
-        }
+        if self.repeats && moves { last - first } else { f64::INFINITY }
     }
 
     /// At the next point, where the third derivative jumps, and at some instants on the way there.

@@ -34,13 +34,7 @@ fn points(values: &[(f64, f64)]) -> String {
 /// Every law, with these numbers: a length, m, a time, s, and a number from 0 to 1.
 fn every_law(a: f64, d: f64, s: f64) -> Vec<String> {
     let steps = [0.0, 0.3 * d, d, (1.2 + s) * d, 3.0 * d];
-    let table = [
-        (steps[0], a),
-        (steps[1], 0.0),
-        (steps[2], -a),
-        (steps[3], s * a),
-        (steps[4], a),
-    ];
+    let table = [(steps[0], a), (steps[1], 0.0), (steps[2], -a), (steps[3], s * a), (steps[4], a)];
     let table = points(&table);
     vec![
         format!("law = \"constant\", position = \"{s} m\", velocity = \"{a} m/s\""),
@@ -54,17 +48,11 @@ fn every_law(a: f64, d: f64, s: f64) -> Vec<String> {
             1.0 / d,
             s + 0.1
         ),
-        format!(
-            "law = \"ramp\", from = \"{s} m\", to = \"{a} m\", start = \"{s} s\", duration = \"{d} s\""
-        ),
-        format!(
-            "law = \"pulse\", base = \"{s} m\", height = \"{a} m\", start = \"{s} s\", duration = \"{d} s\""
-        ),
+        format!("law = \"ramp\", from = \"{s} m\", to = \"{a} m\", start = \"{s} s\", duration = \"{d} s\""),
+        format!("law = \"pulse\", base = \"{s} m\", height = \"{a} m\", start = \"{s} s\", duration = \"{d} s\""),
         format!("law = \"table\", points = [{table}]"),
         format!("law = \"table\", repeat = true, points = [{table}]"),
-        format!(
-            "law = \"formula\", formula = \"{a} * sin(2*pi*t/{d}) * exp(-t/3) + smoothstep((t - {s}) / {d})\""
-        ),
+        format!("law = \"formula\", formula = \"{a} * sin(2*pi*t/{d}) * exp(-t/3) + smoothstep((t - {s}) / {d})\""),
         format!("law = \"formula\", unit = \"mm\", formula = \"10 * tanh(t)^3 / (2 + cos(t))\""),
     ]
 }
@@ -123,8 +111,7 @@ proptest! {
 
 #[test]
 fn ramp_and_pulse_are_where_they_should_be() {
-    let ramp =
-        law("law = \"ramp\", from = \"1 m\", to = \"3 m\", start = \"1 s\", duration = \"2 s\"");
+    let ramp = law("law = \"ramp\", from = \"1 m\", to = \"3 m\", start = \"1 s\", duration = \"2 s\"");
     for (t, value) in [(0.0, 1.0), (1.0, 1.0), (2.0, 2.0), (3.0, 3.0), (9.0, 3.0)] {
         assert_eq!(ramp.at(t).value, value, "{t}");
     }
@@ -133,9 +120,7 @@ fn ramp_and_pulse_are_where_they_should_be() {
     }
     // 30/16 of the mean rate, half way.
     assert!((ramp.at(2.0).rate - 1.875).abs() < 1e-15);
-    let pulse = law(
-        "law = \"pulse\", base = \"1 m\", height = \"4 mm\", start = \"1 s\", duration = \"10 ms\"",
-    );
+    let pulse = law("law = \"pulse\", base = \"1 m\", height = \"4 mm\", start = \"1 s\", duration = \"10 ms\"");
     assert!((pulse.at(1.005).value - 1.004).abs() < 1e-15);
     for t in [0.0, 0.999, 1.0, 1.011, 2.0] {
         assert_eq!(pulse.at(t), crate::jet::Jet::constant(1.0), "{t}");
@@ -145,15 +130,11 @@ fn ramp_and_pulse_are_where_they_should_be() {
 #[test]
 fn constant_and_harmonic_keep_their_arithmetic() {
     let line = law("law = \"constant\", position = \"0.1 m\", velocity = \"0.3 m/s\"");
-    let swing = law(
-        "law = \"harmonic\", mean = \"0.1 m\", amplitude = \"0.3 m\", frequency = \"1.7 Hz\", phase = \"0.2 rad\"",
-    );
+    let swing =
+        law("law = \"harmonic\", mean = \"0.1 m\", amplitude = \"0.3 m\", frequency = \"1.7 Hz\", phase = \"0.2 rad\"");
     for t in [0.0, 0.123, 77.7] {
         let at = line.at(t);
-        assert_eq!(
-            (at.value, at.rate, at.acceleration),
-            (0.1 + 0.3 * t, 0.3, 0.0)
-        );
+        assert_eq!((at.value, at.rate, at.acceleration), (0.1 + 0.3 * t, 0.3, 0.0));
         let omega = TAU * 1.7;
         let (s, c) = libm::sincos(omega * t + 0.2);
         let at = swing.at(t);
@@ -165,9 +146,7 @@ fn constant_and_harmonic_keep_their_arithmetic() {
 
 #[test]
 fn one_harmonic_of_a_sum_is_that_harmonic() {
-    let one = law(
-        "law = \"harmonic\", mean = \"1 m\", amplitude = \"2 m\", frequency = \"3 Hz\", phase = \"1 rad\"",
-    );
+    let one = law("law = \"harmonic\", mean = \"1 m\", amplitude = \"2 m\", frequency = \"3 Hz\", phase = \"1 rad\"");
     let sum = law(
         "law = \"harmonics\", mean = \"1 m\", terms = [{ amplitude = \"2 m\", frequency = \"3 Hz\", phase = \"1 rad\" }]",
     );
@@ -188,39 +167,15 @@ fn the_period_of_a_law_is_the_time_after_which_it_repeats() {
         (terms(&[2.0, 3.0]), 1.0),
         (terms(&[0.1, 0.3, 0.7]), 10.0),
         (terms(&[1.0, 2.0_f64.sqrt()]), f64::INFINITY),
-        (
-            "law = \"harmonics\", terms = [{ amplitude = 0, frequency = \"1 Hz\" }]".into(),
-            f64::INFINITY,
-        ),
-        (
-            "law = \"pulse\", height = \"1 mm\", duration = \"1 s\"".into(),
-            f64::INFINITY,
-        ),
-        (
-            format!(
-                "law = \"table\", points = [{}]",
-                points(&[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)])
-            ),
-            f64::INFINITY,
-        ),
-        (
-            format!(
-                "law = \"table\", repeat = true, points = [{}]",
-                points(&[(0.5, 0.0), (1.0, 1.0), (2.0, 0.0)])
-            ),
-            1.5,
-        ),
-        (
-            "law = \"formula\", formula = \"sin(t)\"".into(),
-            f64::INFINITY,
-        ),
+        ("law = \"harmonics\", terms = [{ amplitude = 0, frequency = \"1 Hz\" }]".into(), f64::INFINITY),
+        ("law = \"pulse\", height = \"1 mm\", duration = \"1 s\"".into(), f64::INFINITY),
+        (format!("law = \"table\", points = [{}]", points(&[(0.0, 0.0), (1.0, 1.0), (2.0, 0.0)])), f64::INFINITY),
+        (format!("law = \"table\", repeat = true, points = [{}]", points(&[(0.5, 0.0), (1.0, 1.0), (2.0, 0.0)])), 1.5),
+        ("law = \"formula\", formula = \"sin(t)\"".into(), f64::INFINITY),
     ] {
         let scene = scene(&text);
         let found = periods_of(&scene, &scene.joints[0]).next().expect("driven");
-        assert!(
-            found == period || (found - period).abs() < 1e-9,
-            "{text}: {found}"
-        );
+        assert!(found == period || (found - period).abs() < 1e-9, "{text}: {found}");
         if period.is_finite() {
             let law = law(&text);
             assert!((law.at(0.3).value - law.at(0.3 + period).value).abs() < 1e-12);
@@ -247,19 +202,10 @@ fn a_spline_reproduces_a_cubic_and_converges_with_the_fourth_order() {
     for (repeats, phase) in [(false, 0.0), (true, 0.0), (true, 0.7)] {
         let wave = |t: f64| libm::cos(TAU * t + phase);
         let error = |n: u32| {
-            let mut samples: Vec<(f64, f64)> = (0..=n)
-                .map(|i| {
-                    (
-                        f64::from(i) / f64::from(n),
-                        wave(f64::from(i) / f64::from(n)),
-                    )
-                })
-                .collect();
+            let mut samples: Vec<(f64, f64)> =
+                (0..=n).map(|i| (f64::from(i) / f64::from(n), wave(f64::from(i) / f64::from(n)))).collect();
             samples[n as usize].1 = samples[0].1;
-            let spline = law(&format!(
-                "law = \"table\", repeat = {repeats}, points = [{}]",
-                points(&samples)
-            ));
+            let spline = law(&format!("law = \"table\", repeat = {repeats}, points = [{}]", points(&samples)));
             let at = |i: u32| f64::from(i) / 1000.0;
             let off = (0..1000).map(|i| (spline.at(at(i)).value - wave(at(i))).abs());
             off.fold(0.0, f64::max)
@@ -267,20 +213,14 @@ fn a_spline_reproduces_a_cubic_and_converges_with_the_fourth_order() {
         let (coarse, fine) = (error(20), error(40));
         // A sixteenth for half the spacing.
         let ratio = coarse / fine;
-        assert!(
-            (14.0..18.0).contains(&ratio),
-            "{repeats} {phase}: {ratio} {fine}"
-        );
+        assert!((14.0..18.0).contains(&ratio), "{repeats} {phase}: {ratio} {fine}");
     }
 }
 
 #[test]
 fn a_periodic_table_repeats_on_both_sides_and_its_steps_end_at_its_points() {
     let given = [(0.2, 0.0), (0.3, 1.0), (0.5, -1.0), (0.9, 0.0)];
-    let law = law(&format!(
-        "law = \"table\", repeat = true, points = [{}]",
-        points(&given)
-    ));
+    let law = law(&format!("law = \"table\", repeat = true, points = [{}]", points(&given)));
     for n in 0..70 {
         let t = 0.2 + f64::from(n) / 100.0;
         for k in [-3.0, 1.0, 5.0, 1000.0] {

@@ -58,11 +58,7 @@ fn rotation_vector(rotation: &Mat3) -> Vec3 {
     let q = quaternion_of(rotation);
     let (sign, vector) = (q.w.signum(), q.imag());
     let (sin, cos) = (vector.norm(), q.w.abs());
-    let factor = if sin > 1e-9 {
-        2.0 * libm::atan2(sin, cos) / sin
-    } else {
-        2.0
-    };
+    let factor = if sin > 1e-9 { 2.0 * libm::atan2(sin, cos) / sin } else { 2.0 };
     vector * (sign * factor)
 }
 
@@ -109,10 +105,7 @@ impl Bushing {
     }
 
     fn ends_in(&self, s: &State, motion: &[Kinematics]) -> [Anchor; 2] {
-        let from = Anchor {
-            body: self.from.body,
-            offset: motion[self.from.body].rotation.tr_mul(&s.arms[0]),
-        };
+        let from = Anchor { body: self.from.body, offset: motion[self.from.body].rotation.tr_mul(&s.arms[0]) };
         [from, self.to]
     }
 }
@@ -139,9 +132,7 @@ impl ForceElement for Bushing {
         let across = |diagonal: &Vec3| world(Mat3::from_diagonal(diagonal));
         let to_torque = torque_matrix(&s.turn);
         let turning = Turning {
-            by_turn: world(
-                to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose(),
-            ),
+            by_turn: world(to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose()),
             by_spin: across(&self.turning_damping),
             by_time: Vec3::zeros(),
         };
@@ -158,8 +149,8 @@ impl ForceElement for Bushing {
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.state(motion);
-        powers.damping += self.damping.component_mul(&s.rate).dot(&s.rate)
-            + self.turning_damping.component_mul(&s.spin).dot(&s.spin);
+        powers.damping +=
+            self.damping.component_mul(&s.rate).dot(&s.rate) + self.turning_damping.component_mul(&s.spin).dot(&s.spin);
     }
 }
 
@@ -167,12 +158,7 @@ impl SceneElement for Bushing {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.state(motion);
         let [force, torque] = self.loads(&s);
-        ElementReport {
-            points: s.points,
-            force,
-            torque: Some(torque),
-            ..ElementReport::default()
-        }
+        ElementReport { points: s.points, force, torque: Some(torque), ..ElementReport::default() }
     }
 }
 
@@ -183,12 +169,9 @@ mod tests {
 
     #[test]
     fn rotation_vectors_go_there_and_back() {
-        for turn in [
-            Vec3::new(0.3, -0.2, 0.9),
-            Vec3::new(1e-11, 2e-11, -1e-11),
-            Vec3::new(0.0, -3.1, 0.1),
-            Vec3::zeros(),
-        ] {
+        for turn in
+            [Vec3::new(0.3, -0.2, 0.9), Vec3::new(1e-11, 2e-11, -1e-11), Vec3::new(0.0, -3.1, 0.1), Vec3::zeros()]
+        {
             let back = rotation_vector(Rotation3::new(turn).matrix());
             assert!((back - turn).norm() < 1e-14 * (1.0 + turn.norm()), "{back}");
         }
@@ -201,21 +184,13 @@ mod tests {
             let turn = rotation_vector(rotation.matrix());
             0.5 * stiffness.component_mul(&turn).dot(&turn)
         };
-        for turn in [
-            Vec3::new(0.4, -1.1, 0.7),
-            Vec3::new(0.02, 0.01, -0.015),
-            Vec3::new(0.0, 0.0, 2.9),
-        ] {
+        for turn in [Vec3::new(0.4, -1.1, 0.7), Vec3::new(0.02, 0.01, -0.015), Vec3::new(0.0, 0.0, 2.9)] {
             let at = Rotation3::new(turn);
             let torque = torque_matrix(&turn) * stiffness.component_mul(&turn);
             for i in 0..3 {
                 let moved = |by: f64| energy(&(Rotation3::new(Vec3::ith(i, by)) * at));
                 let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
-                assert!(
-                    (torque[i] - slope).abs() < 1e-7,
-                    "{turn} {i}: {} {slope}",
-                    torque[i]
-                );
+                assert!((torque[i] - slope).abs() < 1e-7, "{turn} {i}: {} {slope}", torque[i]);
             }
         }
     }

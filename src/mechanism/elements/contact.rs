@@ -39,13 +39,7 @@ pub struct Contact {
 
 impl Contact {
     pub fn new(index: usize, joint: BallJoint, law: Coefficients) -> Self {
-        Self {
-            index,
-            joint,
-            law,
-            gap: Gap::default(),
-            left_piece: false,
-        }
+        Self { index, joint, law, gap: Gap::default(), left_piece: false }
     }
 
     /// Whether it has clearance.
@@ -106,8 +100,7 @@ impl Contact {
     #[inline]
     pub fn friction_reads(&self, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
         let [ball, socket] = self.spins(motion);
-        self.law
-            .friction_reads(n, &self.gap.eccentricity_rate, ball, socket)
+        self.law.friction_reads(n, &self.gap.eccentricity_rate, ball, socket)
     }
 
     /// Measures eccentricity and its rate; forces stay.
@@ -136,11 +129,7 @@ impl ForceElement for Contact {
         let arms = joint.arms(at.motion);
         let (e, velocity) = joint.opening(at.motion, &arms);
         let gap = &mut self.gap;
-        *gap = Gap {
-            eccentricity: e,
-            eccentricity_rate: velocity,
-            ..Gap::default()
-        };
+        *gap = Gap { eccentricity: e, eccentricity_rate: velocity, ..Gap::default() };
         let clearance = law.clearance;
         if e.norm_squared() <= clearance * clearance {
             return;
@@ -186,19 +175,9 @@ impl ForceElement for Contact {
         let memory = memory.filter(|_| gap.normal_force > 0.0)?;
         let n = gap.separation.normal;
         let read = self.friction_reads(&n, at.motion);
-        let force = Force {
-            normal: gap.normal_force,
-            friction: gap.friction,
-            slip_speed: gap.slip_speed,
-        };
-        let mut stiffness = self.law.linearise(
-            memory,
-            &gap.separation,
-            &gap.eccentricity_rate,
-            &read,
-            &force,
-            Slope::Tangent,
-        );
+        let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
+        let mut stiffness =
+            self.law.linearise(memory, &gap.separation, &gap.eccentricity_rate, &read, &force, Slope::Tangent);
         let [ball, socket] = self.spins(at.motion);
         stiffness.add_turning_read(&self.law.friction_reads_by_normal(ball, socket));
         Some(Coupling {

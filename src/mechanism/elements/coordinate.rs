@@ -91,13 +91,7 @@ impl Coordinate {
             let velocity = child.point_velocity(&arm) - parent.point_velocity(&from_parent);
             (along.dot(&slid) - position, along.dot(&velocity))
         };
-        Place {
-            off,
-            rate,
-            along,
-            point,
-            arms: [from_parent, arm],
-        }
+        Place { off, rate, along, point, arms: [from_parent, arm] }
     }
 
     /// Adds `force` (N or N m) along the axis to the child, and its opposite to the parent.
@@ -117,10 +111,7 @@ impl Coordinate {
     pub fn ends(&self, motion: &[Kinematics]) -> [Anchor; 2] {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let point = child.position + child.rotation * self.child.offset;
-        let parent = Anchor {
-            body: self.parent.body,
-            offset: parent.rotation.tr_mul(&(point - parent.position)),
-        };
+        let parent = Anchor { body: self.parent.body, offset: parent.rotation.tr_mul(&(point - parent.position)) };
         [parent, self.child]
     }
 
@@ -131,11 +122,7 @@ impl Coordinate {
         let by_time = place.along * slopes.by_time;
         let ends = self.ends(motion);
         if self.turns {
-            let turning = Turning {
-                by_turn: stiffness,
-                by_spin: damping,
-                by_time,
-            };
+            let turning = Turning { by_turn: stiffness, by_spin: damping, by_time };
             return Coupling::at_one_point(ends, [Mat3::zeros(); 2], Vec3::zeros(), turning);
         }
         Coupling::at_one_point(ends, [stiffness, damping], by_time, Turning::default())
@@ -154,10 +141,7 @@ impl Coordinate {
         }
         let parent = &motion[self.parent.body];
         ElementReport {
-            points: [
-                parent.position + parent.rotation * self.parent.offset,
-                place.point,
-            ],
+            points: [parent.position + parent.rotation * self.parent.offset, place.point],
             force,
             ..ElementReport::default()
         }

@@ -24,20 +24,14 @@ impl Elastic {
     pub fn of(element: &Element, side: SpringSide) -> Self {
         match &element.curve {
             Some(points) => Self::Curve(Curve::new(points, side)),
-            None => Self::Line {
-                preload: element.number("preload"),
-                stiffness: element.number("stiffness"),
-                side,
-            },
+            None => Self::Line { preload: element.number("preload"), stiffness: element.number("stiffness"), side },
         }
     }
 
     /// Tension at `stretch`, N or N m, as if it acted both ways.
     pub fn tension(&self, stretch: f64) -> f64 {
         match self {
-            Self::Line {
-                preload, stiffness, ..
-            } => preload + stiffness * stretch,
+            Self::Line { preload, stiffness, .. } => preload + stiffness * stretch,
             Self::Curve(curve) => curve.at(stretch).value,
         }
     }
@@ -53,11 +47,7 @@ impl Elastic {
     /// Energy stored, J: what it took to get there from a stretch of 0.
     pub fn stored(&self, stretch: f64) -> f64 {
         match self {
-            Self::Line {
-                preload,
-                stiffness,
-                side,
-            } => {
+            Self::Line { preload, stiffness, side } => {
                 let elastic = preload + stiffness * stretch;
                 // Beyond the length at which it is slack it keeps what it has there.
                 let stretch = match side.of(elastic) == elastic || *stiffness == 0.0 {
@@ -83,11 +73,7 @@ pub(super) struct Curve {
 
 impl Curve {
     fn new(points: &[[f64; 2]], side: SpringSide) -> Self {
-        let mut curve = Self {
-            spline: Spline::new(points, Ends::Straight),
-            marks: Vec::new(),
-            acts: Vec::new(),
-        };
+        let mut curve = Self { spline: Spline::new(points, Ends::Straight), marks: Vec::new(), acts: Vec::new() };
         let mut marks = curve.spline.knots.clone();
         if side != SpringSide::Both {
             marks.extend(curve.roots());
@@ -101,11 +87,7 @@ impl Curve {
         let between = marks.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]));
         let [first, last] = [marks[0], marks[marks.len() - 1]];
         let width = last - first;
-        curve.acts = std::iter::once(first - width)
-            .chain(between)
-            .chain([last + width])
-            .map(acts)
-            .collect();
+        curve.acts = std::iter::once(first - width).chain(between).chain([last + width]).map(acts).collect();
         let mut stored = 0.0;
         for (i, &mark) in marks.iter().enumerate() {
             if i > 0 && curve.acts[i] {
@@ -114,10 +96,7 @@ impl Curve {
             curve.marks.push([mark, stored]);
         }
         let unstretched = curve.stored(0.0);
-        curve
-            .marks
-            .iter_mut()
-            .for_each(|mark| mark[1] -= unstretched);
+        curve.marks.iter_mut().for_each(|mark| mark[1] -= unstretched);
         curve
     }
 
@@ -199,13 +178,7 @@ impl Curve {
 mod tests {
     use super::*;
 
-    const POINTS: [[f64; 2]; 5] = [
-        [-0.04, -90.0],
-        [-0.02, 5.0],
-        [-0.01, -8.0],
-        [0.01, 6.0],
-        [0.03, 70.0],
-    ];
+    const POINTS: [[f64; 2]; 5] = [[-0.04, -90.0], [-0.02, 5.0], [-0.01, -8.0], [0.01, 6.0], [0.03, 70.0]];
 
     #[test]
     fn the_energy_is_the_integral_of_what_acts() {

@@ -46,17 +46,12 @@ impl ForceElement for JointSpring {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let (place, _) = self.at(at.motion);
-        let slopes = Slopes {
-            by_position: -self.elastic.stiffness(place.off),
-            by_rate: -self.damping,
-            by_time: 0.0,
-        };
+        let slopes = Slopes { by_position: -self.elastic.stiffness(place.off), by_rate: -self.damping, by_time: 0.0 };
         Some(self.on.coupling(&place, &slopes, at.motion))
     }
 
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
-        self.elastic
-            .stored(self.on.place(self.position, motion).off)
+        self.elastic.stored(self.on.place(self.position, motion).off)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {

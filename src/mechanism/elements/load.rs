@@ -30,11 +30,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
 impl Load {
     /// Force and torque at `t`, world axes.
     fn at(&self, t: f64, motion: &[Kinematics]) -> (Vec3, Vec3) {
-        let size = if self.omega > 0.0 {
-            libm::sin(self.omega * t + self.phase)
-        } else {
-            1.0
-        };
+        let size = if self.omega > 0.0 { libm::sin(self.omega * t + self.phase) } else { 1.0 };
         let (force, torque) = (self.force * size, self.torque * size);
         if self.turns {
             let rotation = &motion[self.on.body].rotation;
@@ -70,11 +66,6 @@ impl SceneElement for Load {
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
         let (force, torque) = self.at(t, motion);
         let (point, ..) = point_of(&self.on, motion);
-        ElementReport {
-            points: [point; 2],
-            force,
-            torque: Some(torque),
-            ..ElementReport::default()
-        }
+        ElementReport { points: [point; 2], force, torque: Some(torque), ..ElementReport::default() }
     }
 }

@@ -42,11 +42,7 @@ pub enum Touching<'a> {
 impl<'a> Touching<'a> {
     /// By the memory if events are `located`, else by penetration.
     pub fn by(located: bool, memory: &'a [Memory]) -> Self {
-        if located {
-            Self::Located(memory)
-        } else {
-            Self::Immediate(memory)
-        }
+        if located { Self::Located(memory) } else { Self::Immediate(memory) }
     }
 
     /// Memory of joint `j` if it may carry a force.
@@ -283,19 +279,12 @@ const KINDS: [(&str, Make); 7] = [
 /// The force elements of `scene`, in its order.
 pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElement>> {
     let make = |element: &Element| {
-        let anchors: Vec<Anchor> = element
-            .points
-            .iter()
-            .map(|point| model.anchor(scene, point))
-            .collect();
+        let anchors: Vec<Anchor> = element.points.iter().map(|point| model.anchor(scene, point)).collect();
         let (_, make) = KINDS
             .iter()
             .find(|(section, _)| *section == element.kind.section)
             .expect("every kind of the scene format has its element");
-        let site = Site {
-            coordinate: Coordinate::of(scene, element, &anchors),
-            anchors: &anchors,
-        };
+        let site = Site { coordinate: Coordinate::of(scene, element, &anchors), anchors: &anchors };
         make(element, &site)
     };
     scene.elements.iter().map(make).collect()
@@ -303,10 +292,7 @@ pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElem
 
 /// The element for a pulling hand.
 pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn SceneElement> {
-    let point = Attachment {
-        body: Some(pull.body),
-        point: pull.point,
-    };
+    let point = Attachment { body: Some(pull.body), point: pull.point };
     let on = model.anchor(scene, &point);
     Box::new(pull::Hand { on, pull })
 }

@@ -39,13 +39,7 @@ impl Pull {
     pub fn softly(scene: &Scene, body: usize, point: Vec3, hand: Vec3) -> Self {
         let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
         let rate = std::f64::consts::TAU * FREQUENCY;
-        Self {
-            body,
-            point,
-            hand,
-            stiffness: mass * rate * rate,
-            damping: 2.0 * DAMPING * mass * rate,
-        }
+        Self { body, point, hand, stiffness: mass * rate * rate, damping: 2.0 * DAMPING * mass * rate }
     }
 
     /// Its report for a given position, m, and velocity, m/s, of the point: from the hand to the point.

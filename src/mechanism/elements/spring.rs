@@ -53,11 +53,7 @@ impl Spring {
         let (end, end_velocity, end_arm) = point_of(&self.to, motion);
         let distance = end - start;
         let length = distance.norm();
-        let along = if length > 0.0 {
-            distance / length
-        } else {
-            Vec3::zeros()
-        };
+        let along = if length > 0.0 { distance / length } else { Vec3::zeros() };
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
         let elastic = self.elastic.tension(length - self.length);
@@ -130,10 +126,6 @@ impl ForceElement for Spring {
 impl SceneElement for Spring {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.state(motion);
-        ElementReport {
-            points: s.points,
-            force: s.along * -s.tension,
-            ..ElementReport::default()
-        }
+        ElementReport { points: s.points, force: s.along * -s.tension, ..ElementReport::default() }
     }
 }

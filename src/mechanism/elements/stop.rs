@@ -52,11 +52,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         lower: lower - middle,
         upper: upper - middle,
         stiffness: element.number("force") / (depth * depth.sqrt()),
-        damping: if chi > 0.0 {
-            chi / element.number("speed")
-        } else {
-            0.0
-        },
+        damping: if chi > 0.0 { chi / element.number("speed") } else { 0.0 },
     })
 }
 
@@ -73,13 +69,7 @@ impl Stop {
         };
         let rate = side * place.rate;
         let elastic = self.stiffness * depth * depth.sqrt();
-        let press = Press {
-            side,
-            depth,
-            rate,
-            elastic,
-            force: (elastic * (1.0 + self.damping * rate)).max(0.0),
-        };
+        let press = Press { side, depth, rate, elastic, force: (elastic * (1.0 + self.damping * rate)).max(0.0) };
         (place, Some(press))
     }
 }

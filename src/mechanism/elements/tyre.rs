@@ -4,9 +4,7 @@
 
 use std::sync::Arc;
 
-use super::{
-    At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of, point_of, push,
-};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of, point_of, push};
 use crate::jet::Jet;
 use crate::mechanism::Powers;
 use crate::mechanism::drives::Law;
@@ -60,14 +58,7 @@ impl Tyre {
             true => (self.stiffness * depth + self.damping * rate).max(0.0),
             false => 0.0,
         };
-        State {
-            centre,
-            arm,
-            ground,
-            depth,
-            rate,
-            force,
-        }
+        State { centre, arm, ground, depth, rate, force }
     }
 }
 
@@ -80,10 +71,7 @@ impl ForceElement for Tyre {
 
     fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
         // What it presses on is where the centre is, but stays with the world, the last of the bodies.
-        let world = Anchor {
-            body: motion.len() - 1,
-            offset: point_of(&self.on, motion).0,
-        };
+        let world = Anchor { body: motion.len() - 1, offset: point_of(&self.on, motion).0 };
         Some([world, self.on])
     }
 

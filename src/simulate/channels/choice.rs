@@ -43,10 +43,7 @@ impl Listed {
     /// Its name, then without its last part, and so on.
     fn names(&self) -> impl Iterator<Item = &str> {
         let cuts = self.name.rmatch_indices('.').map(|(dot, _)| dot);
-        [self.name.len()]
-            .into_iter()
-            .chain(cuts)
-            .map(|end| &self.name[..end])
+        [self.name.len()].into_iter().chain(cuts).map(|end| &self.name[..end])
     }
 }
 
@@ -103,14 +100,8 @@ pub fn chosen_columns(
             });
         }
     }
-    let chosen = |channel: &&Listed| {
-        channel.name == TIME || patterns.iter().any(|p| channel.is_chosen_by(p))
-    };
-    Ok(list
-        .iter()
-        .filter(chosen)
-        .map(|channel| (channel.column.clone(), channel.reading))
-        .unzip())
+    let chosen = |channel: &&Listed| channel.name == TIME || patterns.iter().any(|p| channel.is_chosen_by(p));
+    Ok(list.iter().filter(chosen).map(|channel| (channel.column.clone(), channel.reading)).unzip())
 }
 
 /// Units by the ends of column names, the longer first.
@@ -175,10 +166,7 @@ mod tests {
                           length = \"1 m\"\nstiffness = \"1 N/m\"\n";
 
     fn first(scene: &Scene) -> Frame {
-        let mut frame = Frame {
-            reactions: Some(Vec::new()),
-            ..Frame::default()
-        };
+        let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
         let mut simulation = Simulation::new(scene).expect("starts");
         simulation.sample(0.0, &mut frame);
         frame
@@ -240,28 +228,13 @@ mod tests {
             chosen_columns(&scene, &first, &patterns).map(|found| found.0.join(","))
         };
         for (patterns, found) in [
-            (
-                &["B.force", "time"][..],
-                "t_s,B_force_x_N,B_force_y_N,B_force_z_N",
-            ),
-            (
-                &["crank.angle", "B.force.z"],
-                "t_s,B_force_z_N,crank_angle_rad",
-            ),
-            (
-                &["crank.rate", "slider.rate"],
-                "t_s,crank_rate_rad_s,slider_rate_m_s",
-            ),
-            (
-                &["s.length", "*.actuator"],
-                "t_s,crank_actuator_Nm,s_length_m",
-            ),
+            (&["B.force", "time"][..], "t_s,B_force_x_N,B_force_y_N,B_force_z_N"),
+            (&["crank.angle", "B.force.z"], "t_s,B_force_z_N,crank_angle_rad"),
+            (&["crank.rate", "slider.rate"], "t_s,crank_rate_rad_s,slider_rate_m_s"),
+            (&["s.length", "*.actuator"], "t_s,crank_actuator_Nm,s_length_m"),
             (&["energy.k*"], "t_s,kinetic_J,kinetic_change_J"),
             (&["rod_?_m"], "t_s,rod_x_m,rod_y_m,rod_z_m"),
-            (
-                &["rod.pose"],
-                "t_s,rod_x_m,rod_y_m,rod_z_m,rod_alpha_rad,rod_beta_rad,rod_gamma_rad",
-            ),
+            (&["rod.pose"], "t_s,rod_x_m,rod_y_m,rod_z_m,rod_alpha_rad,rod_beta_rad,rod_gamma_rad"),
         ] {
             assert_eq!(columns(patterns).expect("matches"), found, "{patterns:?}");
         }
@@ -269,9 +242,6 @@ mod tests {
         let pose = columns(&[&format!("{output}.pose")]).expect("matches");
         assert_eq!(pose, "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad");
         let wrong = columns(&["B.force", "B.froce"]).expect_err("no such channel");
-        assert_eq!(
-            wrong.to_string(),
-            "`B.froce` is none of the scene's channels (did you mean `B.force`?)"
-        );
+        assert_eq!(wrong.to_string(), "`B.froce` is none of the scene's channels (did you mean `B.force`?)");
     }
 }

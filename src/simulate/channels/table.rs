@@ -3,9 +3,9 @@
 
 use Quantity as Q;
 use Take::{
-    Angles, Axes, BodyAxes, ChildTurn, Closing, Element, ElementValue, FirstTurn, Given, Hinge,
-    HingeCoordinate, Joint, JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn,
-    Slide, SlideCoordinate, Taken, Turn, TurnRate, Whole,
+    Angles, Axes, BodyAxes, ChildTurn, Closing, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
+    JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn, Slide, SlideCoordinate, Taken, Turn, TurnRate,
+    Whole,
 };
 
 use crate::scene::Vec3;
@@ -216,9 +216,7 @@ impl Quantity {
     /// Whether this member of [`Self::EnergyBalance`] takes or stores energy; the others supply it. All of them sum to
     /// zero.
     pub fn takes(member: &str) -> bool {
-        TABLE
-            .iter()
-            .any(|signal| matches!(signal.take, Taken(own, _) if own == member))
+        TABLE.iter().any(|signal| matches!(signal.take, Taken(own, _) if own == member))
     }
 }
 
@@ -308,9 +306,7 @@ impl Take {
             Element(_) | ElementValue(_) => Each::Element,
             Axes(_) | Angles(_) => Each::Output,
             BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
-            SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => {
-                Each::Coordinate
-            }
+            SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => Each::Coordinate,
             Reaction(_) => Each::Holding,
             Whole(..) | Given(..) | Taken(..) | ProbeError => Each::Once,
         }
@@ -318,8 +314,8 @@ impl Take {
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | Closing(_)
-            | ProbeError | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | Closing(_) | ProbeError
+            | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
             Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
             _ => &[("", "")],
         }
@@ -344,10 +340,9 @@ impl Take {
                 let body = frame.bodies.get(part);
                 body.map(|body| of(&pose_of(body))[component])
             }
-            SlideCoordinate(order)
-            | HingeCoordinate(order)
-            | FirstTurn(order)
-            | SecondTurn(order) => frame.coordinates.get(part).map(|c| c[*order]),
+            SlideCoordinate(order) | HingeCoordinate(order) | FirstTurn(order) | SecondTurn(order) => {
+                frame.coordinates.get(part).map(|c| c[*order])
+            }
             TurnRate => frame.coordinates.get(part).map(|c| c[1]),
             Reaction(which) => {
                 let of_part = frame.reactions.as_ref()?.get(part)?;
@@ -389,31 +384,17 @@ pub(super) struct Signal {
 
 /// A signal in neither plots nor the rows that `run` writes unasked.
 const fn asked(name: &'static str, column: &'static str, take: Take, help: &'static str) -> Signal {
-    Signal {
-        name,
-        column,
-        help,
-        plot: None,
-        run: None,
-        take,
-        of_elements: false,
-    }
+    Signal { name, column, help, plot: None, run: None, take, of_elements: false }
 }
 
 /// The same shown in a plot.
 const fn plotted(plot: Quantity, signal: Signal) -> Signal {
-    Signal {
-        plot: Some(plot),
-        ..signal
-    }
+    Signal { plot: Some(plot), ..signal }
 }
 
 /// The same among the columns of `run`.
 const fn listed(place: u8, signal: Signal) -> Signal {
-    Signal {
-        run: Some(place),
-        ..signal
-    }
+    Signal { run: Some(place), ..signal }
 }
 
 const fn both(plot: Quantity, place: u8, signal: Signal) -> Signal {
@@ -421,10 +402,7 @@ const fn both(plot: Quantity, place: u8, signal: Signal) -> Signal {
 }
 
 const fn of_elements(signal: Signal) -> Signal {
-    Signal {
-        of_elements: true,
-        ..signal
-    }
+    Signal { of_elements: true, ..signal }
 }
 
 /// Every signal, in the order of saved records and of the members of a plot.

@@ -107,11 +107,7 @@ impl Simulation {
         let factor = state.control.controller.after_accept(error);
         let next = h * factor.min(growth.max(1.0));
         // A step cut short is no evidence against the longer one.
-        state.control.h_next = if cut {
-            state.control.h_next.max(next)
-        } else {
-            next
-        };
+        state.control.h_next = if cut { state.control.h_next.max(next) } else { next };
         let contact_began = std::mem::take(&mut state.control.contact_began);
         self.finish_gaps(t_end);
         let event = self.first_event(h);
@@ -185,21 +181,13 @@ impl Simulation {
     fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         // Positive where the gap contradicts the recorded contact state.
-        let sign = if self.state.now.memory[j].active {
-            -1.0
-        } else {
-            1.0
-        };
+        let sign = if self.state.now.memory[j].active { -1.0 } else { 1.0 };
         // A ball may cross its play several times in one long step: search intervals in which it moves little compared with
         // the play.
         let travel = h * start.speed.max(end.speed);
         let clearance = self.mechanism.contacts.clearance(j);
         let pieces = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
-        let signed = |theta: f64, at: Approach| SignedGap {
-            theta,
-            gap: sign * at.penetration,
-            rate: sign * at.rate,
-        };
+        let signed = |theta: f64, at: Approach| SignedGap { theta, gap: sign * at.penetration, rate: sign * at.rate };
         let mut left = signed(0.0, start);
         for n in 1..=pieces as u32 {
             let right = if f64::from(n) == pieces {
@@ -232,18 +220,13 @@ impl Simulation {
         }
         // An extremum inside: a brief contact that both ends miss, or a brief separation.
         let (mut a, mut b) = (left, right);
-        let turns = if right.gap > 0.0 {
-            a.rate < 0.0 && b.rate > 0.0
-        } else {
-            a.rate > 0.0 && b.rate < 0.0
-        };
+        let turns = if right.gap > 0.0 { a.rate < 0.0 && b.rate > 0.0 } else { a.rate > 0.0 && b.rate < 0.0 };
         if !turns {
             return None;
         }
         for _ in 0..40 {
             // Neither tangent reaches zero: no root here.
-            let reach = (a.gap + a.rate * (b.theta - a.theta) * h)
-                .min(b.gap - b.rate * (b.theta - a.theta) * h);
+            let reach = (a.gap + a.rate * (b.theta - a.theta) * h).min(b.gap - b.rate * (b.theta - a.theta) * h);
             if right.gap <= 0.0 && reach < 0.0 {
                 return None;
             }
@@ -267,10 +250,6 @@ impl Simulation {
     fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> SignedGap {
         self.measure_at(j, theta, h);
         let gap = self.mechanism.contacts.gap(j);
-        SignedGap {
-            theta,
-            gap: sign * gap.separation.penetration,
-            rate: sign * gap.separation.rate,
-        }
+        SignedGap { theta, gap: sign * gap.separation.penetration, rate: sign * gap.separation.rate }
     }
 }

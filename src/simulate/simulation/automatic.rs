@@ -200,11 +200,8 @@ impl Simulation {
                 choice.limited += 1;
             }
         } else {
-            choice.limited = if stiffness > STABILITY_LIMIT {
-                choice.limited + 1
-            } else {
-                choice.limited.saturating_sub(1)
-            };
+            choice.limited =
+                if stiffness > STABILITY_LIMIT { choice.limited + 1 } else { choice.limited.saturating_sub(1) };
             if touches
                 && choice.friction.wait == 0
                 && self.mechanism.has_friction_alone()
@@ -218,8 +215,7 @@ impl Simulation {
             choice.implicit.wait -= 1;
             return next;
         }
-        let limited =
-            choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
+        let limited = choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
         let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
         if settled && velocities <= self.mechanism.largest_implicit() {
             (choice.since_contact, choice.limited) = (0, 0);
@@ -242,10 +238,7 @@ pub(super) fn controller_of(method: Method, member: Member) -> Controller {
 }
 
 /// Allocates what an implicit method needs.
-pub(super) fn prepare_implicit(
-    mechanism: &mut Mechanism,
-    method: Method,
-) -> Result<(), MechanismError> {
+pub(super) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
     let velocities = mechanism.dimension() - mechanism.positions();
     if mechanism.is_kinematic() {
         return Ok(());
@@ -254,10 +247,7 @@ pub(super) fn prepare_implicit(
         mechanism.prepare_implicit_contacts()?;
     }
     if method.is_implicit() && velocities > LARGEST_DENSE {
-        return Err(MechanismError::TooLarge {
-            velocities,
-            most: LARGEST_DENSE,
-        });
+        return Err(MechanismError::TooLarge { velocities, most: LARGEST_DENSE });
     }
     let tries = method == Method::Automatic && velocities <= mechanism.largest_implicit();
     if method.is_implicit() || tries {
@@ -288,13 +278,7 @@ mod tests {
             simulation.state.control.choice = Choice {
                 explicit_progress: 1e-3,
                 explicit_cost: 1e3,
-                implicit: Trial {
-                    progress: ratio * 1e-2,
-                    cost: 1e4,
-                    steps: 7,
-                    failures: 1,
-                    wait: 0,
-                },
+                implicit: Trial { progress: ratio * 1e-2, cost: 1e4, steps: 7, failures: 1, wait: 0 },
                 ..Choice::default()
             };
             simulation.choose_member(1e-9, 0.0, 10.0);
@@ -311,8 +295,7 @@ mod tests {
     fn a_trial_of_friction_that_fails_has_explicit_steps_follow() {
         for (tolerance, fails) in [("1e-6", true), ("1e-5", false)] {
             let change = ("solver.tolerance".to_owned(), tolerance.to_owned());
-            let mut simulation =
-                Simulation::new(&Scene::load("spcmm", &[change]).unwrap()).unwrap();
+            let mut simulation = Simulation::new(&Scene::load("spcmm", &[change]).unwrap()).unwrap();
             simulation.advance_to(1.0).unwrap();
             simulation.state.now.memory[0].active = true;
             simulation.state.control.member = Member::Friction;
@@ -320,12 +303,7 @@ mod tests {
             simulation.state.control.choice = Choice {
                 explicit_progress: 1.0,
                 explicit_cost: 1.0,
-                friction: Trial {
-                    progress: 1e-3,
-                    cost: 100.0,
-                    steps: FRICTION_STEPS - 1,
-                    ..Trial::default()
-                },
+                friction: Trial { progress: 1e-3, cost: 100.0, steps: FRICTION_STEPS - 1, ..Trial::default() },
                 ..Choice::default()
             };
             simulation.choose_member(1e-9, 0.0, 10.0);
@@ -346,10 +324,7 @@ mod tests {
             h_explicit: 1e-16,
             explicit_progress: 1.0,
             explicit_cost: 1e-3,
-            implicit: Trial {
-                steps: TRIAL_STEPS - 1,
-                ..Trial::default()
-            },
+            implicit: Trial { steps: TRIAL_STEPS - 1, ..Trial::default() },
             ..Choice::default()
         };
         simulation.choose_member(1e-3, 0.0, 10.0);

@@ -30,8 +30,7 @@ impl State {
         self.record.impacts.follow(j, course, force, damping);
         if damping > self.record.statistics.damping[j] {
             self.record.statistics.damping[j] = damping;
-            self.record.statistics.damping_time[j] =
-                self.before.t + theta * (self.now.t - self.before.t);
+            self.record.statistics.damping_time[j] = self.before.t + theta * (self.now.t - self.before.t);
         }
     }
 }
@@ -41,19 +40,10 @@ impl Simulation {
     pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
         let located = self.attempt.located.take();
         let fixed = !self.locates();
-        let Self {
-            mechanism,
-            running,
-            state,
-            attempt,
-            ..
-        } = self;
+        let Self { mechanism, running, state, attempt, .. } = self;
         let strongest = &attempt.strongest;
         let least = least_impact_steps(running.solver.method);
-        let mut switched = Switched {
-            contacts: false,
-            forces: false,
-        };
+        let mut switched = Switched { contacts: false, forces: false };
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
@@ -68,11 +58,8 @@ impl Simulation {
             // A located switch ends within rounding of the wall, on either side; but the repeated step may show that a ball
             // about to separate turned around before.
             let turned = state.now.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
-            let touching = if located == Some(j) {
-                !state.now.memory[j].active || turned
-            } else {
-                end.penetration > 0.0
-            };
+            let touching =
+                if located == Some(j) { !state.now.memory[j].active || turned } else { end.penetration > 0.0 };
             state.record.contact_steps[j] += 1;
             if touching == state.now.memory[j].active {
                 if touching {
@@ -89,18 +76,11 @@ impl Simulation {
                 let course = PenetrationCubic::new(start, end, h);
                 let crosses = start.penetration < 0.0 && end.penetration > 0.0;
                 let theta = if crosses { course.crossing() } else { 1.0 };
-                let rate = if crosses {
-                    course.at(theta).1
-                } else {
-                    end.rate
-                };
+                let rate = if crosses { course.at(theta).1 } else { end.rate };
                 let time = state.before.t + theta * h;
                 let asked = running.ball_joints[j].contact.restitution;
                 let among_others = state.now.memory.iter().any(|m| m.active);
-                state
-                    .record
-                    .impacts
-                    .begin(j, time, rate, asked, coefficients, among_others);
+                state.record.impacts.begin(j, time, rate, asked, coefficients, among_others);
                 let mut memory = Memory::begun(coefficients, rate);
                 // A located contact begins where the step ends.
                 if fixed {
@@ -112,8 +92,7 @@ impl Simulation {
                 state.record.statistics.impacts[j] += 1;
                 state.record.statistics.floored[j] += u64::from(memory.floored);
                 state.record.peaks[j].impacts += 1;
-                state.record.peaks[j].approach_speed =
-                    state.record.peaks[j].approach_speed.max(rate);
+                state.record.peaks[j].approach_speed = state.record.peaks[j].approach_speed.max(rate);
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
             } else {
@@ -138,12 +117,7 @@ impl Simulation {
     /// Largest contact forces of the step just accepted, in continuous time.
     pub(super) fn track_peaks(&mut self, h: f64) {
         let immediate = !self.locates();
-        let Self {
-            mechanism,
-            state,
-            attempt,
-            ..
-        } = self;
+        let Self { mechanism, state, attempt, .. } = self;
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
@@ -175,11 +149,8 @@ impl Simulation {
                 peak.time = time;
                 peak.normal_force = gap.separation.normal * -force;
                 // Friction follows the normal force within a step: the ratio at the step's end is used for the peak.
-                peak.friction_force = if gap.normal_force > 0.0 {
-                    gap.friction * (force / gap.normal_force)
-                } else {
-                    gap.friction
-                };
+                peak.friction_force =
+                    if gap.normal_force > 0.0 { gap.friction * (force / gap.normal_force) } else { gap.friction };
             }
         }
     }

@@ -70,9 +70,7 @@ impl Simulation {
     /// Where corners are not located, all follow the whole laws.
     pub(super) fn hold_pieces(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.control.chatters;
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
         if anew || !holds {
             for memory in &mut now.memory {
@@ -115,11 +113,7 @@ impl Simulation {
             let mut take = |corner: Option<(f64, Piece)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
                 if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
-                    first = Some(Corner {
-                        theta,
-                        joint: j,
-                        next,
-                    });
+                    first = Some(Corner { theta, joint: j, next });
                 }
             };
             if memory.friction_piece != FrictionPiece::Unsplit {
@@ -198,14 +192,7 @@ impl Simulation {
 
     /// Measures the gap of joint `j` on the interpolant of the attempted step.
     pub(super) fn measure_at(&mut self, j: usize, theta: f64, h: f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            attempt,
-            scratch_y,
-            ..
-        } = self;
+        let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
         let (now, end) = (&state.now, &attempt.end);
         let all = 0..now.y.len();
         for part in mechanism.measured(j).unwrap_or(std::slice::from_ref(&all)) {
@@ -240,9 +227,7 @@ impl Simulation {
                 let (_, speed) = self.beyond(j, at.max(AT_START), h);
                 let c = self.mechanism.contacts.coefficients(j);
                 let next = match self.state.now.memory[j].friction_piece {
-                    FrictionPiece::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => {
-                        FrictionPiece::Full
-                    }
+                    FrictionPiece::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => FrictionPiece::Full,
                     FrictionPiece::Ramp => FrictionPiece::DeadBand,
                     _ => FrictionPiece::Ramp,
                 };
@@ -259,8 +244,7 @@ impl Simulation {
         let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
         for part in self.mechanism.moving() {
             let part = part.clone();
-            self.stepper
-                .interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
+            self.stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
         }
         for part in self.mechanism.moving() {
             end.y[part.clone()].copy_from_slice(&scratch[part.clone()]);

@@ -10,9 +10,7 @@ impl Simulation {
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
     pub fn displace(&mut self, offset: &[f64]) {
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         for (y, offset) in state.now.y.iter_mut().zip(offset) {
             *y += offset;
         }

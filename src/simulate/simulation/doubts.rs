@@ -55,10 +55,7 @@ impl Simulation {
             contacts: statistics.impacts[j],
         }));
         let patch = self.worst(LARGEST_PATCH, |j| self.largest_patch(j));
-        doubts.extend(patch.map(|(joints, j)| Doubt::Patch {
-            joints,
-            radii: self.largest_patch(j),
-        }));
+        doubts.extend(patch.map(|(joints, j)| Doubt::Patch { joints, radii: self.largest_patch(j) }));
         let usual = |j: usize| self.mechanism.contacts.coefficients(j).damping;
         let damping = self.worst(MOST_DAMPING, |j| statistics.damping[j] - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
@@ -104,19 +101,9 @@ impl Simulation {
             (LedgerTerm::External, ledger.external_work),
             (LedgerTerm::Changes, ledger.change_work),
         ];
-        let least = works
-            .into_iter()
-            .filter(|(_, value)| *value != 0.0)
-            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let beyond =
-            |value: f64| residual.abs() > RESIDUAL_OF_WORK * value.abs() && share > NOTEWORTHY;
-        least
-            .filter(|(_, value)| beyond(*value))
-            .map(|(work, value)| Doubt::Work {
-                work,
-                value,
-                residual,
-            })
+        let least = works.into_iter().filter(|(_, value)| *value != 0.0).min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let beyond = |value: f64| residual.abs() > RESIDUAL_OF_WORK * value.abs() && share > NOTEWORTHY;
+        least.filter(|(_, value)| beyond(*value)).map(|(work, value)| Doubt::Work { work, value, residual })
     }
 
     /// An explicit method at a loose tolerance, limited by stability and not by its error: the estimate then says little
@@ -137,10 +124,7 @@ impl Simulation {
         let joints = &self.running.ball_joints;
         let beyond = || (0..joints.len()).filter(|&j| measure(j) > limit);
         let worst = beyond().max_by(|&a, &b| measure(a).total_cmp(&measure(b)))?;
-        let joints = Joints {
-            worst: joints[worst].name.clone(),
-            others: beyond().count() - 1,
-        };
+        let joints = Joints { worst: joints[worst].name.clone(), others: beyond().count() - 1 };
         Some((joints, worst))
     }
 

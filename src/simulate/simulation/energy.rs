@@ -22,18 +22,14 @@ impl Simulation {
 
     /// Opens a new account at the current state, just fully evaluated.
     pub(super) fn open_account(&mut self) {
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         let energies = energies(mechanism, state);
         state.record.account = Account::start(self.running.solver.energy_ledger, energies);
     }
 
     /// Books what a live change did to the energies; the state was just fully evaluated.
     pub(super) fn book_change(&mut self) {
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         if state.record.account.on {
             let energies = energies(mechanism, state);
             state.record.account.book_change(energies);
@@ -51,12 +47,7 @@ impl Simulation {
             return;
         }
         let located = self.locates();
-        let Self {
-            mechanism,
-            state,
-            scratch_k,
-            ..
-        } = self;
+        let Self { mechanism, state, scratch_k, .. } = self;
         if !mechanism.is_evaluated_at(state.now.t) {
             mechanism.measure(state.now.t, &state.now.y);
         }
@@ -87,12 +78,7 @@ impl Simulation {
     /// Starts booking the step just accepted in the wear map: the contacts that began at its end, and the forces there,
     /// from the latest evaluation.
     fn begin_wear_of_step(&mut self) {
-        let State {
-            before,
-            now,
-            record,
-            ..
-        } = &mut self.state;
+        let State { before, now, record, .. } = &mut self.state;
         let Some(wear) = &mut record.wear else {
             return;
         };
@@ -119,11 +105,7 @@ impl Simulation {
                 return;
             }
         }
-        let interior = if kinematic {
-            &MIDDLE
-        } else {
-            self.stepper.interior()
-        };
+        let interior = if kinematic { &MIDDLE } else { self.stepper.interior() };
         self.state.record.account.course.clear();
         // A collocation method has its own quadrature, which excludes the start.
         if interior.len() == 1 {
@@ -143,14 +125,7 @@ impl Simulation {
         // Nothing acts on the others but gravity.
         self.interpolate_stepped(theta, h);
         let located = self.locates();
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            scratch_y,
-            scratch_k,
-            ..
-        } = self;
+        let Self { mechanism, stepper, state, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
         let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
         let powers = evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k);
@@ -169,15 +144,10 @@ impl Simulation {
         if frame.time >= to {
             return self.ledger().copied();
         }
-        let energies = Energies {
-            kinetic: frame.kinetic,
-            gravitational: frame.potential - frame.elastic,
-            elastic: frame.elastic,
-        };
+        let energies =
+            Energies { kinetic: frame.kinetic, gravitational: frame.potential - frame.elastic, elastic: frame.elastic };
         let h = to - from;
-        account
-            .on
-            .then(|| account.within((frame.time - from) / h, h, energies))
+        account.on.then(|| account.within((frame.time - from) / h, h, energies))
     }
 }
 
@@ -187,15 +157,7 @@ fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let contacts = &mechanism.contacts;
     let in_contacts: f64 = (0..contacts.len())
         .filter(|&j| contacts.has_clearance(j))
-        .map(|j| {
-            contacts
-                .coefficients(j)
-                .elastic_energy(state.now.gaps[j].penetration)
-        })
+        .map(|j| contacts.coefficients(j).elastic_energy(state.now.gaps[j].penetration))
         .sum();
-    Energies {
-        kinetic,
-        gravitational,
-        elastic: in_contacts + mechanism.energy_in_elements(state.now.t),
-    }
+    Energies { kinetic, gravitational, elastic: in_contacts + mechanism.energy_in_elements(state.now.t) }
 }

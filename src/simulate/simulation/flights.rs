@@ -16,9 +16,7 @@ impl Simulation {
         if self.running.solver.method != Method::Automatic || flyers < FEWEST_FLYERS {
             return;
         }
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         let now = &mut state.now;
         let until = limit.min(now.t + state.control.h_next.min(LONGEST_STEP));
         let (mut some_land, mut some_start) = (false, false);
@@ -48,12 +46,8 @@ impl Simulation {
         if some_land {
             // The derivative of what landed is still that of a flight.
             let located = self.locates();
-            let Self {
-                mechanism, state, ..
-            } = self;
-            let StepEnd {
-                t, y, k, memory, ..
-            } = &mut state.now;
+            let Self { mechanism, state, .. } = self;
+            let StepEnd { t, y, k, memory, .. } = &mut state.now;
             let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
             evaluator.derivative(*t, y, k);
             let counts = evaluator.counts;
@@ -64,8 +58,7 @@ impl Simulation {
     /// Lets evaluations leave out what flies.
     pub(super) fn leave_out_flights(&mut self) {
         let flights = &self.state.flights;
-        self.mechanism
-            .put_to_sleep(|flyer| flights[flyer].is_some());
+        self.mechanism.put_to_sleep(|flyer| flights[flyer].is_some());
     }
 
     /// Lets evaluations see everything for a while, if anything flies; whether it does.
@@ -103,12 +96,7 @@ pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k
 }
 
 /// Writes the bodies in flight at `t` to the state `y`.
-pub(super) fn put_flights(
-    mechanism: &Mechanism,
-    flights: &[Option<Flight>],
-    t: f64,
-    y: &mut [f64],
-) {
+pub(super) fn put_flights(mechanism: &Mechanism, flights: &[Option<Flight>], t: f64, y: &mut [f64]) {
     for (flyer, flight) in mechanism.flyers().iter().zip(flights) {
         if let Some(flight) = flight {
             flight.put(flyer, t, y);

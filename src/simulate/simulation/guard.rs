@@ -32,10 +32,7 @@ impl Simulation {
             let penetration = self.attempt.end.gaps[j].penetration;
             let radius = self.mechanism.contacts.coefficients(j).ball_radius;
             if !(penetration <= LEFT_SOCKET * radius) {
-                return Some(StopFault::LeftSocket {
-                    joint: self.running.ball_joints[j].name.clone(),
-                    penetration,
-                });
+                return Some(StopFault::LeftSocket { joint: self.running.ball_joints[j].name.clone(), penetration });
             }
             if !self.running.solver.method.is_adaptive()
                 && let Some(times) = self.energy_of_overshoot(j, h)
@@ -51,11 +48,7 @@ impl Simulation {
             let (v, w) = (m.velocity.norm(), m.angular_velocity.norm());
             let sane = v <= ABSURD_SPEED && w <= ABSURD_SPEED;
             if !(sane && m.position.iter().all(|x| x.is_finite())) {
-                return Some(StopFault::AbsurdSpeed {
-                    body: body.name.clone(),
-                    speed: v,
-                    angular_speed: w,
-                });
+                return Some(StopFault::AbsurdSpeed { body: body.name.clone(), speed: v, angular_speed: w });
             }
         }
         // Where the others are is known from the motion.

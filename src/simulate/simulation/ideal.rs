@@ -117,10 +117,7 @@ impl Reference {
     }
 
     pub(super) fn kept(&self) -> Reference<Kept> {
-        self.map(|motion| Kept {
-            snapshot: motion.simulation.snapshot(),
-            marks: motion.marks.clone(),
-        })
+        self.map(|motion| Kept { snapshot: motion.simulation.snapshot(), marks: motion.marks.clone() })
     }
 
     /// To the state of a reference of the same equations.
@@ -182,11 +179,7 @@ impl IdealMotion {
             body: scene.output.body,
             probe,
             frame: Frame::default(),
-            marks: Marks {
-                ring: vec![Mark::default(); MARKS],
-                count: 0,
-                stopped: None,
-            },
+            marks: Marks { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
         };
         motion.mark();
         Ok(motion)
@@ -194,17 +187,13 @@ impl IdealMotion {
 
     /// Records the current tip.
     fn mark(&mut self) {
-        self.simulation
-            .sample(self.simulation.time(), &mut self.frame);
+        self.simulation.sample(self.simulation.time(), &mut self.frame);
         let body = &self.frame.bodies[self.body];
         let (arm, w) = (body.rotation * self.probe, body.angular_velocity);
-        let acceleration =
-            body.acceleration + body.angular_acceleration.cross(&arm) + w.cross(&w.cross(&arm));
+        let acceleration = body.acceleration + body.angular_acceleration.cross(&arm) + w.cross(&w.cross(&arm));
         let velocity = body.velocity + w.cross(&arm);
-        self.marks.ring[self.marks.count % MARKS] = Mark {
-            time: self.frame.time,
-            tip: [body.position + arm, velocity, acceleration],
-        };
+        self.marks.ring[self.marks.count % MARKS] =
+            Mark { time: self.frame.time, tip: [body.position + arm, velocity, acceleration] };
         self.marks.count += 1;
     }
 
@@ -261,11 +250,7 @@ fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
     let (v0, v1, a0, a1) = (v0 * h, v1 * h, a0 * (h * h), a1 * (h * h));
     // What remains at the end after the parabola from the start.
     let (x, v, c) = (x1 - x0 - v0 - a0 * 0.5, v1 - v0 - a0, a1 - a0);
-    let (c3, c4, c5) = (
-        x * 10.0 - v * 4.0 + c * 0.5,
-        x * -15.0 + v * 7.0 - c,
-        x * 6.0 - v * 3.0 + c * 0.5,
-    );
+    let (c3, c4, c5) = (x * 10.0 - v * 4.0 + c * 0.5, x * -15.0 + v * 7.0 - c, x * 6.0 - v * 3.0 + c * 0.5);
     x0 + (v0 + (a0 * 0.5 + (c3 + (c4 + c5 * s) * s) * s) * s) * s
 }
 
@@ -320,10 +305,7 @@ mod tests {
         let tips = times.map(|time| motion.tip(time).expect("goes on"));
         let angle = |a: Vec3, b: Vec3| libm::atan2(a.cross(&b).norm(), a.dot(&b));
         let (first, second) = (angle(tips[0], tips[1]), angle(tips[1], tips[2]));
-        assert!(
-            first > 0.01 && (first - second).abs() < 1e-9,
-            "{first} {second}"
-        );
+        assert!(first > 0.01 && (first - second).abs() < 1e-9, "{first} {second}");
         let before = motion.tip(change - 0.005).expect("goes on");
         assert!((angle(before, tips[0]) - 0.5 * first).abs() > 1e-6);
     }

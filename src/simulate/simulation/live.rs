@@ -31,9 +31,7 @@ pub enum ChangeError {
         bodies: usize,
     },
     /// A hand, or the point that it holds, out of reach.
-    #[error(
-        "a hand, or the point that it holds, is {far:e} m away; allowed at most {FARTHEST_HAND} m"
-    )]
+    #[error("a hand, or the point that it holds, is {far:e} m away; allowed at most {FARTHEST_HAND} m")]
     TooFar {
         /// m.
         far: f64,
@@ -69,18 +67,10 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub fn set_value(
-        &mut self,
-        key: &str,
-        value: &crate::scene::Value,
-    ) -> Result<Effect, ChangeError> {
+    pub fn set_value(&mut self, key: &str, value: &crate::scene::Value) -> Result<Effect, ChangeError> {
         let mut next = Scene::clone(&self.scene);
         let waits = next.set_value(key, value)?.at_reset;
-        self.adopt(
-            next,
-            |running| running.set_value(key, value).map(|_| ()),
-            waits,
-        )
+        self.adopt(next, |running| running.set_value(key, value).map(|_| ()), waits)
     }
 
     /// Starts, changes or (with `None`) ends the pull of a hand on a body.
@@ -140,9 +130,7 @@ impl Simulation {
         // A joint that becomes ideal, or stops being so, changes the equations.
         let turns = |running: &Scene| {
             let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
-            pairs
-                .map(|(a, b)| (a.contact.clearance, b.contact.clearance))
-                .any(|(a, b)| (a == 0.0) != (b == 0.0))
+            pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance)).any(|(a, b)| (a == 0.0) != (b == 0.0))
         };
         if waits || turns(&running) {
             self.scene = Arc::new(next);
@@ -189,12 +177,7 @@ impl Simulation {
 
     /// Gives the equations what live changes reach: the running scene and the state have it.
     pub(super) fn put_conditions(&mut self) {
-        let Self {
-            mechanism,
-            state,
-            running,
-            ..
-        } = self;
+        let Self { mechanism, state, running, .. } = self;
         mechanism.gravity = running.gravity;
         if mechanism.pull() != state.pull {
             mechanism.set_pull(running, state.pull);
@@ -226,20 +209,13 @@ impl Simulation {
         if contact.clearance == 0.0 {
             return;
         }
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let Self { mechanism, state, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
         let now = mechanism.contacts.clearance(j);
         let gap = *mechanism.contacts.gap(j);
         let distance = gap.separation.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
-            let ramp = Ramp {
-                start: state.now.t,
-                from: now,
-                rate: -CLEARANCE_SPEED,
-                to: contact.clearance,
-            };
+            let ramp = Ramp { start: state.now.t, from: now, rate: -CLEARANCE_SPEED, to: contact.clearance };
             state.ramps[j] = Some(ramp);
             now
         } else {
@@ -257,12 +233,7 @@ impl Simulation {
     /// When the first clearance ramp under way ends, s.
     pub(super) fn ramp_end(&self) -> f64 {
         let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
-        self.state
-            .ramps
-            .iter()
-            .flatten()
-            .map(end)
-            .fold(f64::INFINITY, f64::min)
+        self.state.ramps.iter().flatten().map(end).fold(f64::INFINITY, f64::min)
     }
 
     pub(super) fn finish_ramps(&mut self) {

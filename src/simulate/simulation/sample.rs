@@ -13,11 +13,7 @@ impl Simulation {
     pub fn peak(&self, j: usize) -> (f64, f64) {
         let statistics = self.statistics();
         let found = (statistics.peak_normal[j], statistics.peak_time[j]);
-        if self.sampled[j].0 > found.0 {
-            self.sampled[j]
-        } else {
-            found
-        }
+        if self.sampled[j].0 > found.0 { self.sampled[j] } else { found }
     }
 
     /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
@@ -52,14 +48,7 @@ impl Simulation {
         }
         let flies = self.look_at_all();
         let located = self.locates();
-        let Self {
-            mechanism,
-            state,
-            scratch_y,
-            scratch_k,
-            scratch_memory,
-            ..
-        } = self;
+        let Self { mechanism, state, scratch_y, scratch_k, scratch_memory, .. } = self;
         if inside {
             mechanism.project(time, scratch_y);
         }
@@ -86,13 +75,7 @@ impl Simulation {
 
     /// The same but for the bodies in flight.
     pub(super) fn interpolate_stepped(&mut self, theta: f64, h: f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            scratch_y,
-            ..
-        } = self;
+        let Self { mechanism, stepper, state, scratch_y, .. } = self;
         let (before, now) = (&state.before, &state.now);
         let (y0, k0, y, k) = (&before.y, &before.k, &now.y, &now.k);
         if mechanism.is_kinematic() {

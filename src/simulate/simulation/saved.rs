@@ -76,10 +76,9 @@ impl Simulation {
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
             ideal: match &self.reference {
-                Reference::Alongside(motion) => Some(Box::new(SavedIdeal {
-                    state: motion.simulation.saved(),
-                    marks: motion.marks.clone(),
-                })),
+                Reference::Alongside(motion) => {
+                    Some(Box::new(SavedIdeal { state: motion.simulation.saved(), marks: motion.marks.clone() }))
+                }
                 Reference::Elsewhere | Reference::Itself | Reference::None(_) => None,
             },
             sampled: self.sampled.clone(),
@@ -95,10 +94,7 @@ impl Simulation {
         let fits = saved.state.fits(self)
             && saved.sampled.len() == self.sampled.len()
             && saved.polynomial.is_some() == polynomial.is_some()
-            && saved
-                .polynomial
-                .iter()
-                .all(|p| p.fits(self.state.now.y.len()));
+            && saved.polynomial.iter().all(|p| p.fits(self.state.now.y.len()));
         if !fits {
             return Err(Misfit);
         }

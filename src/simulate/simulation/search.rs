@@ -34,8 +34,7 @@ impl Simulation {
             if !memory.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let course =
-                PenetrationCubic::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
+            let course = PenetrationCubic::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
             let (force, theta) = course.strongest(&c, &memory);
             self.attempt.strongest[j] = (force, theta);
@@ -48,11 +47,7 @@ impl Simulation {
             self.look(self.state.before.t + theta * h);
             let inside = self.mechanism.contacts.gap(j).normal_force;
             let ends = course.stronger_end(&c, &memory);
-            self.attempt.strongest[j] = if inside > ends.0 {
-                (inside, theta)
-            } else {
-                ends
-            };
+            self.attempt.strongest[j] = if inside > ends.0 { (inside, theta) } else { ends };
         }
     }
 
@@ -79,8 +74,7 @@ impl Simulation {
                     continue;
                 }
                 let gap = self.mechanism.contacts.gap(j);
-                let (normal, size, friction) =
-                    (gap.separation.normal, gap.normal_force, gap.friction);
+                let (normal, size, friction) = (gap.separation.normal, gap.normal_force, gap.friction);
                 if self.is_peak(j, size, time) {
                     self.state.record.peaks[j].normal_force = normal * -size;
                     self.state.record.peaks[j].friction_force = friction;
@@ -93,9 +87,7 @@ impl Simulation {
     /// too uneven for a parabola through their ends: it would have spurious peaks.
     fn search_reactions(&mut self) {
         let joints = self.state.now.gaps.len();
-        if !self.mechanism.has_reactions()
-            || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j))
-        {
+        if !self.mechanism.has_reactions() || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j)) {
             return;
         }
         let (t0, t) = (self.state.before.t, self.state.now.t);

@@ -26,12 +26,7 @@ impl State {
         let impacts = std::mem::size_of_val(self.record.impacts.kept());
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
-        FIXED
-            + wear
-            + flights
-            + coordinates * COPIES * size_of::<f64>()
-            + joints * OF_JOINT
-            + impacts
+        FIXED + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
     }
 }
 
@@ -89,12 +84,7 @@ impl Simulation {
         self.put_conditions();
         self.mechanism.put_to_sleep(|_| false);
         let located = self.locates();
-        let Self {
-            mechanism,
-            state,
-            scratch_k,
-            ..
-        } = self;
+        let Self { mechanism, state, scratch_k, .. } = self;
         // The interpolant of the previous step is not part of the state.
         state.before.copy_from(&state.now);
         // What is read from the mechanism between steps: motion, reactions, clearance ramps.

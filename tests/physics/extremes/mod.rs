@@ -73,17 +73,12 @@ fn table(rows: Vec<Row>) -> Vec<(Row, Outcomes)> {
                 let open = outcomes.iter().position(Option::is_none).unwrap();
                 let (row, form, word) = cells[open];
                 let row = &rows[row];
-                panic!(
-                    "hangs: {}, {}, {}, {word}",
-                    row.scene, row.what, FORMS[form]
-                );
+                panic!("hangs: {}, {}, {}, {word}", row.scene, row.what, FORMS[form]);
             }
         }
     }
     let mut outcomes = outcomes.into_iter().map(Option::unwrap);
-    let Ok(rows) = Arc::try_unwrap(rows) else {
-        panic!("a thread still holds the rows")
-    };
+    let Ok(rows) = Arc::try_unwrap(rows) else { panic!("a thread still holds the rows") };
     let mut with = |row: Row| {
         let mut take = || outcomes.by_ref().take(row.columns.words().len()).collect();
         let of_forms = [take(), take()];
@@ -112,10 +107,7 @@ const LONG_RUN: &str = "\n## 1000 simulated seconds\n";
 
 fn page(table: &[(Row, Outcomes)]) -> String {
     let mut page = String::from(HEAD);
-    for (columns, about) in [
-        (Columns::Presets, "every preset"),
-        (Columns::Methods, "every method"),
-    ] {
+    for (columns, about) in [(Columns::Presets, "every preset"), (Columns::Methods, "every method")] {
         let rows = || table.iter().filter(move |(row, _)| row.columns == columns);
         for (f, form) in FORMS.iter().enumerate() {
             let words = columns.words();
@@ -143,11 +135,7 @@ fn page(table: &[(Row, Outcomes)]) -> String {
                 said.push(outcome.word());
                 let (what, word, why) = (&row.what, outcome.word(), outcome.reason());
                 let why = why.lines().next().unwrap_or_default();
-                let _ = writeln!(
-                    page,
-                    "- {}, {what}, {form}, {column}: **{word}**: {why}",
-                    row.scene
-                );
+                let _ = writeln!(page, "- {}, {what}, {form}, {column}: **{word}**: {why}", row.scene);
             }
         }
     }
@@ -189,8 +177,5 @@ fn every_extreme_ends_in_a_named_outcome() {
         }
     }
     assert_eq!(wrong, 0, "outcomes that must not be");
-    assert!(
-        kept().0 == page(&table),
-        "cargo test --test physics -- --ignored extremes::write_the_page"
-    );
+    assert!(kept().0 == page(&table), "cargo test --test physics -- --ignored extremes::write_the_page");
 }

@@ -64,11 +64,7 @@ struct Balance {
 
 impl Balance {
     fn new(frame: &Frame) -> Self {
-        Self {
-            start: frame.kinetic + frame.potential,
-            created: 0.0,
-            exchanged: frame.kinetic + frame.elastic,
-        }
+        Self { start: frame.kinetic + frame.potential, created: 0.0, exchanged: frame.kinetic + frame.elastic }
     }
 
     fn watch(&mut self, frame: &Frame) {

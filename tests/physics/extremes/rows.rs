@@ -95,9 +95,7 @@ fn thin_rods(scene: &mut Scene) {
 
 /// Where the pendulum's ball starts, from the centre of its socket.
 fn start_at(scene: &mut Scene, offset: Vec3) {
-    let JointStart::Pose { position, .. } = &mut scene.joints[0].start else {
-        panic!("the pendulum is free")
-    };
+    let JointStart::Pose { position, .. } = &mut scene.joints[0].start else { panic!("the pendulum is free") };
     *position += offset;
 }
 
@@ -136,18 +134,9 @@ pub fn rows() -> Vec<Row> {
         let changes = [("contact.friction", friction)];
         each(&format!("friction {friction}"), &changes);
     }
-    for law in [
-        "lankarani-nikravesh",
-        "hertz",
-        "hunt-crossley",
-        "flores",
-        "gonthier",
-    ] {
+    for law in ["lankarani-nikravesh", "hertz", "hunt-crossley", "flores", "gonthier"] {
         for restitution in ["0", "0.001", "1"] {
-            let changes = [
-                ("contact.normal_law", law),
-                ("contact.restitution", restitution),
-            ];
+            let changes = [("contact.normal_law", law), ("contact.restitution", restitution)];
             each(&format!("restitution {restitution}, {law}"), &changes);
         }
     }
@@ -156,36 +145,17 @@ pub fn rows() -> Vec<Row> {
         each(&format!("Young's modulus {modulus}"), &changes);
     }
     for (radius, clearance) in [("0.1 mm", "0.05 mm"), ("1 m", "0.3 mm"), ("1 m", "0.9 m")] {
-        let changes = [
-            ("contact.clearance", clearance),
-            ("contact.ball_radius", radius),
-        ];
+        let changes = [("contact.clearance", clearance), ("contact.ball_radius", radius)];
         let reversed = [changes[1], changes[0]];
-        let changes = if clearance == "0.9 m" {
-            reversed
-        } else {
-            changes
-        };
-        each(
-            &format!("ball radius {radius}, clearance {clearance}"),
-            &changes,
-        );
+        let changes = if clearance == "0.9 m" { reversed } else { changes };
+        each(&format!("ball radius {radius}, clearance {clearance}"), &changes);
     }
     each(
         "slip speeds 0 and 1e-6 mm/s",
-        &[
-            ("contact.slip_speed_low", "0 m/s"),
-            ("contact.slip_speed_high", "1e-6 mm/s"),
-        ],
+        &[("contact.slip_speed_low", "0 m/s"), ("contact.slip_speed_high", "1e-6 mm/s")],
     );
-    each(
-        "impact speed floor 1e-6 mm/s",
-        &[("contact.impact_speed_floor", "1e-6 mm/s")],
-    );
-    each(
-        "impact speed floor 10 m/s",
-        &[("contact.impact_speed_floor", "10 m/s")],
-    );
+    each("impact speed floor 1e-6 mm/s", &[("contact.impact_speed_floor", "1e-6 mm/s")]);
+    each("impact speed floor 10 m/s", &[("contact.impact_speed_floor", "10 m/s")]);
     for (what, x, z) in [
         ("gravity 0", "0 m/s^2", "0 m/s^2"),
         ("gravity reversed", "-9.81 m/s^2", "9.81 m/s^2"),
@@ -202,17 +172,9 @@ pub fn rows() -> Vec<Row> {
     }
     for frequency in ["0 Hz", "5 Hz", "50 Hz"] {
         let changes = [("spcmm.frequency", frequency)];
-        rows.push(Row::new(
-            &format!("drive frequency {frequency}"),
-            "spcmm",
-            &changes,
-        ));
+        rows.push(Row::new(&format!("drive frequency {frequency}"), "spcmm", &changes));
         let ideal = [changes[0], ("contact.clearance", "0")];
-        rows.push(Row::new(
-            &format!("drive frequency {frequency}, ideal"),
-            "spcmm",
-            &ideal,
-        ));
+        rows.push(Row::new(&format!("drive frequency {frequency}, ideal"), "spcmm", &ideal));
     }
     for scene in both {
         for step in ["0.1 us", "1 us", "100 us", "1 ms", "10 ms"] {
@@ -234,10 +196,9 @@ pub fn rows() -> Vec<Row> {
     // x_s = a1 + 28 mm; the square roots end between 28 mm and 60 mm, and between 364 mm and 365 mm. The rods of the lower
     // end are longest a quarter of a period after the start, that of the upper end three quarters: within the run at the
     // higher frequency.
-    for (end, good, bad, frequencies) in [
-        ("lower", 0.032, 0.0, &["0.5 Hz", "10 Hz"][..]),
-        ("upper", 0.336, 0.337, &["30 Hz"]),
-    ] {
+    for (end, good, bad, frequencies) in
+        [("lower", 0.032, 0.0, &["0.5 Hz", "10 Hz"][..]), ("upper", 0.336, 0.337, &["30 Hz"])]
+    {
         let (reached, not_reached) = reach_limit(good, bad);
         for (what, plane) in [("within", reached), ("beyond", not_reached)] {
             let plane = format!("{plane} m");
@@ -257,32 +218,18 @@ pub fn rows() -> Vec<Row> {
     for plane in ["132 mm", "162 mm", "175 mm", "189 mm", "222 mm", "336 mm"] {
         for (kind, clearance) in [("clearance 0.3 mm", "0.3 mm"), ("ideal", "0")] {
             // Fast enough to cross the range in the time there is.
-            let changes = [
-                ("spcmm.slider_plane", plane),
-                ("contact.clearance", clearance),
-                ("spcmm.frequency", "5 Hz"),
-            ];
-            rows.push(Row::new(
-                &format!("slider plane {plane}, {kind}"),
-                "spcmm",
-                &changes,
-            ));
+            let changes =
+                [("spcmm.slider_plane", plane), ("contact.clearance", clearance), ("spcmm.frequency", "5 Hz")];
+            rows.push(Row::new(&format!("slider plane {plane}, {kind}"), "spcmm", &changes));
         }
     }
     for (what, changes) in [
         ("one joint ideal", &[("joint.S1.clearance", "0")][..]),
-        (
-            "two joints ideal",
-            &[("joint.S1.clearance", "0"), ("joint.S2.clearance", "0")],
-        ),
+        ("two joints ideal", &[("joint.S1.clearance", "0"), ("joint.S2.clearance", "0")]),
         ("all joints ideal", &[("contact.clearance", "0")]),
         (
             "clearances 0, 0.1 um and 9 mm",
-            &[
-                ("joint.S1.clearance", "0"),
-                ("joint.S2.clearance", "0.1 um"),
-                ("joint.S3.clearance", "9 mm"),
-            ],
+            &[("joint.S1.clearance", "0"), ("joint.S2.clearance", "0.1 um"), ("joint.S3.clearance", "9 mm")],
         ),
         (
             "an ideal joint, a frictionless elastic one, a rough one with friction 1",
@@ -299,30 +246,14 @@ pub fn rows() -> Vec<Row> {
     ] {
         rows.push(Row::new(what, "spcmm", changes));
     }
-    rows.push(Row::new(
-        "free, one joint of each kind",
-        "slider-crank",
-        &[],
-    ));
-    rows.push(Row::new(
-        "free, both joints ideal",
-        "slider-crank",
-        &[("contact.clearance", "0")],
-    ));
-    rows.push(Row::new(
-        "driven, one joint of each kind",
-        "slider-crank-driven",
-        &[],
-    ));
+    rows.push(Row::new("free, one joint of each kind", "slider-crank", &[]));
+    rows.push(Row::new("free, both joints ideal", "slider-crank", &[("contact.clearance", "0")]));
+    rows.push(Row::new("driven, one joint of each kind", "slider-crank-driven", &[]));
     let pendulum = |what: &str| Row::new(what, "pendulum", &[]);
     let calm = |what: &str| Row::new(what, "pendulum", &[("gravity.z", "0 m/s^2")]);
     rows.push(pendulum("starts on the wall").edited(|s| start_at(s, Vec3::z() * -0.3e-3)));
-    rows.push(
-        pendulum("starts 1 um inside the wall").edited(|s| start_at(s, Vec3::z() * -0.301e-3)),
-    );
-    rows.push(
-        pendulum("starts 0.09 mm inside the wall").edited(|s| start_at(s, Vec3::z() * -0.39e-3)),
-    );
+    rows.push(pendulum("starts 1 um inside the wall").edited(|s| start_at(s, Vec3::z() * -0.301e-3)));
+    rows.push(pendulum("starts 0.09 mm inside the wall").edited(|s| start_at(s, Vec3::z() * -0.39e-3)));
     rows.push(pendulum("starts 1 mm inside the wall").edited(|s| start_at(s, Vec3::z() * -1.3e-3)));
     rows.push(calm("at rest on the wall, no gravity").edited(|s| start_at(s, Vec3::x() * 0.3e-3)));
     rows.push(calm("at rest in the middle, no gravity"));

@@ -26,12 +26,9 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let done = match arguments[..] {
         ["pack", library, folder] => pack::pack(Path::new(library), Path::new(folder), false),
-        ["pack", library, folder, "--compress"] => {
-            pack::pack(Path::new(library), Path::new(folder), true)
-        }
+        ["pack", library, folder, "--compress"] => pack::pack(Path::new(library), Path::new(folder), true),
         ["serve", folder] => serve::serve(Path::new(folder), HERE, 0),
-        ["serve", folder, port] => number(port)
-            .and_then(|port| serve::serve(Path::new(folder), HERE, port)),
+        ["serve", folder, port] => number(port).and_then(|port| serve::serve(Path::new(folder), HERE, port)),
         ["serve", folder, port, host] => number(port).and_then(|port| {
             let host = host.parse().map_err(|_| {
                 format!("`{host}` is no address of this machine: name it in numbers, 0.0.0.0 for all that it has")

@@ -72,14 +72,10 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     all.extend(page.bytes().chain(keeper.bytes()));
     // The build in every address: a browser never joins new scripts to old code from its cache.
     let build = format!("{:016x}", hash(&all));
-    let page = page
-        .replace("{{build}}", &build)
-        .replace("{{wasm_bytes}}", &code.len().to_string());
+    let page = page.replace("{{build}}", &build).replace("{{wasm_bytes}}", &code.len().to_string());
     let to = scratch.join(PAGE);
     fs::write(&to, page).map_err(|e| failed(&to, &e))?;
-    let keeper = keeper
-        .replace("{{build}}", &build)
-        .replace("{{files}}", &integrity(&scratch)?);
+    let keeper = keeper.replace("{{build}}", &build).replace("{{files}}", &integrity(&scratch)?);
     let to = scratch.join(from.file_name().expect("a file"));
     fs::write(&to, keeper).map_err(|e| failed(&to, &e))?;
     compress_all(&scratch, compress)?;
@@ -109,10 +105,7 @@ fn check_replaceable(folder: &Path) -> Result<(), String> {
     if ours || entries.next().is_none() {
         return Ok(());
     }
-    Err(format!(
-        "{}: holds something else than this page; name an empty or a new folder",
-        folder.display()
-    ))
+    Err(format!("{}: holds something else than this page; name an empty or a new folder", folder.display()))
 }
 
 /// The files of `folder`, in order.
@@ -182,9 +175,7 @@ fn brotli(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
 
 /// FNV-1a, 64 bit.
 pub fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 fn remove(folder: &Path) -> Result<(), String> {

@@ -17,34 +17,25 @@ use crate::pack::{CODINGS, hash};
 /// Serves `folder` on an address of this machine and prints the link; port 0 takes any free one. An address that others reach is
 /// printed as a QR code, too.
 pub fn serve(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .enable_io()
-        .build();
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_io().build();
     let runtime = runtime.map_err(|e| format!("cannot serve: {e}"))?;
     runtime.block_on(give_out(folder, host, port))
 }
 
 async fn give_out(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
     let folder = fs::canonicalize(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let listener = TcpListener::bind((host, port))
-        .await
-        .map_err(|e| format!("cannot serve on {host}, port {port}: {e}"))?;
+    let listener =
+        TcpListener::bind((host, port)).await.map_err(|e| format!("cannot serve on {host}, port {port}: {e}"))?;
     let bound = listener.local_addr();
     let port = bound.map_or(port, |address| address.port());
     let seen = seen_from_outside(host);
     let link = format!("http://{}/", SocketAddr::new(seen, port));
-    let code = if seen.is_loopback() {
-        String::new()
-    } else {
-        qr(&link)?
-    };
+    let code = if seen.is_loopback() { String::new() } else { qr(&link)? };
     // In one piece, for a program that reads it.
     let said = io::stdout().write_all(format!("{link}\n{code}").as_bytes());
     said.map_err(|e| format!("standard output: {e}"))?;
     let files = Router::new().fallback(async move |request: Request| answer(&folder, &request));
-    axum::serve(listener, files)
-        .await
-        .map_err(|e| format!("cannot serve any longer: {e}"))
+    axum::serve(listener, files).await.map_err(|e| format!("cannot serve any longer: {e}"))
 }
 
 /// The address at which others find a server on `host`: of every address of this machine, the one that leads out.
@@ -54,14 +45,8 @@ fn seen_from_outside(host: IpAddr) -> IpAddr {
     }
     // Nothing is sent: the system only looks up which way it would go. The addresses are those kept for documentation.
     let (any, out): (IpAddr, IpAddr) = match host {
-        IpAddr::V4(_) => (
-            Ipv4Addr::UNSPECIFIED.into(),
-            Ipv4Addr::new(192, 0, 2, 1).into(),
-        ),
-        IpAddr::V6(_) => (
-            Ipv6Addr::UNSPECIFIED.into(),
-            Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into(),
-        ),
+        IpAddr::V4(_) => (Ipv4Addr::UNSPECIFIED.into(), Ipv4Addr::new(192, 0, 2, 1).into()),
+        IpAddr::V6(_) => (Ipv6Addr::UNSPECIFIED.into(), Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into()),
     };
     let way = UdpSocket::bind((any, 0)).and_then(|socket| {
         socket.connect((out, 9))?;
@@ -78,20 +63,17 @@ fn seen_from_outside(host: IpAddr) -> IpAddr {
 fn qr(text: &str) -> Result<String, String> {
     /// Light modules around it, which a reader needs.
     const QUIET: i32 = 4;
-    let code = QrCode::encode_text(text, QrCodeEcc::Medium)
-        .map_err(|e| format!("no QR code of {text}: {e}"))?;
+    let code = QrCode::encode_text(text, QrCodeEcc::Medium).map_err(|e| format!("no QR code of {text}: {e}"))?;
     let size = code.size();
     let light = |x, y| !code.get_module(x, y);
     let mut lines = String::new();
     for y in (-QUIET..size + QUIET).step_by(2) {
-        lines.extend(
-            (-QUIET..size + QUIET).map(|x| match (light(x, y), light(x, y + 1)) {
-                (true, true) => '█',
-                (true, false) => '▀',
-                (false, true) => '▄',
-                (false, false) => ' ',
-            }),
-        );
+        lines.extend((-QUIET..size + QUIET).map(|x| match (light(x, y), light(x, y + 1)) {
+            (true, true) => '█',
+            (true, false) => '▀',
+            (false, true) => '▄',
+            (false, false) => ' ',
+        }));
         lines.push('\n');
     }
     Ok(lines)
@@ -119,8 +101,8 @@ fn given(folder: &Path, request: &Request) -> Option<Response> {
     };
     let bytes = fs::read(from).ok()?;
     let tag = format!("\"{:016x}\"", hash(&bytes));
-    let known = field(request, header::IF_NONE_MATCH)
-        .is_some_and(|known| known.split(',').any(|known| known.trim() == tag));
+    let known =
+        field(request, header::IF_NONE_MATCH).is_some_and(|known| known.split(',').any(|known| known.trim() == tag));
     let fields = [
         (header::CONTENT_TYPE, media_type(&file)),
         (header::CACHE_CONTROL, "no-cache"),
@@ -138,9 +120,7 @@ fn given(folder: &Path, request: &Request) -> Option<Response> {
 /// The file that `path` names inside `folder`; a folder's is its `index.html`.
 fn locate(folder: &Path, path: &str) -> Option<PathBuf> {
     let relative = Path::new(path.trim_start_matches('/'));
-    let plain = relative
-        .components()
-        .all(|part| matches!(part, Component::Normal(_)));
+    let plain = relative.components().all(|part| matches!(part, Component::Normal(_)));
     if !plain {
         return None;
     }
