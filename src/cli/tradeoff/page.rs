@@ -11,11 +11,13 @@ use crate::analysis::{CaseCost, Phase, Point, Setting, WorkPrecision};
 use crate::cli::tables::{fill, markdown};
 use crate::cli::{Failure, machine};
 use crate::files::{OutputFile, publish};
-use crate::scene::{BUILT_IN, Preset};
+use crate::scene::Preset;
 
 /// Paths under the source folder.
 const PAGE: &str = "docs/tradeoff.md";
 const RECORD: &str = "assets/presets.json";
+/// Scenes whose diagrams the page shows: the default one, and one in which the methods differ most.
+const DRAWN: [&str; 2] = ["spcmm", "chain"];
 
 /// All files, claimed before the measuring begins.
 pub(super) struct Targets {
@@ -29,7 +31,7 @@ impl Targets {
     /// A folder that is not the program's source, or cannot be written.
     pub(super) fn claim(root: &Path) -> Result<Self, Failure> {
         let claim = |name: &str| Ok::<_, Failure>(OutputFile::claim(&root.join(name), true)?);
-        let diagrams = BUILT_IN.iter().map(|name| claim(&format!("docs/{}", diagram(name))));
+        let diagrams = DRAWN.iter().map(|name| claim(&format!("docs/{}", diagram(name))));
         Ok(Self { page: claim(PAGE)?, record: claim(RECORD)?, diagrams: diagrams.collect::<Result<_, _>>()? })
     }
 
@@ -45,9 +47,10 @@ impl Targets {
         let page = page(&machine, found, paces, &scenes, costs);
         let record = serde_json::to_string_pretty(&record(found, paces, &machine))
             .map_err(|error| Failure::io(error.to_string()))?;
-        let mut drawn = Vec::with_capacity(found.len());
-        for found in found {
-            let svg = picture(found, true, &machine).svg();
+        let mut drawn = Vec::with_capacity(DRAWN.len());
+        for name in DRAWN {
+            let found = found.iter().find(|found| found.reference.scene().name == name);
+            let svg = picture(found.expect("every built-in scene is measured"), true, &machine).svg();
             drawn.push(svg.map_err(|error| Failure::io(error.to_string()))?);
         }
         let put = |target: OutputFile, text: &str| target.fill(|file| file.write_all(text.as_bytes()));
@@ -121,13 +124,17 @@ fn page(machine: &str, found: &[WorkPrecision], paces: &[(&str, f64)], scenes: &
     )
 }
 
-/// Section of a scene: its reference, its diagram, what that shows, and the points that the page names.
+/// Section of a scene: its reference, its diagram if it is among those drawn, what was found, and the points that the page names.
 fn scene(name: &str, against: &[String], reading: &[String], rows: Vec<Vec<String>>) -> String {
     let list = |lines: &[String]| -> String { lines.iter().map(|l| format!("- {l}\n")).collect() };
+    let picture = if DRAWN.contains(&name) {
+        format!("![Error against time of every method, {name}]({})\n\n", diagram(name))
+    } else {
+        String::new()
+    };
     format!(
-        "## Scene `{name}`\n\n{}\n![Error against time of every method, {name}]({})\n\n{}\n{}\n",
+        "## Scene `{name}`\n\n{}\n{picture}{}\n{}\n",
         list(against),
-        diagram(name),
         list(reading),
         markdown(
             "Method | Setting | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Front",
