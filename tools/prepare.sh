@@ -36,9 +36,24 @@ prepare_packages() {
         root=(sudo -n)
     fi
     say "installing ${missing[*]}"
-    if ! "${root[@]}" apt-get update -qq || ! "${root[@]}" env DEBIAN_FRONTEND=noninteractive "${install[@]}" > /dev/null; then
+    if ! patient_apt "${root[@]}" apt-get update -qq ||
+        ! patient_apt "${root[@]}" env DEBIAN_FRONTEND=noninteractive "${install[@]}"; then
         say "that did not work; if something fails below, try it by hand: ${install[*]}"
     fi
+}
+
+# Runs apt-get, and waits while another one holds its locks: apt's own DPkg::Lock::Timeout covers only one of the three.
+patient_apt() {
+    local errors waited=0
+    until errors=$("$@" 2>&1 > /dev/null); do
+        if [[ $errors != *"Could not get lock"* && $errors != *"Unable to lock"* ]] || ((waited >= 1800)); then
+            printf '%s\n' "$errors" >&2
+            return 1
+        fi
+        ((waited)) || say "another installation is under way on this machine: waiting for it to end"
+        sleep 2
+        waited=$((waited + 2))
+    done
 }
 
 prepare_rust() {
@@ -66,40 +81,44 @@ prepare_environment() {
     fi
 }
 
-# What the tests of the page need: Node, Chromium, Firefox with a screen and what it decodes films with, and the packages of
-# web/package-lock.json.
+# What the tests of the page need: Node with the packages of web/package-lock.json, and Chromium; given `firefox`, that too, with a
+# screen and what it decodes films with. `lacking` then says in a sentence what could not be had; it is empty if all is there.
 prepare_browser() {
-    local needed=() browser firefox
+    local needed=() with_firefox=${1:-}
+    lacking=
     command -v node > /dev/null || needed+=(nodejs)
     command -v npm > /dev/null || needed+=(npm)
-    browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
-    [[ -n $browser ]] || needed+=(chromium)
-    firefox=$(command -v firefox-esr || command -v firefox || true)
-    [[ -n $firefox ]] || needed+=(firefox-esr)
-    command -v Xvfb > /dev/null || needed+=(xvfb)
-    /sbin/ldconfig -p | grep -q libavcodec.so || needed+=(libavcodec-extra)
+    find_chromium || needed+=(chromium)
+    if [[ -n $with_firefox ]]; then
+        find_firefox || needed+=(firefox-esr)
+        command -v Xvfb > /dev/null || needed+=(xvfb)
+        /sbin/ldconfig -p | grep -q libavcodec.so || needed+=(libavcodec-extra)
+    fi
     ((${#needed[@]} == 0)) || prepare_packages "${needed[@]}"
-    for program in node npm; do
-        if ! command -v $program > /dev/null; then
-            say "the tests of the page need $program: install Node 18 or newer"
-            exit 1
-        fi
-    done
-    export CHROMIUM=${CHROMIUM:-${browser:-$(command -v chromium || true)}}
-    if [[ -z $CHROMIUM ]]; then
-        say "the tests of the page need Chromium: install it, or name it: CHROMIUM=/path/to/chromium"
-        exit 1
-    fi
-    export FIREFOX=${FIREFOX:-${firefox:-$(command -v firefox-esr || true)}}
-    if [[ -z $FIREFOX ]]; then
-        say "the tests of the page need Firefox: install it, or name it: FIREFOX=/path/to/firefox"
-        exit 1
-    fi
-    if ! cmp -s "$root/web/package-lock.json" "$root/web/node_modules/.from"; then
+    if ! command -v node > /dev/null || ! command -v npm > /dev/null; then
+        lacking="the tests of the page need Node 18 or newer with npm: install them"
+    elif ! find_chromium; then
+        lacking="the tests of the page need Chromium: install it, or name it: CHROMIUM=/path/to/chromium"
+    elif [[ -n $with_firefox ]] && ! find_firefox; then
+        lacking="the tests in Firefox need it: install it, or name it: FIREFOX=/path/to/firefox"
+    elif ! cmp -s "$root/web/package-lock.json" "$root/web/node_modules/.from"; then
         say "installing what the tests of the page use"
-        npm ci --silent --no-audit --no-fund --prefix "$root/web"
-        cp "$root/web/package-lock.json" "$root/web/node_modules/.from"
+        if npm ci --silent --no-audit --no-fund --prefix "$root/web"; then
+            cp "$root/web/package-lock.json" "$root/web/node_modules/.from"
+        else
+            lacking="the tests of the page need the packages of web/package-lock.json: npm ci --prefix web"
+        fi
     fi
+}
+
+# Name the browsers, unless the caller did.
+find_chromium() {
+    export CHROMIUM=${CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome)}
+    [[ -n $CHROMIUM ]]
+}
+find_firefox() {
+    export FIREFOX=${FIREFOX:-$(command -v firefox-esr || command -v firefox)}
+    [[ -n $FIREFOX ]]
 }
 
 prepare_sound() {

@@ -12,16 +12,17 @@ wasm_works() {
     return $works
 }
 
+# Fails, with a sentence about why, where that cannot be had.
 prepare_wasm() {
     wasm_works && return
     if ! command -v rustup > /dev/null; then
         say "the page needs Rust's standard library for $wasm_target, and there is no rustup to add it: install Rust from"
         say "https://rustup.rs, or that library from where this Rust comes from"
-        exit 1
+        return 1
     fi
     say "rustup target add $wasm_target"
     if ! rustup target add $wasm_target || ! wasm_works; then
         say "this Rust still does not compile for $wasm_target; try by hand: rustup target add $wasm_target"
-        exit 1
+        return 1
     fi
 }
