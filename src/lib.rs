@@ -7,6 +7,8 @@
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+pub use jointplay_physics::{contact, integrate, jet, mechanism, mesh, scene, simulate, words};
+
 pub mod analysis;
 #[cfg(feature = "gui")]
 pub mod app;
@@ -15,20 +17,12 @@ pub mod app;
 pub mod chart;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;
-pub mod contact;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod files;
 #[cfg(feature = "gui")]
 pub mod film;
-pub mod integrate;
-pub mod jet;
-pub mod mechanism;
-pub mod mesh;
 #[cfg(feature = "gui")]
 pub mod render;
-pub mod scene;
-pub mod simulate;
 #[cfg(feature = "gui")]
 pub mod view;
 pub mod web;
-mod words;

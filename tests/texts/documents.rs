@@ -167,7 +167,7 @@ fn documents_name_files_that_exist() {
     ] {
         let text = read(document);
         for word in text.split(['`', '(', ')']) {
-            let kept = ["src/", "docs/", "assets/", "tests/", "benches/", "examples/", "shaders/"]
+            let kept = ["src/", "crates/", "docs/", "assets/", "tests/", "benches/", "examples/", "shaders/"]
                 .iter()
                 .any(|folder| word.starts_with(folder));
             if kept && !word.contains(['*', '<', ' ', '\n']) {

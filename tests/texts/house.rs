@@ -38,12 +38,15 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
 
 /// (module, file name for messages, code without comments and texts) of every file but `lib.rs`.
 fn files() -> Vec<(String, String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
-    sources(&root, &mut paths);
+    for crate_root in ["crates/physics/src", "src"].map(|folder| root.join(folder)) {
+        let mut own = Vec::new();
+        sources(&crate_root, &mut own);
+        paths.extend(own.into_iter().map(|path| (path.strip_prefix(&crate_root).unwrap().to_owned(), path)));
+    }
     let mut files = Vec::new();
-    for path in paths {
-        let local = path.strip_prefix(&root).unwrap();
+    for (local, path) in paths {
         let first = local.components().next().unwrap().as_os_str();
         let module = Path::new(first).file_stem().unwrap().to_str().unwrap();
         if module == "lib" {

@@ -45,16 +45,16 @@ pub fn too_large() -> String {
 /// TOML text of a built-in scene.
 pub fn built_in_text(name: &str) -> Option<&'static str> {
     Some(match name {
-        "spcmm" => include_str!("../../assets/scenes/spcmm.toml"),
-        "pendulum" => include_str!("../../assets/scenes/pendulum.toml"),
-        "slider-crank" => include_str!("../../assets/scenes/slider-crank.toml"),
-        "slider-crank-driven" => include_str!("../../assets/scenes/slider-crank-driven.toml"),
-        "chain" => include_str!("../../assets/scenes/chain.toml"),
-        "hexapod" => include_str!("../../assets/scenes/hexapod.toml"),
-        "delta" => include_str!("../../assets/scenes/delta.toml"),
-        "four-bar" => include_str!("../../assets/scenes/four-bar.toml"),
-        "suspension" => include_str!("../../assets/scenes/suspension.toml"),
-        "press" => include_str!("../../assets/scenes/press.toml"),
+        "spcmm" => include_str!("../../../../assets/scenes/spcmm.toml"),
+        "pendulum" => include_str!("../../../../assets/scenes/pendulum.toml"),
+        "slider-crank" => include_str!("../../../../assets/scenes/slider-crank.toml"),
+        "slider-crank-driven" => include_str!("../../../../assets/scenes/slider-crank-driven.toml"),
+        "chain" => include_str!("../../../../assets/scenes/chain.toml"),
+        "hexapod" => include_str!("../../../../assets/scenes/hexapod.toml"),
+        "delta" => include_str!("../../../../assets/scenes/delta.toml"),
+        "four-bar" => include_str!("../../../../assets/scenes/four-bar.toml"),
+        "suspension" => include_str!("../../../../assets/scenes/suspension.toml"),
+        "press" => include_str!("../../../../assets/scenes/press.toml"),
         _ => return None,
     })
 }

@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn the_seeds_of_the_fuzz_target_are_read() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/meshes");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fuzz/meshes");
         let mut count = 0;
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

@@ -1,6 +1,6 @@
 //! Scenes as data: what a mechanism consists of, its file format, and the single table of its parameters.
 //!
-#![doc = include_str!("../../docs/scene-format.md")]
+#![doc = include_str!("../../../../docs/scene-format.md")]
 
 mod access;
 mod beside;

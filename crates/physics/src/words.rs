@@ -14,7 +14,8 @@ pub trait Words: Copy + 'static {
 
 /// Gives an enum `ALL`, `word`, [`Words`], and prints and serialises it as its word. A variant without a word does not
 /// compile.
-macro_rules! words {
+#[macro_export]
+macro_rules! named_by_words {
     ($name:ident { $($variant:ident => $word:literal),+ $(,)? }) => {
         impl $name {
             /// Every variant, in menu order.
@@ -58,4 +59,4 @@ macro_rules! words {
     };
 }
 
-pub(crate) use words;
+pub use crate::named_by_words as words;

@@ -276,7 +276,7 @@ pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
 }
 
 #[cfg(test)]
-#[path = "../../tests/common/large.rs"]
+#[path = "../../../../tests/common/large.rs"]
 mod large;
 
 #[cfg(test)]
@@ -326,7 +326,7 @@ mod tests {
 
     #[test]
     fn the_limits_are_those_of_the_documentation() {
-        let page = include_str!("../../docs/scene-format.md");
+        let page = include_str!("../../../../docs/scene-format.md");
         for (kind, formulation, row) in [
             ("hinges in a row", "tree", "hinges in a row"),
             ("hinges on one body", "tree", "hinges on one free body"),
