@@ -1,0 +1,69 @@
+//! The program's equations.
+
+use std::cell::RefCell;
+
+use jointplay::contact::Memory;
+use jointplay::integrate::System;
+use jointplay::mechanism::{Mechanism, Touching};
+use jointplay::scene::Scene;
+
+use crate::integrate::Equations;
+
+/// The program's equations under another's solver.
+pub struct Borrowed {
+    mechanism: RefCell<Mechanism>,
+    memory: RefCell<Vec<Memory>>,
+    speed_floor: f64,
+}
+
+impl Borrowed {
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            mechanism: RefCell::new(Mechanism::new(scene).unwrap()),
+            memory: RefCell::new(vec![Memory::default(); scene.ball_joints.len()]),
+            speed_floor: scene.contact.impact_speed_floor,
+        }
+    }
+}
+
+impl Equations for Borrowed {
+    fn start(&self) -> Vec<f64> {
+        self.mechanism.borrow_mut().start().unwrap()
+    }
+
+    fn derivative(&self, t: f64, y: &[f64], dy: &mut [f64]) {
+        let memory = self.memory.borrow();
+        let mut mechanism = self.mechanism.borrow_mut();
+        let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+        evaluator.derivative(t, y, dy);
+    }
+
+    fn gaps(&self, t: f64, y: &[f64]) -> Vec<(f64, f64)> {
+        let mut mechanism = self.mechanism.borrow_mut();
+        mechanism.measure(t, y);
+        let gaps = mechanism.contacts.gaps();
+        gaps.map(|gap| (gap.separation.penetration, gap.separation.rate)).collect()
+    }
+
+    fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {
+        self.derivative(t, y, &mut vec![0.0; y.len()]);
+        let mechanism = self.mechanism.borrow();
+        let gaps = mechanism.contacts.gaps();
+        gaps.map(|gap| gap.normal_force).collect()
+    }
+
+    fn speed_floor(&self) -> f64 {
+        self.speed_floor
+    }
+
+    fn remember(&self, contacts: &[Option<f64>]) {
+        for (memory, speed) in self.memory.borrow_mut().iter_mut().zip(contacts) {
+            *memory = Memory {
+                active: speed.is_some(),
+                approach_speed: speed.unwrap_or(0.0),
+                floored: false,
+                ..Memory::default()
+            };
+        }
+    }
+}
