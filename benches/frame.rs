@@ -7,15 +7,17 @@
 //! does nothing: `WGPU_BACKEND=noop WGPU_NOOP_BACKEND=1 cargo bench --bench frame`.
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use criterion::{Criterion, criterion_group, criterion_main};
 use eframe::egui;
 use jointplay::app::{App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, Stretch, Voice, clicks};
 use jointplay::render::Offscreen;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Impact, Simulation};
 use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, ViewOptions, WearMap};
+use timing::Stopwatch;
+
+mod timing;
 
 const SIZE: [u32; 2] = [1280, 800];
 /// Time simulated before the frame, s, so that the plots have something to show.
@@ -27,16 +29,16 @@ fn default_scene() -> Scene {
 
 /// As the window opens, with the longest chain, and with every instrument on: microscope, ideal ghost, twin, wear map, an
 /// abandoned future, over a second of simulation.
-fn frames(c: &mut Criterion) {
-    frame(c, "frame of the window", default_scene(), |app, _| {
+fn frames(watch: &Stopwatch) {
+    frame(watch, "frame of the window", default_scene(), |app, _| {
         app.player_mut().run_to(TIME);
     });
-    frame(c, "frame of a presentation", default_scene(), |app, ctx| {
+    frame(watch, "frame of a presentation", default_scene(), |app, ctx| {
         app.player_mut().run_to(TIME);
         app.present(ctx, true);
     });
-    frame(c, "frame of the longest chain", longest_chain(), |_, _| {});
-    frame(c, "frame with all instruments", default_scene(), |app, _| {
+    frame(watch, "frame of the longest chain", longest_chain(), |_, _| {});
+    frame(watch, "frame with all instruments", default_scene(), |app, _| {
         app.microscope_mut().set_open(true);
         let player = app.player_mut();
         player.set_ideal(true);
@@ -49,24 +51,19 @@ fn frames(c: &mut Criterion) {
     });
 }
 
-fn frame(c: &mut Criterion, name: &str, scene: Scene, prepare: impl FnOnce(&mut App, &egui::Context)) {
+fn frame(watch: &Stopwatch, name: &str, scene: Scene, prepare: impl FnOnce(&mut App, &egui::Context)) {
     let mut headless = Headless::new().expect("a graphics adapter");
     let mut options = AppOptions::new(scene);
     options.view.wear = if name.contains("all") { WearMap::Impulse } else { WearMap::Off };
     let mut app = headless.app(options).expect("starts");
     prepare(&mut app, headless.context());
     headless.app_frame(&mut app, SIZE, 1.0).expect("drawn");
-    c.bench_function(name, |b| {
-        b.iter_custom(|frames| {
-            let mut total = Duration::ZERO;
-            for _ in 0..frames {
-                let clock = Instant::now();
-                headless.encode_frame(&mut app, SIZE, 1.0).expect("drawn");
-                total += clock.elapsed();
-                headless.wait();
-            }
-            total
-        });
+    watch.time_part(name, || {
+        let clock = Instant::now();
+        headless.encode_frame(&mut app, SIZE, 1.0).expect("drawn");
+        let time = clock.elapsed();
+        headless.wait();
+        time
     });
 }
 
@@ -113,11 +110,11 @@ impl Stage {
     }
 }
 
-fn draw_list(c: &mut Criterion) {
-    let mut bench = |name: &str, stage: &Stage| {
+fn draw_list(watch: &Stopwatch) {
+    let bench = |name: &str, stage: &Stage| {
         let mut list = DrawList::default();
         stage.shot(SIZE, |shot| {
-            c.bench_function(name, |b| b.iter(|| stage.view.build(black_box(shot), &mut list)));
+            watch.time(name, || stage.view.build(black_box(shot), &mut list));
         });
     };
     bench("draw list alone", &Stage::new(default_scene(), TIME));
@@ -131,22 +128,17 @@ fn longest_chain() -> Scene {
 }
 
 /// What is done before the adapter begins to draw a list: a frame of the longest chain has 16 ms for that and its draw list.
-fn recording(c: &mut Criterion) {
+fn recording(watch: &Stopwatch) {
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
     let stage = Stage::new(longest_chain(), 0.0);
     let list = stage.list(SIZE);
     println!("the longest chain: {} triangles", offscreen.triangles(&list));
-    c.bench_function("recording the longest chain", |b| {
-        b.iter_custom(|times| {
-            let time = |_| offscreen.time_to_record(&list).expect("drawn");
-            (0..times).map(time).sum()
-        });
-    });
+    watch.time_part("recording the longest chain", || offscreen.time_to_record(&list).expect("drawn"));
 }
 
 /// The most that a frame can ask for: every impact that a run keeps, all as low and therefore as long as can be. The page computes
 /// the samples in its frame, the desktop in a thread of the system's.
-fn sound(c: &mut Criterion) {
+fn sound(watch: &Stopwatch) {
     let impacts: Vec<Impact> = (1..=64)
         .map(|k| Impact {
             start: TIME,
@@ -160,21 +152,17 @@ fn sound(c: &mut Criterion) {
         .collect();
     let stretch = Stretch { from: TIME, to: 2.0 * TIME, lasts: 1.0 / 60.0 };
     let mut heard: Vec<Click> = Vec::new();
-    c.bench_function("clicks of a frame", |b| {
-        b.iter(|| clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));
-    });
+    watch.time("clicks of a frame", || clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));
     clicks(impacts.iter(), &stretch, 1.0, &mut heard);
     assert_eq!(heard.len(), MOST_CLICKS);
-    c.bench_function("samples of the clicks of a frame", |b| {
-        b.iter(|| -> usize {
-            let samples = |click| Voice::new(click, 48_000.0).collect::<Vec<f32>>().len();
-            black_box(&heard).iter().map(samples).sum()
-        });
+    watch.time("samples of the clicks of a frame", || -> usize {
+        let samples = |click| Voice::new(click, 48_000.0).collect::<Vec<f32>>().len();
+        black_box(&heard).iter().map(samples).sum()
     });
 }
 
 /// Time of the graphics adapter alone, by scene and size, where it has timestamps. A software adapter's is the processor's.
-fn pictures(c: &mut Criterion) {
+fn pictures(watch: &Stopwatch) {
     let mut offscreen = Offscreen::new().expect("a graphics adapter");
     println!("drawn by {}", offscreen.adapter());
     for name in ["spcmm", "chain", "hexapod"] {
@@ -186,15 +174,16 @@ fn pictures(c: &mut Criterion) {
                 return;
             }
             let [width, height] = size;
-            c.bench_function(&format!("adapter: {name}, {width}x{height}"), |b| {
-                b.iter_custom(|times| {
-                    let time = |_| offscreen.time_of(&list).expect("drawn");
-                    (0..times).filter_map(time).sum()
-                });
+            watch.time_part(&format!("adapter: {name}, {width}x{height}"), || {
+                offscreen.time_of(&list).expect("drawn").expect("it has timestamps")
             });
         }
     }
 }
 
-criterion_group!(benches, frames, draw_list, recording, sound, pictures);
-criterion_main!(benches);
+fn main() {
+    let watch = Stopwatch::new();
+    for part in [frames, draw_list, recording, sound, pictures] {
+        part(&watch);
+    }
+}
