@@ -351,8 +351,9 @@ mod tests {
     fn several_share_the_points_and_each_is_the_same_to_the_bit() {
         // One for each of four, of whom two have nothing to do; and two blocks of points that follow each other.
         let cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
-        let mut followed = task(&["contact.friction=0.1..0.3:30"]);
+        let mut followed = task(&["contact.friction=0.1..0.3:26"]);
         (followed.start, followed.periods, followed.discard) = (Start::FollowUp, 2, 1);
+        followed.scene.changes.push(("spcmm.frequency".to_owned(), "20 Hz".to_owned()));
         for task in [cold, followed] {
             let mut whole: Vec<_> = told(task.clone(), usize::MAX);
             let mut shared = Vec::new();

@@ -242,8 +242,10 @@ mod tests {
             let scene = scene(name, &[]);
             let [mut with, mut without] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
             with.set_ideal(true);
-            for time in [0.013, 0.03, 0.021_3] {
-                if time == 0.021_3 {
+            // Many loose joints take their time.
+            let part = if scene.ball_joints.len() > 3 { 0.4 } else { 1.0 };
+            for (turn, time) in [0.013, 0.03, 0.021_3].map(|time| part * time).into_iter().enumerate() {
+                if turn == 2 {
                     // Back, and another way there.
                     with.reset().expect("starts");
                     without.reset().expect("starts");

@@ -10,8 +10,8 @@ use std::time::{Duration, SystemTime};
 use super::host::OpenedFile;
 use crate::scene::{LARGEST_FILE, too_large};
 
-/// Between two looks.
-const PERIOD: Duration = Duration::from_millis(500);
+/// Between two looks; tests do not wait for long.
+const PERIOD: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 500 });
 /// A file that does not change for so long is written completely.
 const SETTLED: Duration = Duration::from_millis(50);
 

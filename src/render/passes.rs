@@ -156,16 +156,3 @@ impl Pass {
         Some(wgpu::BlendState { color: over(wgpu::BlendFactor::SrcAlpha), alpha: over(share) })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_shadow_comes_first_and_what_is_seen_through_after_what_is_not() {
-        assert!(PASSES[0].casts() && PASSES[1..].iter().all(|pass| !pass.casts()));
-        let place = |label| PASSES.iter().position(|pass| pass.label == label);
-        let order = ["background", "solid", "floor", "sockets", "arrows"].map(place);
-        assert!(order.iter().all(Option::is_some) && order.is_sorted());
-    }
-}

@@ -25,12 +25,23 @@ fn bare() -> ViewOptions {
 }
 
 fn picture(scene: &Scene, frame: &Frame, options: &ViewOptions, camera: &Camera, hit: bool) -> DrawList {
+    picture_of(SIZE, scene, frame, options, camera, hit)
+}
+
+fn picture_of(
+    size: [u32; 2],
+    scene: &Scene,
+    frame: &Frame,
+    options: &ViewOptions,
+    camera: &Camera,
+    hit: bool,
+) -> DrawList {
     let view = SceneView::new(scene, frame);
     let mut marks = PeakMarks::new();
     let peaks = if hit { fixture::hits(frame) } else { Vec::new() };
     marks.update(frame, &peaks, f64::INFINITY);
     let mut list = DrawList::default();
-    let shot = Shot { scene, frame, marks: &marks, options, camera, trail: &[], size: SIZE, pixels_per_point: 1.0 };
+    let shot = Shot { scene, frame, marks: &marks, options, camera, trail: &[], size, pixels_per_point: 1.0 };
     view.build(&shot, &mut list);
     list
 }
@@ -559,27 +570,26 @@ fn every_standard_view_shows_what_moves() {
     let mut device = offscreen();
     let mut draw = |list: &DrawList| device.render(list).expect("a picture");
     let options = ViewOptions { floor: false, ..bare() };
+    // There are some hundred of them: small.
+    let size = SIZE.map(|n| n / 2);
     for name in crate::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
         let mut frame = Frame::default();
         let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
         // Twelve loose joints take their time.
-        let later = match scene.ball_joints.len() {
-            0..=8 => 0.3,
-            _ => 0.01,
-        };
-        for time in [0.0, later] {
+        let later = (scene.ball_joints.len() <= 8).then_some(0.3);
+        for time in std::iter::once(0.0).chain(later) {
             simulation.advance_to(time).expect("runs");
             simulation.sample(time, &mut frame);
             let view = SceneView::new(&scene, &frame);
             for preset in Preset::ALL {
                 let mut camera = view.camera();
                 camera.preset(preset);
-                view.fit(&mut camera, &scene, &frame, &options, SIZE);
-                let whole = picture(&scene, &frame, &options, &camera, false);
+                view.fit(&mut camera, &scene, &frame, &options, size);
+                let whole = picture_of(size, &scene, &frame, &options, &camera, false);
                 let mut free = scene.clone();
                 free.fixed_shapes.clear();
-                let mut moving = picture(&free, &frame, &options, &camera, false);
+                let mut moving = picture_of(size, &free, &frame, &options, &camera, false);
                 moving.light = whole.light;
                 let (mut fixed, mut nothing) = (whole.clone(), moving.clone());
                 // Fixed parts come first.
@@ -595,7 +605,7 @@ fn every_standard_view_shows_what_moves() {
                 let seen = possible.iter().filter(|[x, y]| difference(whole.pixel(*x, *y), fixed.pixel(*x, *y)) > 24);
                 let (seen, possible) = (seen.count(), possible.len());
                 println!("{name} {time} {preset:?}: {seen} of {possible}");
-                assert!(possible > 300, "{name} {preset:?}: {possible}");
+                assert!(possible > 75, "{name} {preset:?}: {possible}");
                 assert!(
                     seen as f64 > 0.8 * possible as f64,
                     "{name} at {time} s, {preset:?}: {seen} of {possible} pixels of what moves are seen"

@@ -6,6 +6,8 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value as Json;
 
+#[cfg(target_os = "linux")]
+use crate::program::until;
 use crate::program::{command, folder, jointplay, names};
 
 /// First columns, in the order that readers of the published reference files expect.
@@ -376,20 +378,20 @@ fn a_stopped_run_keeps_its_rows_and_says_why() {
     assert_eq!(meta["status"], "diverged");
 }
 
-/// Starts `command` and waits until signal 15, the last that the program asks for, is among those it catches.
+/// Whether signal `number` is among those that `child` does with as `what` says: `SigCgt` catches, `SigIgn` ignores.
+#[cfg(target_os = "linux")]
+fn treats(child: &std::process::Child, what: &str, number: u32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+    let mask = status.lines().find_map(|line| line.strip_prefix(what)?.strip_prefix(':')).unwrap();
+    u64::from_str_radix(mask.trim(), 16).unwrap() & (1 << (number - 1)) != 0
+}
+
+/// Starts `command` and waits until it has said what it does at Ctrl-C, SIGTERM and SIGHUP.
 #[cfg(target_os = "linux")]
 pub fn start_and_listen(command: &mut Command) -> std::process::Child {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let listens = || {
-        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap();
-        u64::from_str_radix(caught.trim(), 16).unwrap() & (1 << 14) != 0
-    };
-    while !listens() {
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    // SIGHUP follows at once.
-    std::thread::sleep(std::time::Duration::from_millis(50));
+    let hangs_up = || treats(&child, "SigCgt", 1) || treats(&child, "SigIgn", 1);
+    until(|| treats(&child, "SigCgt", 2) && treats(&child, "SigCgt", 15) && hangs_up());
     child
 }
 
@@ -404,13 +406,24 @@ pub fn signal(child: &std::process::Child, name: &str) {
 #[test]
 fn an_interrupted_run_keeps_its_complete_rows() {
     for name in ["-INT", "-TERM", "-HUP"] {
-        interrupted_run("1000000s --every 1s", &|child| signal(child, name));
+        interrupted_run("1000000s --every 1s", &|child, _| signal(child, name));
     }
-    // `timeout -s INT` sends two. So many rows take longer to write than the second takes to come.
-    interrupted_run("100s --every 10us", &|child| {
-        std::thread::sleep(std::time::Duration::from_secs(1));
+}
+
+/// `timeout -s INT` sends two.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interruption_that_is_told_again_while_rows_are_written_changes_nothing() {
+    interrupted_run("100s --every 10us", &|child, folder| {
+        // Rows wait in a file without a name.
+        let waiting = || {
+            let files = fs::read_dir(format!("/proc/{}/fd", child.id())).unwrap();
+            let lengths = files.filter_map(|file| Some(fs::metadata(file.ok()?.path()).ok()?.len()));
+            lengths.max().unwrap_or(0)
+        };
+        until(|| waiting() > 4 << 20);
         signal(child, "-INT");
-        std::thread::sleep(std::time::Duration::from_millis(20));
+        until(|| names(folder).iter().any(|name| name.starts_with(".jointplay-")));
         signal(child, "-INT");
     });
 }
@@ -425,8 +438,8 @@ fn what_nohup_started_outlives_its_terminal() {
     );
     let mut command = Command::new("sh");
     let mut child = start_and_listen(command.args(["-c", &run]).current_dir(folder.path()));
+    assert!(treats(&child, "SigIgn", 1));
     signal(&child, "-HUP");
-    std::thread::sleep(std::time::Duration::from_millis(300));
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-TERM");
     assert_eq!(child.wait().unwrap().code(), Some(130));
@@ -434,7 +447,7 @@ fn what_nohup_started_outlives_its_terminal() {
 
 #[cfg(target_os = "linux")]
 #[track_caller]
-fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child)) {
+fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child, &Path)) {
     let folder = folder();
     let line = format!("run pendulum --duration {times} --out a.json --summary json");
     // Under nohup this program ignores SIGHUP, and what it starts would, too.
@@ -442,7 +455,7 @@ fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child)) {
     command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_jointplay")]);
     command.args(line.split_whitespace()).current_dir(folder.path());
     let child = start_and_listen(&mut command);
-    interrupt(&child);
+    interrupt(&child, folder.path());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
     let summary: Json = serde_json::from_slice(&output.stdout).unwrap();

@@ -55,6 +55,14 @@ pub fn folder() -> TempDir {
     tempfile::tempdir().unwrap()
 }
 
+#[cfg(target_os = "linux")]
+/// Waits until something is so, which the program is on its way to.
+pub fn until(so: impl Fn() -> bool) {
+    while !so() {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+}
+
 /// Names in `folder`, sorted.
 pub fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();

@@ -4,7 +4,6 @@ use std::cell::Cell;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use jointplay::analysis::{
     AnalysisError, End, RunContext, Setting, WorkBudget, WorkPrecision, presets, work_precision,
@@ -13,7 +12,7 @@ use jointplay::integrate::Method;
 use jointplay::scene::{Preset, Scene};
 use serde_json::Value as Json;
 
-use crate::program::{command, jointplay, names};
+use crate::program::{jointplay, names};
 
 #[track_caller]
 fn run(folder: &Path, line: &str, code: i32) -> String {
@@ -96,26 +95,13 @@ fn bad_input_is_answered_with_what_would_be_right() {
     assert!(names(folder.path()).is_empty());
 }
 
+#[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_measurement_writes_nothing() {
+    use crate::command_line::{signal, start_and_listen};
     let folder = tempfile::tempdir().unwrap();
-    let child = command(folder.path(), "tradeoff chain --quiet --out found")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let pid = child.id();
-    // Ctrl-C counts once the program listens for it: signal 2 is then among those it catches.
-    let listens = || {
-        let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-        let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:"));
-        u64::from_str_radix(caught.unwrap().trim(), 16).unwrap() & 2 != 0
-    };
-    while !listens() {
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    let kill = Command::new("kill").args(["-INT", &pid.to_string()]).status();
-    assert!(kill.unwrap().success());
+    let child = start_and_listen(&mut crate::program::command(folder.path(), "tradeoff chain --quiet --out found"));
+    signal(&child, "-INT");
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     assert!(output.stdout.is_empty());

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file is a crate of its own and uses some of this")]
 
 pub mod invariants;
+pub mod matrix;
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;

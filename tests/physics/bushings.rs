@@ -1,8 +1,8 @@
 //! Bushings against closed solutions: deflections, natural frequencies, momentum and energy.
 
-use crate::common::METHODS;
-use crate::elements::{at, settings};
-use crate::joint_elements::{FORMULATIONS, momenta, started};
+use crate::common::matrix::{FORMULATIONS, for_every};
+use crate::elements::at;
+use crate::joint_elements::{momenta, started};
 use jointplay::scene::{Quat, Scene, Vec3};
 
 /// One free body of 0.5 kg at (0.1, 0.2, 0.3) m with `start` besides, and a bushing at its centroid to the world with `more`.
@@ -27,47 +27,35 @@ fn turned(rotation: &nalgebra::Matrix3<f64>) -> Vec3 {
 
 #[test]
 fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
-    for method in METHODS {
-        let (step, bound) = settings(method);
-        for formulation in FORMULATIONS {
-            for axis in 0..3 {
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.step", step),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ];
-                let label = format!("{method} {formulation} {axis}");
-                let mut place = [100.0, 200.0, 300.0];
-                place[axis] += 20.0;
-                let start = format!("position = \"{} {} {} mm\"", place[0], place[1], place[2]);
-                let mut simulation = started(&one(&start, ""), &changes);
-                let t = 0.15;
-                let frame = at(&mut simulation, t);
-                let omega = (STIFFNESS[axis] / 0.5).sqrt();
-                let off = 0.02 * (omega * t).cos();
-                let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, off);
-                let wrong = (frame.bodies[0].position - expected).norm();
-                assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
-                let force = frame.elements[0].force[axis] + STIFFNESS[axis] * off;
-                assert!(force.abs() < 2e3 * bound, "{label}: {force:e}");
+    for_every(0..3, |axis, way| {
+        let (bound, label) = (way.bound(), format!("{way}, axis {axis}"));
+        let mut place = [100.0, 200.0, 300.0];
+        place[axis] += 20.0;
+        let start = format!("position = \"{} {} {} mm\"", place[0], place[1], place[2]);
+        let mut simulation = started(&one(&start, ""), &way.close());
+        let t = 0.15;
+        let frame = at(&mut simulation, t);
+        let omega = (STIFFNESS[axis] / 0.5).sqrt();
+        let off = 0.02 * (omega * t).cos();
+        let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, off);
+        let wrong = (frame.bodies[0].position - expected).norm();
+        assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
+        let force = frame.elements[0].force[axis] + STIFFNESS[axis] * off;
+        assert!(force.abs() < 2e3 * bound, "{label}: {force:e}");
 
-                // About one axis it is linear however far it turns.
-                let mut about = [0, 0, 0];
-                about[axis] = 1;
-                let start =
-                    format!("position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}");
-                let mut simulation = started(&one(&start, ""), &changes);
-                let frame = at(&mut simulation, t);
-                let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
-                let angle = (omega * t).cos();
-                let wrong = (turned(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
-                assert!(wrong < 200.0 * bound, "{label}: {wrong:e}");
-                let residual = simulation.ledger().unwrap().relative_residual();
-                assert!(residual.abs() < 1e-3, "{label}: {residual:e}");
-            }
-        }
-    }
+        // About one axis it is linear however far it turns.
+        let mut about = [0, 0, 0];
+        about[axis] = 1;
+        let start = format!("position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}");
+        let mut simulation = started(&one(&start, ""), &way.close());
+        let frame = at(&mut simulation, t);
+        let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
+        let angle = (omega * t).cos();
+        let wrong = (turned(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
+        assert!(wrong < 200.0 * bound, "{label}: {wrong:e}");
+        let residual = simulation.ledger().unwrap().relative_residual();
+        assert!(residual.abs() < 1e-3, "{label}: {residual:e}");
+    });
 }
 
 #[test]
@@ -130,13 +118,15 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
     let damped = "damping = \"0.5 0.2 1 N s/m\"\nturning_damping = \"1e-3 5e-4 2e-3 N m s/rad\"\n";
     for more in ["", damped] {
         let mut ends = Vec::new();
-        for (method, formulation) in [
+        let ways = [
             ("dopri5", "tree"),
-            ("dopri5", "lagrange"),
             ("radau5", "tree"),
             ("rosenbrock", "lagrange"),
             ("automatic", "tree"),
-        ] {
+            ("dopri5", "lagrange"),
+        ];
+        // What damps has no part in how they differ: there two are enough.
+        for (method, formulation) in ways.into_iter().skip(if more.is_empty() { 0 } else { 3 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = started(&format!("{pair}{more}"), &changes);
             let scene = simulation.scene().clone();
@@ -166,32 +156,6 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
         }
         for end in &ends[1..] {
             assert!((end - ends[0]).norm() < 1e-6, "{end} {}", ends[0]);
-        }
-    }
-}
-
-#[test]
-fn a_stiff_bushing_does_not_hold_implicit_methods_back() {
-    let stiff = one(
-        "position = \"100.001 200 300.001 mm\", rotation = { axis = [1, 2, 0], angle = \"1e-3 rad\" }",
-        "damping = \"4e3 4e3 4e3 N s/m\"\nturning_damping = \"2 2 2 N m s/rad\"\n",
-    )
-    .replace("200 300 500 N/m", "4e7 5e7 6e7 N/m")
-    .replace("0.1 0.2 0.3 N m/rad", "1e4 2e4 3e4 N m/rad");
-    for formulation in FORMULATIONS {
-        let evaluations = |method: &str| {
-            let changes = [("solver.method", method), ("solver.tolerance", "1e-6"), ("formulation", formulation)];
-            let mut simulation = started(&stiff, &changes);
-            let frame = at(&mut simulation, 1.0);
-            let off = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
-            assert!(off.norm() < 1e-7, "{method} {formulation}: {off}");
-            simulation.statistics().evaluations
-        };
-        let explicit = evaluations("dopri5");
-        for method in ["radau5", "rosenbrock", "automatic"] {
-            let implicit = evaluations(method);
-            println!("{formulation} {method} {implicit}, dopri5 {explicit}");
-            assert!(4 * implicit < explicit, "{method} {formulation}: {implicit} {explicit}");
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Force elements and drives on single coordinates of joints of two degrees, and force elements on joints that close loops, against
 //! closed solutions, in every method and both formulations.
 
-use crate::common::METHODS;
-use crate::elements::{at, settings};
-use crate::joint_elements::{FORMULATIONS, momenta, started};
+use crate::common::matrix::{FORMULATIONS, for_every};
+use crate::elements::at;
+use crate::joint_elements::{momenta, started};
 use crate::two_degrees::differ;
 use jointplay::simulate::{Frame, Simulation};
 
@@ -139,41 +139,30 @@ impl Case {
 
 #[test]
 fn a_spring_on_one_coordinate_swings_as_it_should_in_every_method_and_formulation() {
-    for case in cases() {
-        let m = case.inertia();
+    for_every(cases(), |case, way| {
+        let (m, bound) = (case.inertia(), way.bound());
         let k = 400.0 * m;
         let [.., unit, _] = case.units();
         let spring = case.element("joint_spring", &format!("stiffness = \"{k:e} {unit}\"\n"));
-        for method in METHODS {
-            for formulation in FORMULATIONS {
-                let (step, bound) = settings(method);
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.step", step),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ];
-                let mut simulation = case.starts([0.03, 0.0], &spring, &changes);
-                let frame = at(&mut simulation, 0.1);
-                let label = format!("{case:?} {method} {formulation}");
-                let [q, rate] = case.coordinate(&frame);
-                let (sin, cos) = (20.0 * 0.1_f64).sin_cos();
-                let wrong = (q - 0.03 * cos).abs();
-                assert!(wrong < bound, "{label}: {wrong:e}");
-                assert!((rate + 0.6 * sin).abs() < 20.0 * bound, "{label}: {rate}");
-                let force = case.force(&frame) + k * q;
-                assert!(force.abs() < 1e-9 * k, "{label}: {force:e}");
-                // The other coordinate goes on as it began.
-                if !case.closes_loop {
-                    let [q, rate] = frame.coordinates[1 - case.part];
-                    let (off, still) = (differ(q, 0.3), (rate - 3.0).abs());
-                    assert!(off < 20.0 * bound && still < 20.0 * bound, "{label}: {off:e} {still:e}");
-                }
-                let residual = simulation.ledger().unwrap().relative_residual();
-                assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
-            }
+        let mut simulation = case.starts([0.03, 0.0], &spring, &way.close());
+        let frame = at(&mut simulation, 0.1);
+        let label = format!("{case:?} {way}");
+        let [q, rate] = case.coordinate(&frame);
+        let (sin, cos) = (20.0 * 0.1_f64).sin_cos();
+        let wrong = (q - 0.03 * cos).abs();
+        assert!(wrong < bound, "{label}: {wrong:e}");
+        assert!((rate + 0.6 * sin).abs() < 20.0 * bound, "{label}: {rate}");
+        let force = case.force(&frame) + k * q;
+        assert!(force.abs() < 1e-9 * k, "{label}: {force:e}");
+        // The other coordinate goes on as it began.
+        if !case.closes_loop {
+            let [q, rate] = frame.coordinates[1 - case.part];
+            let (off, still) = (differ(q, 0.3), (rate - 3.0).abs());
+            assert!(off < 20.0 * bound && still < 20.0 * bound, "{label}: {off:e} {still:e}");
         }
-    }
+        let residual = simulation.ledger().unwrap().relative_residual();
+        assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
+    });
 }
 
 #[test]
@@ -238,8 +227,8 @@ fn driven() -> [f64; 3] {
 
 #[test]
 fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants() {
-    for case in OF_TWO {
-        let [length, ..] = case.units();
+    for_every(OF_TWO, |case, way| {
+        let ([length, ..], bound) = (case.units(), way.bound());
         let text = case.text([0.0, 0.0], "");
         let start = text.find("start = ").expect("start values");
         let (before, after) = text.split_at(start);
@@ -249,39 +238,25 @@ fn a_drive_of_one_coordinate_leaves_the_other_free_and_needs_what_inertia_wants(
         let law = DRIVEN.replace("UNIT", length);
         let drive = format!("start = {{ {rate} = \"3 {unit}\" }}\ndrive = {{ {} = {{ {law} }} }}\n", case.coordinate);
         let text = before.to_owned() + &drive + after.split_once('\n').expect("a line").1;
-        for method in METHODS {
-            for formulation in FORMULATIONS {
-                let (step, bound) = settings(method);
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.step", step),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ];
-                let mut simulation = started(&text, &changes);
-                let frame = at(&mut simulation, 0.13);
-                let label = format!("{case:?} {method} {formulation}");
-                let [q, rate, acceleration] = driven();
-                let [own, speed] = case.coordinate(&frame);
-                assert!((own - q).abs() < bound && (speed - rate).abs() < 20.0 * bound, "{label}: {own} {speed}");
-                let [other, speed] = frame.coordinates[1 - case.part];
-                assert!(
-                    differ(other, 0.39) < 20.0 * bound && (speed - 3.0).abs() < 20.0 * bound,
-                    "{label}: {other} {speed}"
-                );
-                let needed = case.inertia() * acceleration;
-                let off = (frame.actuators[0] - needed).abs() / needed.abs();
-                assert!(frame.actuators.len() == 1 && off < 1e4 * bound, "{label}: {off:e}");
-                let ledger = simulation.ledger().unwrap();
-                let residual = ledger.relative_residual();
-                assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
-                let w = 3.0 * std::f64::consts::PI;
-                let work = 0.5 * case.inertia() * (rate * rate - (0.2 * w).powi(2));
-                let off = (ledger.drive_work / work - 1.0).abs();
-                assert!(off < 1e3 * bound.max(1e-7), "{label}: {off:e}");
-            }
-        }
-    }
+        let mut simulation = started(&text, &way.close());
+        let frame = at(&mut simulation, 0.13);
+        let label = format!("{case:?} {way}");
+        let [q, rate, acceleration] = driven();
+        let [own, speed] = case.coordinate(&frame);
+        assert!((own - q).abs() < bound && (speed - rate).abs() < 20.0 * bound, "{label}: {own} {speed}");
+        let [other, speed] = frame.coordinates[1 - case.part];
+        assert!(differ(other, 0.39) < 20.0 * bound && (speed - 3.0).abs() < 20.0 * bound, "{label}: {other} {speed}");
+        let needed = case.inertia() * acceleration;
+        let off = (frame.actuators[0] - needed).abs() / needed.abs();
+        assert!(frame.actuators.len() == 1 && off < 1e4 * bound, "{label}: {off:e}");
+        let ledger = simulation.ledger().unwrap();
+        let residual = ledger.relative_residual();
+        assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
+        let w = 3.0 * std::f64::consts::PI;
+        let work = 0.5 * case.inertia() * (rate * rate - (0.2 * w).powi(2));
+        let off = (ledger.drive_work / work - 1.0).abs();
+        assert!(off < 1e3 * bound.max(1e-7), "{label}: {off:e}");
+    });
 }
 
 #[test]

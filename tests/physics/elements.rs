@@ -1,6 +1,7 @@
 //! Force elements against closed solutions, in every method and both formulations.
 
-use crate::common::{FOUR_WAYS, METHODS, parse};
+use crate::common::matrix::every_way;
+use crate::common::{FOUR_WAYS, parse};
 use jointplay::scene::{Scene, Vec3};
 use jointplay::simulate::{Frame, Simulation};
 
@@ -32,61 +33,23 @@ pub fn at(simulation: &mut Simulation, time: f64) -> Frame {
 const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\n\
                       length = \"100 mm\"\nstiffness = \"200 N/m\"\n";
 
-/// A step that suits the method's order, and how close it then comes, m.
-pub fn settings(method: &str) -> (&'static str, f64) {
-    match method {
-        "semi-implicit-euler" | "imex-euler" => ("1 us", 2e-6),
-        "rk4" => ("100 us", 1e-9),
-        _ => ("10 us", 1e-8),
-    }
-}
-
 #[test]
 fn a_mass_on_a_spring_swings_as_it_should_in_every_method_and_formulation() {
     let omega = (200.0 / MASS).sqrt();
-    for method in METHODS {
-        for formulation in ["tree", "lagrange"] {
-            let (step, bound) = settings(method);
-            let mut simulation = floating(
-                SPRING,
-                &[
-                    ("solver.method", method),
-                    ("solver.step", step),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ],
-            );
-            let time = 0.2;
-            let frame = at(&mut simulation, time);
-            let expected = 0.1 + 0.03 * (omega * time).cos();
-            let off = (frame.bodies[0].position - Vec3::new(expected, 0.0, 0.0)).norm();
-            assert!(off < bound, "{method} {formulation}: {off:e}");
-            let tension = 200.0 * (expected - 0.1);
-            assert!((frame.elements[0].force.x + tension).abs() < 2e3 * bound);
-            assert!((frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound);
-            let ledger = simulation.ledger().unwrap();
-            assert!(ledger.exchanged > 0.1, "{ledger:?}");
-            assert!(ledger.relative_residual().abs() < 1e-4, "{method} {formulation}");
-        }
-    }
-}
-
-#[test]
-fn the_error_falls_with_the_order_of_the_method() {
-    let omega = (200.0 / MASS).sqrt();
-    let error = |method: &str, step: f64| {
-        let step = format!("{step} s");
-        let changes = [("solver.method", method), ("solver.step", &*step)];
-        let frame = at(&mut floating(SPRING, &changes), 0.2);
-        (frame.bodies[0].position.x - 0.1 - 0.03 * (omega * 0.2).cos()).abs()
-    };
-    for (method, steps, order) in
-        [("semi-implicit-euler", [1e-4, 5e-5], 1.0), ("imex-euler", [1e-4, 5e-5], 1.0), ("rk4", [4e-3, 2e-3], 4.0)]
-    {
-        let [coarse, fine] = steps.map(|step| error(method, step));
-        let found = (coarse / fine).log2();
-        println!("{method}: {coarse:e}, {fine:e}, order {found}");
-        assert!((found - order).abs() < 0.15, "{method}: {found}");
+    for way in every_way() {
+        let bound = way.bound();
+        let mut simulation = floating(SPRING, &way.close());
+        let time = 0.2;
+        let frame = at(&mut simulation, time);
+        let expected = 0.1 + 0.03 * (omega * time).cos();
+        let off = (frame.bodies[0].position - Vec3::new(expected, 0.0, 0.0)).norm();
+        assert!(off < bound, "{way}: {off:e}");
+        let tension = 200.0 * (expected - 0.1);
+        assert!((frame.elements[0].force.x + tension).abs() < 2e3 * bound);
+        assert!((frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound);
+        let ledger = simulation.ledger().unwrap();
+        assert!(ledger.exchanged > 0.1, "{ledger:?}");
+        assert!(ledger.relative_residual().abs() < 1e-4, "{way}");
     }
 }
 

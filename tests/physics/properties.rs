@@ -1,6 +1,8 @@
 //! Any values of the one parameter table: in their ranges a scene starts or says why not, outside of them every key says what
 //! is allowed. `PROPTEST_CASES` asks for more cases than every run of the tests makes, `PROPTEST_RNG_SEED` for others.
 
+use std::sync::LazyLock;
+
 use crate::common::invariants::finite;
 use crate::common::{METHODS, SCENES};
 use jointplay::scene::{BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table};
@@ -48,6 +50,17 @@ fn values(parameter: &'static Parameter) -> BoxedStrategy<Value> {
     }
 }
 
+/// A built-in scene, read once.
+fn built_in(name: &str) -> &'static Scene {
+    static ALL: LazyLock<Vec<Scene>> = LazyLock::new(|| BUILT_IN.map(|name| Scene::load(name, &[]).unwrap()).into());
+    ALL.iter().find(|scene| scene.name == name).expect("built in")
+}
+
+/// One that has this row.
+fn with_row(row: &Parameter) -> Scene {
+    built_in(if row.scope == Scope::Chain { "chain" } else { "spcmm" }).clone()
+}
+
 /// Any row of the table.
 fn rows() -> impl Strategy<Value = &'static Parameter> {
     (0..table().len()).prop_map(|row| &table()[row])
@@ -68,7 +81,7 @@ fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
 /// One of `scenes`, and changes in its keys' ranges.
 fn changed_scenes(scenes: &'static [&'static str]) -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
     let of_scene = |name: &'static str| {
-        let scene = Scene::load(name, &[]).unwrap();
+        let scene = built_in(name);
         let rows: Vec<BoxedStrategy<(&'static Parameter, Value)>> =
             scene.parameters().into_iter().map(|row| values(row).prop_map(move |value| (row, value)).boxed()).collect();
         let change = proptest::strategy::Union::new(rows);
@@ -248,7 +261,7 @@ proptest! {
 
     #[test]
     fn any_changes_of_a_running_scene_are_taken_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
-        let mut simulation = Simulation::new(&Scene::load(name, &[]).unwrap()).unwrap();
+        let mut simulation = Simulation::new(built_in(name)).unwrap();
         // Somewhere in the first impacts.
         simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;
         let mut frame = Frame::default();
@@ -288,8 +301,7 @@ proptest! {
         let written = row.write(&value);
         prop_assert_eq!(row.read(&written), Ok(value.clone()), "{}", written);
         prop_assert!(row.check(&value).is_ok());
-        let spcmm = Scene::load(if row.scope == Scope::Chain { "chain" } else { "spcmm" }, &[]).unwrap();
-        let mut scene = spcmm;
+        let mut scene = with_row(row);
         match scene.set_value(row.key, &value) {
             Ok(_) => {
                 prop_assert_eq!(scene.get(row.key).unwrap(), value);
@@ -316,7 +328,7 @@ proptest! {
         };
         prop_assert!(row.check(&outside).is_err());
         let written = row.write(&outside);
-        let mut scene = Scene::load(if row.scope == Scope::Chain { "chain" } else { "spcmm" }, &[]).unwrap();
+        let mut scene = with_row(row);
         let before = scene.clone();
         let words = scene.set(row.key, &written).unwrap_err().to_string();
         prop_assert!(words.starts_with(&format!("{} = {written}: ", row.key)), "{}", words);
@@ -334,7 +346,7 @@ proptest! {
 
     #[test]
     fn any_text_as_a_key_is_known_or_refused(text in "[a-z._]{0,30}|\\PC{0,24}") {
-        let mut scene = Scene::load("spcmm", &[]).unwrap();
+        let mut scene = built_in("spcmm").clone();
         if let Err(error) = scene.set(&text, "1") {
             prop_assert!(!error.to_string().is_empty());
         }

@@ -1,7 +1,7 @@
 //! What joints of the tree exert: against closed solutions, and by Newton and Euler for every body.
 
+use crate::common::matrix::FORMULATIONS;
 use crate::common::{parse, scene};
-use crate::joint_elements::FORMULATIONS;
 use jointplay::scene::{JointKind, Scene, Vec3};
 use jointplay::simulate::{BodyMotion, Frame, Simulation};
 
@@ -253,24 +253,5 @@ fn contacts_load_them_too() {
             }
             assert!(touched, "{name} {formulation}");
         }
-    }
-}
-
-#[test]
-fn asking_for_them_changes_no_bit() {
-    for formulation in FORMULATIONS {
-        let changes = [("formulation", formulation)];
-        let [mut asked, mut not] = [0; 2].map(|_| Simulation::new(&scene("slider-crank", &changes)).unwrap());
-        let (mut with, mut without) = (asking(), Frame::default());
-        for n in 1..=20 {
-            let time = 1e-3 * f64::from(n);
-            asked.advance_to(time).unwrap();
-            asked.sample(time, &mut with);
-            not.advance_to(time).unwrap();
-            not.sample(time, &mut without);
-            assert!(without.reactions.is_none());
-            assert_eq!(format!("{:?}", with.bodies), format!("{:?}", without.bodies));
-        }
-        assert_eq!(asked.state_hash(), not.state_hash());
     }
 }

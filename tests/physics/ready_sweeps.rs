@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::common::matrix::side_by_side;
 use crate::common::simulation;
 use jointplay::analysis::ready::{READY, ReadySweep};
 use jointplay::analysis::sweep_task::{Share, SweptPoint};
@@ -49,14 +50,16 @@ fn every_ready_sweep_has_a_sentence_and_a_range_that_its_scene_takes() {
 }
 
 #[test]
-fn the_road_to_chaos_begins_with_knocks() {
+#[ignore = "full: a minute"]
+fn full_the_road_to_chaos_begins_with_knocks() {
     let ready = named("Road to chaos");
-    for (value, regime, knocks) in [
-        ("21 rad/s", "periodic 1", false),
-        ("23 rad/s", "periodic 1", false),
-        ("29 rad/s", "periodic 2", true),
+    let cases = [
         ("31 rad/s", "chaotic", true),
-    ] {
+        ("29 rad/s", "periodic 2", true),
+        ("23 rad/s", "periodic 1", false),
+        ("21 rad/s", "periodic 1", false),
+    ];
+    side_by_side(&cases, |&(value, regime, knocks)| {
         let point = &points(ready, Some(&format!("{value}..{value}:1")), false)[0];
         assert_eq!(point.regime, regime, "{value}");
         // Contacts that begin in the kept turns.
@@ -66,13 +69,14 @@ fn the_road_to_chaos_begins_with_knocks() {
             run.statistics().impacts.iter().sum::<u64>()
         });
         assert_eq!(impacts[1] > impacts[0], knocks, "{value}: {impacts:?}");
-    }
+    });
     let ends = points(ready, Some("23 rad/s..31 rad/s:2"), true);
     parts_from(&ends[1], &ends[0]);
 }
 
 #[test]
-fn friction_ends_the_chaos_of_the_slider_crank() {
+#[ignore = "full: ten seconds"]
+fn full_friction_ends_the_chaos_of_the_slider_crank() {
     let ready = named("Friction ends chaos");
     let regime = |value: &str| points(ready, Some(&format!("{value}..{value}:1")), false)[0].regime.clone();
     assert_eq!(regime("0.003"), "chaotic");
@@ -95,12 +99,21 @@ fn parts_from(chaotic: &SweptPoint, regular: &SweptPoint) {
     assert_eq!(regular.regime, "periodic 1");
 }
 
-#[test]
-fn the_machine_of_the_paper_repeats_whatever_its_play() {
-    let ready = named("Play alone is no chaos");
-    let points = points(ready, None, false);
-    assert_eq!(points.len(), ready.values);
+fn repeats(vary: Option<&str>, values: usize) {
+    let points = points(named("Play alone is no chaos"), vary, false);
+    assert_eq!(points.len(), values);
     for point in points {
         assert_eq!(point.regime, "periodic 1", "{:?}", point.settings);
     }
+}
+
+#[test]
+fn the_machine_of_the_paper_repeats_with_little_play_and_with_much() {
+    repeats(Some("0.01 mm..1 mm:2"), 2);
+}
+
+#[test]
+#[ignore = "full: three seconds"]
+fn full_the_machine_of_the_paper_repeats_whatever_its_play() {
+    repeats(None, named("Play alone is no chaos").values);
 }

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use crate::common::{FOUR_WAYS, METHODS, parse};
-use crate::elements::{at, settings};
-use crate::joint_elements::FORMULATIONS;
+use crate::common::matrix::for_every;
+use crate::common::{FOUR_WAYS, parse};
+use crate::elements::at;
 use jointplay::scene::{Scene, Vec3};
 use jointplay::simulate::{Frame, Simulation};
 
@@ -50,41 +50,30 @@ fn ridden(damping: f64, [a, w]: [f64; 2], t: f64) -> f64 {
 #[test]
 fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
     let (waves, time) = ([1e-3, TAU * 6.0], 0.3);
-    for damping in [0.0, 400.0] {
+    for_every([0.0, 400.0], |damping, way| {
         let text = wheel(
             REST,
             &format!(
                 "damping = \"{damping} N s/m\"\nground = {{ law = \"harmonic\", amplitude = \"1 mm\", frequency = \"6 Hz\" }}"
             ),
         );
-        for method in METHODS {
-            for formulation in FORMULATIONS {
-                let (step, bound) = settings(method);
-                let changes = [
-                    ("solver.method", method),
-                    ("solver.step", step),
-                    ("solver.tolerance", "1e-10"),
-                    ("formulation", formulation),
-                ];
-                let mut simulation = started(&text, &changes);
-                let frame = at(&mut simulation, time);
-                let label = format!("{method} {formulation} {damping}");
-                let expected = ridden(damping, waves, time);
-                let off = frame.bodies[0].position.z - REST - expected;
-                assert!(off.abs() < bound, "{label}: {off:e} of {expected:e}");
-                let ground = waves[0] * (waves[1] * time).sin();
-                let depth = ground + RADIUS - frame.bodies[0].position.z;
-                let stored = 0.5 * STIFFNESS * depth * depth;
-                assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
-                let below = frame.elements[0].points[0];
-                assert!((below - Vec3::new(0.0, 0.0, ground)).norm() < 1e-15, "{label}");
-                let ledger = simulation.ledger().unwrap();
-                assert!(ledger.drive_work != 0.0, "{ledger:?}");
-                assert_eq!(ledger.damping_loss > 0.0, damping > 0.0, "{ledger:?}");
-                assert!(ledger.relative_residual().abs() < 1e-4, "{label} {ledger:?}");
-            }
-        }
-    }
+        let mut simulation = started(&text, &way.close());
+        let frame = at(&mut simulation, time);
+        let label = format!("{way}, damping {damping}");
+        let expected = ridden(damping, waves, time);
+        let off = frame.bodies[0].position.z - REST - expected;
+        assert!(off.abs() < way.bound(), "{label}: {off:e} of {expected:e}");
+        let ground = waves[0] * (waves[1] * time).sin();
+        let depth = ground + RADIUS - frame.bodies[0].position.z;
+        let stored = 0.5 * STIFFNESS * depth * depth;
+        assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
+        let below = frame.elements[0].points[0];
+        assert!((below - Vec3::new(0.0, 0.0, ground)).norm() < 1e-15, "{label}");
+        let ledger = simulation.ledger().unwrap();
+        assert!(ledger.drive_work != 0.0, "{ledger:?}");
+        assert_eq!(ledger.damping_loss > 0.0, damping > 0.0, "{ledger:?}");
+        assert!(ledger.relative_residual().abs() < 1e-4, "{label} {ledger:?}");
+    });
 }
 
 #[test]

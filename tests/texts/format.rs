@@ -100,10 +100,14 @@ fn at<'a>(root: &'a mut Item, path: &[Step]) -> &'a mut Item {
     })
 }
 
-/// Every key of `item`, a table as `rows` says, with its place and row; and every table with its place.
+/// The word that tells which variant of a table one is.
+type Word = Option<&'static str>;
+
+/// Every key of `item`, a table as `rows` says, with its place, its row and the variant of its table; and every table with its place
+/// and variant.
 struct Found {
-    keys: Vec<(Vec<Step>, &'static FileKey)>,
-    tables: Vec<(Vec<Step>, &'static FileTable)>,
+    keys: Vec<(Vec<Step>, &'static FileKey, Word)>,
+    tables: Vec<(Vec<Step>, &'static FileTable, Word)>,
 }
 
 impl Found {
@@ -116,16 +120,16 @@ impl Found {
 
     fn walk(&mut self, item: &Item, rows: &'static FileTable, path: Vec<Step>) {
         let table = item.as_table_like().expect("a table");
-        self.tables.push((path.clone(), rows));
         let there = |word: &&&str| match rows.variants {
             Some(Variants::Word(by, _)) => table.get(by).and_then(Item::as_str) == Some(**word),
             _ => table.contains_key(word),
         };
         let word = rows.words().iter().find(there).copied();
+        self.tables.push((path.clone(), rows, word));
         for (name, inner) in table.iter() {
             let row = rows.key(name, word).unwrap_or_else(|| panic!("{name}"));
             let path = [&path[..], &[Step::Key(name.to_owned())]].concat();
-            self.keys.push((path.clone(), row));
+            self.keys.push((path.clone(), row, word));
             match row.takes {
                 Takes::Table(rows) => self.walk(inner, rows, path),
                 Takes::List(rows, _) => {
@@ -158,6 +162,26 @@ fn changed(text: &str, path: &[Step], key: Option<&str>) -> String {
     DocumentMut::from(table).to_string()
 }
 
+/// Of the keys and tables of all scenes, which come with their names and texts, each where it first stands at such a place in such
+/// a variant: elsewhere the same code reads it.
+fn each_once() -> Vec<(String, String, Found)> {
+    let (mut keys, mut tables) = (BTreeSet::new(), BTreeSet::new());
+    let places = |path: &[Step]| -> Vec<String> {
+        let key = |step: &Step| match step {
+            Step::Key(key) => Some(key.clone()),
+            Step::Place(_) => None,
+        };
+        path.iter().filter_map(key).collect()
+    };
+    let own = |(name, text): (String, String)| {
+        let mut found = Found::of(text.trim_start_matches('\u{feff}'));
+        found.keys.retain(|(path, row, word)| keys.insert((places(path), std::ptr::from_ref(*row), *word)));
+        found.tables.retain(|(path, rows, word)| tables.insert((places(path), std::ptr::from_ref(*rows), *word)));
+        (name, text, found)
+    };
+    scenes().into_iter().map(own).collect()
+}
+
 /// Last part of the key of an error, without places in lists.
 fn last(error: &SceneError) -> String {
     let key = error.key.as_deref().unwrap_or_default();
@@ -168,17 +192,16 @@ fn last(error: &SceneError) -> String {
 #[test]
 fn every_row_is_read_and_nothing_else_is() {
     let mut read = BTreeSet::new();
-    for (name, text) in scenes() {
+    for (name, text, found) in each_once() {
         parse(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let found = Found::of(&text);
-        for (path, row) in found.keys {
+        for (path, row, _) in found.keys {
             // No key takes a date: one that is not read would let it pass.
             let wrong = changed(&text, &path, None);
             let error = parse(&wrong).expect_err(&format!("{name}: {path:?} is not read"));
             assert_eq!(last(&error), row.name, "{name}: {path:?}: {error}");
             read.insert(std::ptr::from_ref(row));
         }
-        for (path, rows) in found.tables {
+        for (path, rows, _) in found.tables {
             let error = parse(&changed(&text, &path, Some("hue"))).unwrap_err();
             assert_eq!(last(&error), "hue", "{name}: {path:?}: {error}");
             assert!(error.message.contains("unknown key"), "{}: {error}", rows.name);
@@ -305,15 +328,14 @@ fn the_schema_takes_whatever_the_reader_takes() {
 #[test]
 fn the_schema_refuses_a_wrong_value_of_every_key_and_any_other_key() {
     let schema = Schema::new();
-    for (name, text) in scenes() {
+    for (name, text, found) in each_once() {
         let text = text.trim_start_matches('\u{feff}');
-        let found = Found::of(text);
-        for (path, _) in &found.keys {
+        for (path, ..) in &found.keys {
             // Neither a number, a text, a list nor a table of such keys.
             let wrong = changed(text, path, None).replace("1979-05-27", "{ colour = { red = 1 } }");
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }
-        for (path, _) in &found.tables {
+        for (path, ..) in &found.tables {
             let wrong = changed(text, path, Some("hue"));
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }

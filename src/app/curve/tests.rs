@@ -85,42 +85,39 @@ fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
         let found = spikes.iter().find(|spike| (spike.0, spike.1) == (n, channel));
         found.map_or(0.0, |spike| spike.2)
     });
-    for (size, scale) in SIZES {
-        // The newest at the right edge, and in the middle.
-        for length in [0.102, 0.2] {
-            let (picture, place) = drawn(&history, length, size, scale);
-            for (n, channel, force) in spikes.into_iter().filter(|spike| spike.2 != 101.0) {
-                let [x, y] = place(f64::from(n) * 1e-4, force);
-                let highest = top(&picture.coloured(around(x), COLOURS[channel], MOSTLY)).expect("drawn");
-                assert!((highest as f64 + 0.5 - y).abs() <= 1.0, "{size:?} {n}: {highest} for {y}");
-            }
+    // The newest at the right edge, and in the middle.
+    for ((size, scale), length) in SIZES.into_iter().zip([0.102, 0.2].into_iter().cycle()) {
+        let (picture, place) = drawn(&history, length, size, scale);
+        for (n, channel, force) in spikes.into_iter().filter(|spike| spike.2 != 101.0) {
+            let [x, y] = place(f64::from(n) * 1e-4, force);
+            let highest = top(&picture.coloured(around(x), COLOURS[channel], MOSTLY)).expect("drawn");
+            assert!((highest as f64 + 0.5 - y).abs() <= 1.0, "{size:?} {n}: {highest} for {y}");
         }
     }
 }
 
 #[test]
 fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
-    for heights in [[621.0, 561.0, 533.0], [533.0, 561.0, 621.0], [400.0; 3], [0.0; 3]] {
+    let all = [[621.0, 561.0, 533.0], [533.0, 561.0, 621.0], [400.0; 3], [0.0; 3]];
+    for (heights, (size, scale)) in all.into_iter().zip(SIZES.into_iter().cycle()) {
         let history = record(|n, channel| if n == 500 { heights[channel] } else { 0.0 });
-        for (size, scale) in SIZES {
-            let (picture, place) = drawn(&history, 0.1, size, scale);
-            let [x, _] = place(0.05, 0.0);
-            for (height, colour) in heights.into_iter().zip(COLOURS) {
-                let [_, y] = place(0.05, height);
-                // Spikes show above the level that all have in common, and that is shared as well.
-                let area = match height {
-                    0.0 => {
-                        let ends = (place(0.0, 9.0), place(0.1, -9.0));
-                        [ends.0[0], ends.0[1], ends.1[0], ends.1[1]].map(|at| at as usize)
-                    }
-                    _ => [around(x)[0], 0, around(x)[2], (place(0.0, 0.0)[1] - 3.0) as usize],
-                };
-                let found = picture.coloured(area, colour, 110);
-                assert!(found.len() > 2, "{heights:?} {size:?}: {colour:?}");
-                if heights[0] != heights[1] {
-                    let highest = top(&picture.coloured(area, colour, MOSTLY)).expect("drawn");
-                    assert!((highest as f64 + 0.5 - y).abs() <= 1.0, "{heights:?}: {highest} for {y}");
+        let (picture, place) = drawn(&history, 0.1, size, scale);
+        let [x, _] = place(0.05, 0.0);
+        for (height, colour) in heights.into_iter().zip(COLOURS) {
+            let [_, y] = place(0.05, height);
+            // Spikes show above the level that all have in common, and that is shared as well.
+            let area = match height {
+                0.0 => {
+                    let ends = (place(0.0, 9.0), place(0.1, -9.0));
+                    [ends.0[0], ends.0[1], ends.1[0], ends.1[1]].map(|at| at as usize)
                 }
+                _ => [around(x)[0], 0, around(x)[2], (place(0.0, 0.0)[1] - 3.0) as usize],
+            };
+            let found = picture.coloured(area, colour, 110);
+            assert!(found.len() > 2, "{heights:?} {size:?}: {colour:?}");
+            if heights[0] != heights[1] {
+                let highest = top(&picture.coloured(area, colour, MOSTLY)).expect("drawn");
+                assert!((highest as f64 + 0.5 - y).abs() <= 1.0, "{heights:?}: {highest} for {y}");
             }
         }
     }
@@ -134,25 +131,24 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
         1 => 350.0 + 300.0 * libm::sin(f64::from(n) * 2.5),
         _ => 50.0 + 100.0 * f64::from(n / 100 % 2),
     };
-    for (size, scale) in SIZES {
-        for length in [0.1, 0.01] {
-            for channel in 0..3 {
-                let only = |n: u32, other: usize| {
-                    if other == channel { value(n, channel) } else { f64::NAN }
-                };
-                let (picture, place) = drawn(&record(only), length, size, scale);
-                let (low, high) = if channel == 2 { (50.0, 150.0) } else { (50.0, 650.0) };
-                let corners = (place(0.0, 740.0), place(length, -40.0));
-                let (left, right) = (corners.0[0] as usize + 1, corners.1[0] as usize - 1);
-                let frame = [left, corners.0[1] as usize, right, corners.1[1] as usize];
-                let found = picture.coloured(frame, COLOURS[channel], 110);
-                // Half the width of the curve where it runs level.
-                let half = f64::from(0.5 * WIDTH * scale) + 0.5;
-                let (top, bottom) = (place(0.0, high)[1] - half, place(0.0, low)[1] + half);
-                assert!(found.iter().all(|(_, y)| (top..bottom).contains(&(*y as f64 + 0.5))));
-                for x in left..right {
-                    assert!(found.iter().any(|place| place.0 == x), "{channel} {size:?}: a gap at {x}");
-                }
+    for (turn, (size, scale)) in SIZES.into_iter().enumerate() {
+        for channel in 0..3 {
+            let length = [0.1, 0.01][(turn + channel) % 2];
+            let only = |n: u32, other: usize| {
+                if other == channel { value(n, channel) } else { f64::NAN }
+            };
+            let (picture, place) = drawn(&record(only), length, size, scale);
+            let (low, high) = if channel == 2 { (50.0, 150.0) } else { (50.0, 650.0) };
+            let corners = (place(0.0, 740.0), place(length, -40.0));
+            let (left, right) = (corners.0[0] as usize + 1, corners.1[0] as usize - 1);
+            let frame = [left, corners.0[1] as usize, right, corners.1[1] as usize];
+            let found = picture.coloured(frame, COLOURS[channel], 110);
+            // Half the width of the curve where it runs level.
+            let half = f64::from(0.5 * WIDTH * scale) + 0.5;
+            let (top, bottom) = (place(0.0, high)[1] - half, place(0.0, low)[1] + half);
+            assert!(found.iter().all(|(_, y)| (top..bottom).contains(&(*y as f64 + 0.5))));
+            for x in left..right {
+                assert!(found.iter().any(|place| place.0 == x), "{channel} {size:?}: a gap at {x}");
             }
         }
     }

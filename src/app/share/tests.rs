@@ -129,7 +129,7 @@ fn every_link_reads_back_to_the_same_bits() {
 fn no_text_whatever_makes_it_panic() {
     let mut chance = Chance(2);
     let mut read = 0;
-    for _ in 0..3000 {
+    for _ in 0..1000 {
         let mut bytes = chance.link().format().into_bytes();
         for _ in 0..=chance.below(4) {
             let at = chance.below(bytes.len() as u64) as usize;
@@ -147,7 +147,7 @@ fn no_text_whatever_makes_it_panic() {
         // Nor does anything else.
         let _ = Link::parse(&chance.text(200));
     }
-    assert!(read > 100, "{read} were links still");
+    assert!(read > 40, "{read} were links still");
 }
 
 #[test]

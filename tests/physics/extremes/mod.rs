@@ -24,22 +24,26 @@ impl Columns {
             Self::Methods => &METHODS,
         }
     }
+
+    /// What stands above its table of a formulation.
+    fn title(self, form: &str) -> String {
+        let about = match self {
+            Self::Presets => "every preset",
+            Self::Methods => "every method",
+        };
+        format!("\n## With {about}, formulation `{form}`\n")
+    }
 }
 
 /// Outcomes of a row: each formulation's in order of its columns.
 type Outcomes = [Vec<Outcome>; 2];
 
-/// Outcomes of every row.
-fn table(rows: Vec<Row>) -> Vec<(Row, Outcomes)> {
-    let cells: Vec<(usize, usize, &str)> = rows
-        .iter()
-        .enumerate()
-        .flat_map(|(r, row)| {
-            let words = row.columns.words();
-            (0..FORMS.len()).flat_map(move |f| words.iter().map(move |word| (r, f, *word)))
-        })
-        .collect();
-    let (rows, cells) = (Arc::new(rows), Arc::new(cells));
+/// A cell: places of its row and its formulation, and the word of its column.
+type Place = (usize, usize, &'static str);
+
+/// Outcomes of some cells, in their order.
+fn outcomes(rows: &Arc<Vec<Row>>, cells: Vec<Place>) -> Vec<Outcome> {
+    let cells = Arc::new(cells);
     let next = Arc::new(Mutex::new(0));
     let (send, receive) = channel();
     for _ in 0..2 {
@@ -77,7 +81,18 @@ fn table(rows: Vec<Row>) -> Vec<(Row, Outcomes)> {
             }
         }
     }
-    let mut outcomes = outcomes.into_iter().map(Option::unwrap);
+    outcomes.into_iter().map(Option::unwrap).collect()
+}
+
+/// Outcomes of every row.
+fn table() -> Vec<(Row, Outcomes)> {
+    let rows = Arc::new(rows());
+    let of_row = |(r, row): (usize, &Row)| {
+        let words = row.columns.words();
+        (0..FORMS.len()).flat_map(move |f| words.iter().map(move |word| (r, f, *word)))
+    };
+    let cells = rows.iter().enumerate().flat_map(of_row).collect();
+    let mut outcomes = outcomes(&rows, cells).into_iter();
     let Ok(rows) = Arc::try_unwrap(rows) else { panic!("a thread still holds the rows") };
     let mut with = |row: Row| {
         let mut take = || outcomes.by_ref().take(row.columns.words().len()).collect();
@@ -90,8 +105,8 @@ fn table(rows: Vec<Row>) -> Vec<(Row, Outcomes)> {
 const HEAD: &str = "# Stable at the extremes
 
 What becomes of a scene at the ends of what may be asked for, with every preset, or with every method where the row is about
-step or tolerance, and both formulations: the first impacts of each row. `cargo test --test physics extremes::` runs the table and checks
-it; with `-- --ignored write_the_page` it writes this page.
+step or tolerance, and both formulations: the first impacts of each row. `cargo test --test physics extremes::` runs and checks a cell of each
+row, with `-- --ignored extremes::full` all; with `-- --ignored write_the_page` it writes this page.
 
 - **runs**: to the end. Every number is finite, orientations are rotations, ideal joints are closed to 1e-9 m (`lagrange`, which
   only stabilises them: 1 mm), no ball is deeper in its wall than a tenth of its radius, a ball in the wall that moves deeper
@@ -107,16 +122,14 @@ const LONG_RUN: &str = "\n## 1000 simulated seconds\n";
 
 fn page(table: &[(Row, Outcomes)]) -> String {
     let mut page = String::from(HEAD);
-    for (columns, about) in [(Columns::Presets, "every preset"), (Columns::Methods, "every method")] {
+    for columns in [Columns::Presets, Columns::Methods] {
         let rows = || table.iter().filter(move |(row, _)| row.columns == columns);
         for (f, form) in FORMS.iter().enumerate() {
             let words = columns.words();
             let line = "---|".repeat(words.len());
             let words = words.join(" | ");
-            let _ = write!(
-                page,
-                "\n## With {about}, formulation `{form}`\n\n| Scene | Extreme | {words} |\n|---|---|{line}\n"
-            );
+            let title = columns.title(form);
+            let _ = write!(page, "{title}\n| Scene | Extreme | {words} |\n|---|---|{line}\n");
             for (row, outcomes) in rows() {
                 let words: Vec<&str> = outcomes[f].iter().map(Outcome::word).collect();
                 let words = words.join(" | ");
@@ -156,26 +169,56 @@ fn kept() -> (String, String) {
 #[test]
 #[ignore = "writes docs/extremes.md"]
 fn write_the_page() {
-    let page = page(&table(rows())) + &kept().1;
+    let page = page(&table()) + &kept().1;
     std::fs::write(page_path(), page).unwrap();
 }
 
+/// What speaks against an outcome or for a name of it, to be shown; whether it must not be.
+fn tell(row: &Row, form: &str, column: &str, outcome: &Outcome) -> bool {
+    let (word, why) = (outcome.word(), outcome.reason());
+    if !why.is_empty() {
+        println!("{word}: {}, {}, {form}, {column}: {why}", row.scene, row.what);
+    }
+    matches!(outcome, Outcome::Wrong(_))
+}
+
+const ANEW: &str = "cargo test --test physics -- --ignored extremes::write_the_page";
+
 #[test]
-fn every_extreme_ends_in_a_named_outcome() {
-    let table = table(rows());
+#[ignore = "full: half a minute"]
+fn full_every_extreme_ends_in_a_named_outcome() {
+    let table = table();
     let mut wrong = 0;
     for (row, outcomes) in &table {
         for (f, form) in FORMS.iter().enumerate() {
             for (outcome, column) in outcomes[f].iter().zip(row.columns.words()) {
-                if !outcome.reason().is_empty() {
-                    let (word, why) = (outcome.word(), outcome.reason());
-                    let what = &row.what;
-                    println!("{word}: {}, {what}, {form}, {column}: {why}", row.scene);
-                }
-                wrong += u32::from(matches!(outcome, Outcome::Wrong(_)));
+                wrong += u32::from(tell(row, form, column, outcome));
             }
         }
     }
     assert_eq!(wrong, 0, "outcomes that must not be");
-    assert!(kept().0 == page(&table), "cargo test --test physics -- --ignored extremes::write_the_page");
+    assert!(kept().0 == page(&table), "{ANEW}");
+}
+
+/// One cell of each row: formulations and columns take turns.
+#[test]
+fn an_outcome_of_every_extreme_is_that_of_the_page() {
+    let rows = Arc::new(rows());
+    let cell = |(r, row): (usize, &Row)| {
+        let words = row.columns.words();
+        (r, r % FORMS.len(), words[r / FORMS.len() % words.len()])
+    };
+    let cells: Vec<Place> = rows.iter().enumerate().map(cell).collect();
+    let outcomes = outcomes(&rows, cells.clone());
+    let page = kept().0;
+    for ((r, f, word), outcome) in cells.into_iter().zip(outcomes) {
+        let (row, form) = (&rows[r], FORMS[f]);
+        assert!(!tell(row, form, word, &outcome), "must not be");
+        let (_, table) = page.split_once(&row.columns.title(form)).expect("its table");
+        let head = format!("| {} | {} |", row.scene, row.what);
+        let line = table.lines().find_map(|line| line.strip_prefix(&*head)).unwrap_or_else(|| panic!("{head}: {ANEW}"));
+        let column = row.columns.words().iter().position(|other| *other == word).expect("a column");
+        let kept = line.split('|').nth(column).expect("a cell").trim();
+        assert_eq!(outcome.word(), kept, "{head} {form} {word}: {ANEW}");
+    }
 }

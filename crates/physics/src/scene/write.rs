@@ -247,9 +247,11 @@ mod tests {
 
     #[test]
     fn every_parameter_is_written_so_that_it_reads_back_to_the_same_scene() {
-        for name in BUILT_IN {
+        for (turn, name) in BUILT_IN.into_iter().enumerate() {
             let plain = scene(name, &[]);
-            for parameter in plain.parameters() {
+            // Those that every scene has take turns.
+            let rows = plain.parameters().into_iter().enumerate();
+            for (_, parameter) in rows.filter(|(place, row)| row.scope == Scope::Own || (place + turn) % 3 == 0) {
                 let other = match parameter.kind {
                     // Inside every range, and not a round number.
                     Kind::Number { slider, .. } => Value::Number(slider.0 + 0.377_123_456_789 * (slider.1 - slider.0)),

@@ -58,6 +58,8 @@ fn every_law(a: f64, d: f64, s: f64) -> Vec<String> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
     #[test]
     fn derivatives_are_those_of_the_value(
         a in 0.01..1.0_f64,

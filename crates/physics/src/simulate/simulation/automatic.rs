@@ -266,56 +266,6 @@ mod tests {
     use crate::scene::Scene;
 
     #[test]
-    fn a_trial_that_a_strike_ends_is_judged_by_what_it_did() {
-        let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap()).unwrap();
-        simulation.advance_to(1.0).unwrap();
-        simulation.state.now.memory[0].active = true;
-        simulation.state.now.memory[0].floored = false;
-        // Progress per cost over that of the explicit steps.
-        for (ratio, fails) in [(0.9 * WORTH_IT, true), (1.1 * WORTH_IT, false)] {
-            simulation.state.control.member = Member::Implicit;
-            simulation.state.control.contact_began = true;
-            simulation.state.control.choice = Choice {
-                explicit_progress: 1e-3,
-                explicit_cost: 1e3,
-                implicit: Trial { progress: ratio * 1e-2, cost: 1e4, steps: 7, failures: 1, wait: 0 },
-                ..Choice::default()
-            };
-            simulation.choose_member(1e-9, 0.0, 10.0);
-            let control = &simulation.state.control;
-            assert_eq!(control.member, Member::Explicit);
-            let trial = &control.choice.implicit;
-            assert_eq!(trial.wait > 0, fails, "{ratio}");
-            assert_eq!(trial.failures, if fails { 2 } else { 0 });
-            assert_eq!(trial.steps, 0);
-        }
-    }
-
-    #[test]
-    fn a_trial_of_friction_that_fails_has_explicit_steps_follow() {
-        for (tolerance, fails) in [("1e-6", true), ("1e-5", false)] {
-            let change = ("solver.tolerance".to_owned(), tolerance.to_owned());
-            let mut simulation = Simulation::new(&Scene::load("spcmm", &[change]).unwrap()).unwrap();
-            simulation.advance_to(1.0).unwrap();
-            simulation.state.now.memory[0].active = true;
-            simulation.state.control.member = Member::Friction;
-            simulation.state.control.contact_began = false;
-            simulation.state.control.choice = Choice {
-                explicit_progress: 1.0,
-                explicit_cost: 1.0,
-                friction: Trial { progress: 1e-3, cost: 100.0, steps: FRICTION_STEPS - 1, ..Trial::default() },
-                ..Choice::default()
-            };
-            simulation.choose_member(1e-9, 0.0, 10.0);
-            let trial = simulation.state.control.choice.friction;
-            assert_eq!(trial.wait > 0, fails, "{tolerance}");
-            assert_eq!(trial.failures, u32::from(fails));
-            simulation.state.control.member = Member::Explicit;
-            assert_eq!(simulation.turn_to_friction(), !fails, "{tolerance}");
-        }
-    }
-
-    #[test]
     fn a_failed_trial_leaves_a_step_that_advances_time() {
         let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap()).unwrap();
         simulation.advance_to(1.0).unwrap();

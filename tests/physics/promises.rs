@@ -1,0 +1,270 @@
+//! What every run promises, whatever the scene, the method and the formulation, gone through once: the same calls give the same
+//! bits, whoever looks, keeps books or maps wear changes none, no frame shows what none may, and a state that is kept in memory or
+//! in a file goes on as if nothing had happened.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::common::invariants::{fault, finite};
+use crate::common::matrix::{FORMULATIONS, Way, every_way, for_every};
+use crate::common::{FOUR_WAYS, MACHINES, METHODS, SCENES, frame_now, parse, run_until, scene};
+use crate::planar_loops::{Extras, GRASHOF, PLAIN};
+use crate::{loop_joints, two_degrees};
+use jointplay::scene::{Quat, Scene, built_in_text};
+use jointplay::simulate::{Frame, Ledger, Simulation};
+
+/// Steps before the instant at which a run without contacts is kept, and after it.
+const BEFORE: u32 = 10;
+const AFTER: u32 = 120;
+/// Steps within which every scene with play has had two impacts.
+const SOON: u32 = 20_000;
+
+/// Steps into the second contact of any joint, or some steps where there are none; their number.
+fn into_contact(simulation: &mut Simulation) -> u32 {
+    if simulation.mechanism().summary().contacts == 0 {
+        (0..BEFORE).for_each(|_| simulation.step().unwrap());
+        return BEFORE;
+    }
+    let mut steps = 0;
+    while simulation.statistics().impacts.iter().sum::<u64>() < 2 {
+        simulation.step().unwrap();
+        steps += 1;
+        assert!(steps < SOON, "no impact");
+    }
+    simulation.step().unwrap();
+    let joints = 0..simulation.scene().ball_joints.len();
+    assert!(joints.into_iter().any(|j| simulation.contact_memory(j).active), "nothing touches");
+    steps + 1
+}
+
+/// What a user does there: one change acts at once, a clearance takes its time, and another formulation waits for a reset.
+fn change(simulation: &mut Simulation) {
+    simulation.set("contact.friction", "0.1").unwrap();
+    let scene = simulation.scene().clone();
+    let loose = scene.ball_joints.iter().find(|joint| joint.contact.clearance > 0.0);
+    if let Some(joint) = loose {
+        let key = format!("joint.{}.clearance", joint.name);
+        let less = format!("{:e} m", 0.9 * joint.contact.clearance);
+        simulation.set(&key, &less).unwrap();
+    }
+    let other = FORMULATIONS.into_iter().find(|word| *word != scene.formulation.word()).expect("two");
+    simulation.set("formulation", other).unwrap();
+}
+
+/// Everything at the latest state, and the frame in the middle of the last step, as text: every bit that is no NaN's.
+fn look(simulation: &mut Simulation) -> (u64, String) {
+    let mut middle = Frame::default();
+    let time = 0.5 * (simulation.step_start() + simulation.time());
+    simulation.sample(time, &mut middle);
+    let end = frame_now(simulation);
+    let text = format!("{middle:?} {end:?} {:?} {:?}", simulation.statistics(), simulation.ledger());
+    (simulation.state_hash(), text)
+}
+
+fn go_on(simulation: &mut Simulation) -> (u64, String) {
+    (0..AFTER).for_each(|_| simulation.step().unwrap());
+    look(simulation)
+}
+
+/// Steps once, looks into the step and at its end, and takes all that can be taken.
+fn watched_step(simulation: &mut Simulation, way: Way) {
+    let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
+    simulation.step().unwrap();
+    let (from, to) = (simulation.step_start(), simulation.time());
+    for part in [0.0, 0.3, 1.0] {
+        simulation.sample(from + part * (to - from), &mut frame);
+        assert!(finite(&frame), "t = {}", frame.time);
+    }
+    assert_eq!(fault(&frame, simulation.running_scene(), way.formulation), None);
+    simulation.take_peaks(&mut Vec::new());
+    simulation.take_impacts(&mut Vec::new());
+}
+
+/// Puts a run of `scene` through all of it; the hash at its end.
+fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
+    let mut plain = Simulation::new(scene).unwrap();
+    let start = plain.state_hash();
+    let steps = into_contact(&mut plain);
+    let here = look(&mut plain);
+    let saved = serde_json::to_string(&plain.saved()).unwrap();
+    change(&mut plain);
+    let (mut peaks, mut again) = (Vec::new(), Vec::new());
+    let snapshot = plain.snapshot();
+    plain.take_peaks(&mut peaks);
+    let first = go_on(&mut plain);
+
+    // Watched all the way, with a map of its wear, after a reset in mid run.
+    let mut watched = Simulation::new(scene).unwrap();
+    (0..BEFORE).for_each(|_| watched_step(&mut watched, way));
+    watched.reset().unwrap();
+    assert_eq!((watched.time(), watched.state_hash()), (0.0, start));
+    assert_eq!(watched.ledger(), Some(&Ledger::default()));
+    watched.keep_wear();
+    (0..steps).for_each(|_| watched_step(&mut watched, way));
+    assert!(look(&mut watched) == here, "watched");
+    change(&mut watched);
+    let kept = watched.snapshot();
+    (0..AFTER).for_each(|_| watched_step(&mut watched, way));
+    assert!(look(&mut watched) == first, "watched");
+    watched.commit_wear();
+    let wear = watched.wear().unwrap().clone();
+    watched.restore(&kept);
+    assert!(go_on(&mut watched) == first, "watched, again");
+    watched.commit_wear();
+    assert!(*watched.wear().unwrap() == wear, "the same wear");
+
+    // Without books.
+    let mut silent = scene.clone();
+    silent.set("solver.energy_ledger", "off").unwrap();
+    let mut silent = Simulation::new(&silent).unwrap();
+    (0..steps).for_each(|_| silent.step().unwrap());
+    change(&mut silent);
+    (0..AFTER).for_each(|_| silent.step().unwrap());
+    assert_eq!((silent.state_hash(), silent.ledger()), (first.0, None), "without a ledger");
+    assert_eq!((silent.state(), silent.statistics()), (plain.state(), plain.statistics()));
+
+    // Restored into itself, into one of other settings that never saw the run, and as a copy.
+    let stranger = Simulation::new(&crate::common::scene("spcmm", &[])).unwrap();
+    let now = {
+        plain.restore(&snapshot);
+        look(&mut plain)
+    };
+    for mut other in [plain, stranger, Simulation::of(&snapshot)] {
+        other.restore(&snapshot);
+        other.take_peaks(&mut again);
+        assert_eq!(again, peaks);
+        assert!(look(&mut other) == now, "restored");
+        assert!(go_on(&mut other) == first, "restored");
+    }
+    // From a file.
+    let mut later = Simulation::new(scene).unwrap();
+    later.go_on_from(&serde_json::from_str(&saved).unwrap()).unwrap();
+    assert_eq!(later.state_hash(), here.0, "read again");
+    change(&mut later);
+    assert!(go_on(&mut later) == first, "read again");
+    first.0
+}
+
+/// A scene in a way, with its name.
+fn case(name: &str, scene: &Scene, way: Way) -> u64 {
+    println!("{name}, {way}");
+    keeps_its_promises(scene, way)
+}
+
+#[test]
+fn every_built_in_scene_keeps_them_by_every_method_in_both_formulations() {
+    for name in SCENES {
+        let mut hashes = BTreeSet::new();
+        for way in every_way() {
+            hashes.insert(case(name, &scene(name, &way.changes()), way));
+        }
+        // The hash sees the difference between methods; the automatic ones may be explicit all the way.
+        assert!(hashes.len() >= METHODS.len(), "{name}: {}", hashes.len());
+    }
+}
+
+#[test]
+fn scenes_without_play_keep_them_too() {
+    for_every(SCENES, |name, way| {
+        let [method, formulation] = way.changes();
+        let mut changes = vec![method, formulation, ("contact.clearance", "0")];
+        if name == "chain" {
+            changes.push(("chain.links", "3"));
+        }
+        case(name, &scene(name, &changes), way);
+    });
+}
+
+/// The ways that between them have every kind of Jacobian and error control.
+fn four_ways() -> [Way; 4] {
+    FOUR_WAYS.map(|(method, formulation)| Way { method, formulation })
+}
+
+#[test]
+fn machines_and_loops_keep_them_too() {
+    for (name, way) in MACHINES.into_iter().zip(four_ways().into_iter().cycle()) {
+        case(name, &scene(name, &way.changes()), way);
+    }
+    for way in every_way() {
+        case("train", &parse(&two_degrees::train(-two_degrees::G), &way.changes()), way);
+        case("four-bar with a bob", &parse(&loop_joints::four_bar_with_a_bob(), &way.changes()), way);
+    }
+    let ideal = Extras { start: "ideal", ..PLAIN };
+    for with in [ideal, Extras { driven: &[0], ..ideal }, Extras { clearance: "0.3 mm", ..ideal }] {
+        for way in four_ways() {
+            case("planar four-bar", &GRASHOF.scene(Quat::identity(), with, &way.changes()), way);
+        }
+    }
+}
+
+/// Scenes that between them have every key of the format.
+#[test]
+fn scenes_of_the_corpus_keep_them_too() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    // A rod of 1e-300 kg comes to no second impact.
+    let good = |path: &&PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy();
+        name.starts_with("good-") && name != "good-tiny-and-huge.toml"
+    };
+    let good = paths.iter().filter(good);
+    for (path, way) in good.zip(four_ways().into_iter().cycle()) {
+        let text = std::fs::read_to_string(path).unwrap();
+        case(&path.display().to_string(), &parse(&text, &way.changes()), way);
+    }
+}
+
+/// A slider-crank with an ideal joint and a pendulum whose loose balls start off the centres of their sockets.
+fn eccentric() -> [(&'static str, String); 2] {
+    let text = |name: &str, from: &str, to: &str| {
+        let text = built_in_text(name).unwrap();
+        assert!(text.contains(from));
+        text.replace(from, to)
+    };
+    let slider = "position = \"200 mm\", velocity";
+    [
+        ("C", text("slider-crank", slider, "position = \"200.2 mm\", velocity")),
+        ("S1", text("pendulum", "position = [0, 0, 0]", "position = \"0.2 0 0 mm\"")),
+    ]
+}
+
+#[test]
+fn a_state_is_restored_where_no_start_would_be_accepted() {
+    for (joint, text) in eccentric() {
+        for way in four_ways() {
+            let scene = parse(&text, &way.changes());
+            let mut simulation = Simulation::new(&scene).unwrap();
+            simulation.advance_to(1e-3).unwrap();
+            simulation.set(&format!("joint.{joint}.clearance"), "0.05 mm").unwrap();
+            assert!(Simulation::new(simulation.running_scene()).is_err(), "{joint}, {way}");
+            simulation.advance_to(4e-3).unwrap();
+            let snapshot = simulation.snapshot();
+            let first = go_on(&mut simulation);
+            let mut other = Simulation::new(&scene).unwrap();
+            for target in [&mut simulation, &mut other] {
+                target.restore(&snapshot);
+                assert!(go_on(target) == first, "{joint}, {way}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_waits_in_a_snapshot_takes_effect_at_the_reset_of_a_copy() {
+    let mut simulation = crate::common::simulation("spcmm", &[]);
+    run_until(&mut simulation, 0.05);
+    simulation.set("contact.clearance", "0.1 mm").unwrap();
+    simulation.set("spcmm.frequency", "1 Hz").unwrap();
+    simulation.set("contact.friction", "0.3").unwrap();
+    run_until(&mut simulation, 0.06);
+    let clearance = frame_now(&mut simulation).joints[0].clearance;
+    assert!(clearance > 0.1e-3 && clearance < 0.3e-3, "{clearance}");
+    let mut fresh = Simulation::new(&scene("spcmm", &[])).unwrap();
+    fresh.restore(&simulation.snapshot());
+    assert_eq!(fresh.running_scene().contact.friction, 0.3);
+    fresh.reset().unwrap();
+    assert_eq!(fresh.scene().spcmm.unwrap().frequency, 1.0);
+    assert_eq!(fresh.running_scene().spcmm.unwrap().frequency, 1.0);
+    assert_eq!(frame_now(&mut fresh).joints[0].clearance, 0.1e-3);
+}
