@@ -5,6 +5,7 @@
 mod common;
 
 mod bench_window;
+mod embed;
 mod film;
 mod frames;
 mod hands;

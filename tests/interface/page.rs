@@ -144,7 +144,7 @@ fn hash(harness: &Harness<'_, App>) -> u64 {
 }
 
 /// Runs until the link's state is reached, or not.
-fn verdict(harness: &mut Harness<'_, App>) -> Verdict {
+pub fn verdict(harness: &mut Harness<'_, App>) -> Verdict {
     for _ in 0..600 {
         if let Some(verdict) = harness.state().verdict() {
             return verdict.clone();

@@ -182,3 +182,24 @@ fn a_menu_that_is_cut_shows_that_it_scrolls() {
         assert_eq!(seen > 60, cut, "{size:?}: {seen} rows");
     }
 }
+
+#[test]
+fn a_menu_that_is_longer_than_the_screen_scrolls_under_a_finger() {
+    let (mut harness, _) = window("spcmm", LYING);
+    harness.run();
+    click(&mut harness, "Menu");
+    harness.run();
+    let about = rect(&harness, Role::Button, "About");
+    assert!(about.top() > LYING[1], "{about:?}");
+    let at = rect(&harness, Role::Button, "Picture…").center();
+    for _ in 0..12 {
+        fingers(&mut harness, &[&path(at, vec2(0.0, -120.0))]);
+        harness.run();
+    }
+    let about = rect(&harness, Role::Button, "About");
+    assert!(about.bottom() <= LYING[1], "{about:?}");
+    // And a tap hits what it shows.
+    fingers(&mut harness, &[&[about.center()]]);
+    harness.run();
+    assert!(label(&harness, "State hash"));
+}
