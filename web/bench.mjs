@@ -8,6 +8,8 @@ import path from 'node:path';
 
 const [folder, native] = process.argv.slice(2).map((file) => path.resolve(file));
 process.env.PAGE = folder;
+// The page as a user has it.
+process.env.JS_FLAGS = '';
 const { open, quit } = await import('./tests/harness.mjs');
 const { load } = await import('./tests/wasm.mjs');
 
@@ -77,7 +79,7 @@ good &&= mean >= LEAST_RATIO;
 
 console.log('first picture after the start of the load, software rendering, median of', REPEATS);
 const firstPicture = async (options) => {
-    const lab = await open('', { ...options, ownTime: true });
+    const lab = await open('', { ...options, picture: true, ownTime: true });
     const at = await lab.page.evaluate(() => performance.getEntriesByName('first picture')[0].startTime / 1000);
     const renderer = /^gl /.test((await lab.state()).renderer) ? 'WebGL2' : 'WebGPU';
     await lab.close();
@@ -101,7 +103,7 @@ for (const backend of [undefined, 'webgpu']) {
 console.log('frames a second while the default scene runs, software rendering, before and during a sweep:');
 for (const backend of ['webgl', 'webgpu']) {
     for (const size of [{ width: 480, height: 360 }, { width: 800, height: 560 }]) {
-        const lab = await open('', { backend, size, ownTime: true });
+        const lab = await open('', { backend, size, picture: true, ownTime: true });
         await lab.key('b');
         const pace = async () => {
             await new Promise((done) => setTimeout(done, SETTLING));

@@ -6,22 +6,19 @@ import path from 'node:path';
 import { after, test } from 'node:test';
 import { deflateRawSync } from 'node:zlib';
 
-import { colours, open, quit, ROOT } from './harness.mjs';
+import { blank, colours, open, quit, ROOT, serve } from './harness.mjs';
 
 after(quit);
 
-const backend = 'webgl';
-const SLIDERS = ['Clearance', 'Friction coefficient', 'Restitution'];
+/** Frames on one page. */
+const COUNT = 8;
 
-/** A page around frames: `body` with `{page}` for the address of the laboratory. Opened in a context of its own. */
-async function course(body, size = { width: 700, height: 500 }) {
-    // Its context, server and browser are what is wanted of it.
-    const lab = await open('scene=pendulum&play=0', { backend, size, ownTime: true });
-    const address = await lab.page.evaluate(() => location.origin + location.pathname);
+/** Puts a page around frames in place of what `lab` shows: `body` with `{page}` for the address of the laboratory. */
+async function course(lab, body) {
+    const address = await serve();
     const html = `<!doctype html><title>Course</title><style>body { margin: 0 } p { height: 120px } iframe { border: 0; display: block }</style>${body.replaceAll('{page}', address)}`;
     await lab.page.route('**/course.html', (route) => route.fulfill({ contentType: 'text/html', body: html }));
     await lab.page.goto(`${address}course.html`);
-    return lab;
 }
 
 /** What a frame says of its laboratory; undefined while it is not there. */
@@ -34,51 +31,18 @@ async function running(lab, count = 1) {
     return frames;
 }
 
-test('embed shows picture and play button, and the panels that it names; links keep it', async () => {
-    const lab = await open('embed&scene=pendulum&play=0', { backend });
-    await lab.find('Button', 'Play');
-    const names = (await lab.widgets()).map(({ label }) => label);
-    for (const name of ['Save', 'Open…', 'Bench', ...SLIDERS]) assert.ok(!names.includes(name), `${name} is there`);
-    assert.match(await lab.page.evaluate(() => globalThis.jointplay.page.link()), /(^|&)embed=(&|$)/);
-    await lab.close();
-
-    const more = await open('embed=controls,timeline&scene=pendulum&play=0', { backend });
-    for (const name of SLIDERS) await more.find('Slider', name);
-    await more.find('Slider', 'Timeline, s');
-    assert.ok(!(await more.has('Button', 'Save')));
-    assert.match(await more.page.evaluate(() => globalThis.jointplay.page.link()), /(^|&)embed=controls%2Ctimeline(&|$)/);
-    await more.slide('Clearance', 0.9);
-    assert.ok((await more.state()).changed_parameters['contact.clearance']);
-    await more.close();
-
-    const wrong = await open('embed=sliders', { backend });
-    await wrong.says('no panel `sliders`; allowed, separated by commas: controls, timeline, plots, bench');
-    await wrong.close();
-});
-
-test('the menu gives the line for another page', async () => {
-    const context = { permissions: ['clipboard-read', 'clipboard-write'] };
-    const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend, context });
+test('the line of the menu shows the same state in another page, which keeps focus, wheel and Tab', async () => {
+    const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend: 'webgl', ownTime: true });
     await lab.runTo(0.01);
     const { state_hash: hash } = await lab.state();
     await lab.click('Button', 'Save');
     await lab.click('Button', 'Embed');
     const line = await lab.until(() => lab.page.evaluate(() => navigator.clipboard.readText()), 'nothing on the clipboard');
-    await lab.close();
-    const around = await course(line);
-    const [frame] = await running(around);
-    const shown = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
-    await around.until(async () => (await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()).state_hash)) === hash, 'another state');
-    assert.equal(shown.scene, 'pendulum');
-    assert.equal(await frame.evaluate(() => document.querySelector('canvas').hidden), false);
-    await around.close();
-});
-
-test('a frame takes neither focus nor wheel nor Tab from the page around it', async () => {
-    const lab = await course(`<p><a id="before" href="#">before</a></p>
-        <iframe src="{page}?embed=controls&scene=pendulum&play=0&renderer=webgl" width="640" height="360"></iframe>
+    await course(lab, `<p><a id="before" href="#">before</a></p>${line.replace(/width="\d+" height="\d+"/, 'width="640" height="360"')}
         <p><a id="after" href="#">after</a></p><p style="height: 2000px">more</p>`);
     const [frame] = await running(lab);
+    await lab.until(async () => (await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()).state_hash)) === hash, 'another state');
+    assert.equal(await frame.evaluate(() => document.querySelector('canvas').hidden), false);
     const { page } = lab;
     const around = () => page.evaluate(() => [document.activeElement.tagName, document.activeElement.id, scrollY]);
     assert.deepEqual(await around(), ['BODY', '', 0]);
@@ -118,7 +82,8 @@ test('a frame takes neither focus nor wheel nor Tab from the page around it', as
 });
 
 test('the page around opens, sets, plays and pauses by messages, and hears what happens', async () => {
-    const lab = await course('<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="640" height="360"></iframe>');
+    const lab = await blank({ size: { width: 340, height: 240 }, ownTime: true });
+    await course(lab, '<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="320" height="200"></iframe>');
     await lab.page.evaluate(() => {
         globalThis.heard = [];
         addEventListener('message', ({ data }) => data.jointplay === 1 && heard.push(data));
@@ -172,9 +137,10 @@ test('the page around opens, sets, plays and pauses by messages, and hears what 
 
 test('of many frames those out of sight hold no graphics, and go on where they were when they are seen again', async () => {
     const frame = '<iframe src="{page}?embed&scene=pendulum&t=10ms&renderer=webgl" width="300" height="200"></iframe>';
-    const lab = await course(frame.repeat(18), { width: 320, height: 300 });
+    const lab = await blank({ size: { width: 320, height: 300 }, ownTime: true });
+    await course(lab, frame.repeat(COUNT));
     const frames = await running(lab, 2);
-    assert.equal(frames.length, 18);
+    assert.equal(frames.length, COUNT);
     const holding = () => Promise.all(frames.map((frame) => frame.evaluate(() => {
         // One that was never in sight has not asked for any, and must not get one by being asked here.
         if (!globalThis.jointplay?.starts) return false;
@@ -182,18 +148,19 @@ test('of many frames those out of sight hold no graphics, and go on where they w
     })));
     const count = async () => (await holding()).filter(Boolean).length;
     await lab.until(async () => (await count()) === 2, 'not the two in sight alone');
-    assert.ok(colours(await lab.pixels()) > 200, 'they show nothing');
     const state = () => frames[0].evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
     await lab.until(async () => (await state()).shown_s === 0.01, 'the instant is not reached');
     const before = await state();
     await lab.page.evaluate(() => scrollTo(0, document.body.scrollHeight));
     await lab.until(async () => {
         const now = await holding();
-        return now[17] && !now[0] && !now[1] && now.filter(Boolean).length <= 3;
+        return now[COUNT - 1] && !now[0] && !now[1] && now.filter(Boolean).length <= 3;
     }, 'those out of sight keep their graphics');
-    await lab.until(() => ready(frames[17]), 'the last does not draw');
+    await lab.until(() => ready(frames[COUNT - 1]), 'the last does not draw');
+    for (const frame of [lab.page, frames[0]]) await frame.evaluate(() => (globalThis.drawsNothing = false));
     await lab.page.evaluate(() => scrollTo(0, 0));
     await lab.until(() => ready(frames[0]), 'the first does not come back');
+    await lab.until(async () => colours(await lab.pixels({ x: 0, y: 0, width: 300, height: 200 })) > 200, 'it shows nothing');
     assert.ok((await holding())[0]);
     const { shown_s: shown, state_hash: hash } = await state();
     assert.deepEqual([shown, hash], [before.shown_s, before.state_hash]);

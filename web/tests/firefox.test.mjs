@@ -1,13 +1,21 @@
 // The page in Firefox: what it does there as in Chromium.
 
 import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
 import { after, test } from 'node:test';
 
-import { colours, open, quit } from './harness.mjs';
+import { PNG } from 'pngjs';
+
+import { emptyFirefox, quitFirefox } from './firefox.mjs';
+import { blank, colours, difference, native, open, quit } from './harness.mjs';
+import { play } from './play.mjs';
 
 after(quit);
+after(quitFirefox);
 
-const firefox = true;
+const empty = emptyFirefox;
 
 test('Firefox: a link from Chromium reproduces its state; a slider changes the run, and the link back agrees', async () => {
     const there = await open('scene=spcmm&cf=0.2&play=0', { backend: 'webgl' });
@@ -16,7 +24,7 @@ test('Firefox: a link from Chromium reproduces its state; a slider changes the r
     const link = await there.page.evaluate(() => globalThis.jointplay.page.link());
     await there.close();
 
-    const lab = await open('', { firefox, fragment: link });
+    const lab = await open('', { empty, picture: true, fragment: link });
     assert.equal(await lab.page.evaluate(() => globalThis.jointplay.backend), 'webgl');
     await lab.says(`State reproduced: hash ${hash} agrees`);
     assert.ok(colours(await lab.pixels()) > 200, 'the picture is empty');
@@ -39,7 +47,7 @@ test('Firefox: a link from Chromium reproduces its state; a slider changes the r
 });
 
 test('Firefox: lost graphics come back, and the simulation goes on as it was', async () => {
-    const lab = await open('c=0.5mm&play=0', { firefox });
+    const lab = await open('c=0.5mm&play=0', { empty, picture: true });
     await lab.runTo(0.00785);
     const before = await lab.state();
     await lab.page.evaluate(() => {
@@ -53,4 +61,31 @@ test('Firefox: lost graphics come back, and the simulation goes on as it was', a
     await lab.key(' ');
     await lab.until(async () => (await lab.state()).time_s > before.time_s, 'it does not go on');
     await lab.close();
+});
+
+test('Chromium and Firefox play a film of the program, and its frames are those that render draws', async () => {
+    const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-film-'));
+    try {
+        const line = ['render', 'spcmm', '--duration', '12ms', '--fps', '10', '--slow', '100', '--size', '640x360', '--quiet'];
+        await native(...line, '--out', path.join(folder, 'frames'));
+        await native(...line, '--film', path.join(folder, 'film.mp4'));
+        const numbers = [0, 5, 12];
+        const bytes = fs.readFileSync(path.join(folder, 'film.mp4'));
+        for (const [where, options] of Object.entries({ Chromium: {}, Firefox: { empty } })) {
+            const lab = await blank({ ...options, ownTime: true });
+            // In the middle of the time that each is shown.
+            const film = await play(lab, bytes, numbers.map((k) => (k + 0.5) / 10));
+            await lab.close();
+            assert.deepEqual([film.width, film.height], [640, 360]);
+            assert.ok(Math.abs(film.duration - 1.3) < 1e-3, `${where}: ${film.duration} s`);
+            for (const [at, k] of numbers.entries()) {
+                const name = `frame_${String(k).padStart(5, '0')}.png`;
+                const frame = PNG.sync.read(fs.readFileSync(path.join(folder, 'frames', name)));
+                const share = difference(film.pictures[at], frame, `film_${where}_${k}`, 0.01);
+                assert.ok(share <= 0.01, `${where}, frame ${k}: ${share}`);
+            }
+        }
+    } finally {
+        fs.rmSync(folder, { recursive: true });
+    }
 });

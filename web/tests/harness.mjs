@@ -8,7 +8,8 @@
 // Time stands still on an open page: it passes by the frames that a gesture or a wait of the test asks for, 50 ms each
 // (inside.mjs). Nothing passes by that a slow machine could miss.
 //
-// `PAGE`: folder of the page; `NATIVE`: the native program; `CHROMIUM`, `FIREFOX`: the browsers. ./test sets what it builds.
+// `PAGE`: folder of the page; `NATIVE`: the native program; `TOOL`: what serves the page; `CHROMIUM`: the browser. Nothing else is
+// needed; Firefox is in firefox.mjs.
 
 import assert from 'node:assert/strict';
 import { spawn, execFile } from 'node:child_process';
@@ -21,14 +22,13 @@ import { promisify } from 'node:util';
 import pixelmatch from 'pixelmatch';
 import { chromium } from 'playwright-core';
 import { PNG } from 'pngjs';
-import puppeteer from 'puppeteer-core';
 
-import { driveTime } from './inside.mjs';
+import { driveTime, drawNothing } from './inside.mjs';
 
 export const ROOT = fileURLToPath(new URL('../../', import.meta.url));
 export const PAGE = path.resolve(process.env.PAGE ?? path.join(ROOT, 'target/page'));
 const NATIVE = process.env.NATIVE ?? path.join(ROOT, 'target/debug/jointplay');
-const TOOL = path.join(ROOT, 'target/tools/debug/jointplay-web');
+const TOOL = process.env.TOOL ?? path.join(ROOT, 'target/tools/debug/jointplay-web');
 /** What a failed test leaves behind. */
 const FAILED = path.join(ROOT, 'web/failed');
 
@@ -49,22 +49,24 @@ const FLAGS = [
     '--disable-sync',
     `--host-resolver-rules=MAP ${ELSEWHERE} 127.0.0.1`,
     '--no-proxy-server',
+    // Compiling well what runs for a moment only takes longer than it saves.
+    `--js-flags=${process.env.JS_FLAGS ?? '--wasm-tiering-budget=500000000'}`,
 ];
 
-/** Small, because a software adapter draws some hundred thousand pixels a second. */
-export const SIZE = { width: 800, height: 560 };
+/** The least that has its panels side by side, because a software adapter draws some hundred thousand pixels a second. */
+export const SIZE = { width: 760, height: 480 };
 
 /**
  * What has not come after so long, ms, and after so many looks will never come. Of a machine that is busy with a dozen other
  * things the looks are what counts.
  */
-const PATIENCE = 300_000;
+export const PATIENCE = 300_000;
 const LOOKS = 100;
 
 let server;
 let browser;
-/** Firefox, and the screen it is on. */
-let fox;
+/** The page that opens the others. */
+let opener;
 /** Pages that a failed test left open: they would take the time of the next. */
 const opened = new Set();
 
@@ -86,7 +88,7 @@ export async function serveFolder(folder, ...rest) {
 }
 
 /** Serves the page below a sub-path; the address of its folder. */
-async function serve() {
+export async function serve() {
     if (!server) {
         const { address, end } = await serveFolder(path.dirname(PAGE));
         server = { end, address: `${address}${path.basename(PAGE)}/` };
@@ -100,71 +102,60 @@ async function launch() {
     return browser;
 }
 
-/** Firefox has WebGL2 on a screen alone, and Playwright drives none but its own build of it. */
-async function launchFirefox() {
-    if (fox) return fox.browser;
-    const screen = spawn('Xvfb', ['-displayfd', '1', '-screen', '0', '1280x1024x24'], { stdio: ['ignore', 'pipe', 'ignore'] });
-    const display = await new Promise((found, failed) => {
-        screen.once('error', failed);
-        screen.once('exit', (code) => failed(new Error(`Xvfb ended with ${code}`)));
-        screen.stdout.once('data', (text) => found(`:${String(text).trim()}`));
-    });
-    const started = await puppeteer.launch({
-        browser: 'firefox',
-        executablePath: process.env.FIREFOX ?? '/usr/bin/firefox-esr',
-        headless: false,
-        env: { ...process.env, DISPLAY: display, LIBGL_ALWAYS_SOFTWARE: '1', MOZ_CRASHREPORTER_DISABLE: '1' },
-        extraPrefsFirefox: { 'webgl.force-enabled': true },
-        protocolTimeout: 2 * PATIENCE,
-    });
-    fox = { browser: started, screen };
-    return started;
-}
-
-/** Ends browsers and server; after the last test of all files that run together. */
+/** Ends browser and server; after the last test of all files that run together. */
 export async function quit() {
     await browser?.close();
-    await fox?.browser.close();
-    fox?.screen.removeAllListeners('exit');
-    fox?.screen.kill();
     await server?.end();
-    browser = fox = server = undefined;
+    browser = opener = server = undefined;
 }
 
-/** An empty page of a browser of its own kind: its context and itself, and how a script is made to run in it before all others. */
-async function emptyPage(firefox, size, options) {
-    if (!firefox) {
-        const context = await (await launch()).newContext({ viewport: size, serviceWorkers: 'block', ...options });
-        const page = await context.newPage();
-        return { context, page, first: (script) => page.addInitScript(script) };
+/**
+ * An empty page of Chromium: its context and itself, how a script is made to run in it before all others, how it ends. Pages that
+ * want no context of their own are opened by one that stays: so one process has them all, and compiles the program once.
+ */
+async function emptyPage(size, options) {
+    const started = await launch();
+    let [context, page] = [opener?.context()];
+    if (options) {
+        context = await started.newContext({ viewport: size, serviceWorkers: 'block', ...options });
+        page = await context.newPage();
+    } else {
+        if (!opener) {
+            context = await started.newContext({ serviceWorkers: 'block', permissions: ['clipboard-read', 'clipboard-write'] });
+            opener = await context.newPage();
+            await opener.goto(`${await serve()}icon.svg`);
+        }
+        [page] = await Promise.all([opener.waitForEvent('popup'), opener.evaluate(() => void globalThis.open('about:blank'))]);
+        await page.setViewportSize(size);
     }
-    const context = await (await launchFirefox()).createBrowserContext();
-    const page = await context.newPage();
-    await page.setViewport(size);
-    return { context, page, first: (script) => page.evaluateOnNewDocument(script) };
+    return { context, page, first: (script) => page.addInitScript(script), end: () => (options ? context : page).close() };
+}
+
+/** What opens nothing yet: see `open`. */
+export async function blank({ size = SIZE, before = [], context, ownTime = false, picture = false, empty = emptyPage } = {}) {
+    for (const lab of opened) await lab.close({ errors: true });
+    const { first, ...own } = await empty(size, context);
+    const lab = new Lab(own);
+    opened.add(lab);
+    // Of what Playwright waits for by itself.
+    lab.page.setDefaultTimeout(2 * PATIENCE);
+    for (const script of [ownTime ? [] : driveTime, picture ? [] : drawNothing, before].flat()) await first(script);
+    return lab;
 }
 
 /**
  * Opens the page. `query`: what follows `?`. Options: `backend` 'webgl' or 'webgpu' (appended to the query), `size`
  * {width, height}, `fragment` (what follows `#`), `before` (functions that run in the page before its scripts),
  * `context` (options of a Playwright context, e.g. {hasTouch: true}), `expectTrouble` (do not wait for a picture),
- * `ownTime` (time passes by the clock on the wall, as for a user), `firefox` (in place of Chromium; `page` is Puppeteer's then),
- * `at` (the address of a page that the test serves itself).
+ * `picture` (it is drawn, and can be looked at), `ownTime` (time passes by the clock on the wall, as for a user), `empty` (an empty
+ * page of another browser, firefox.mjs), `at` (the address of a page that the test serves itself).
  */
 export async function open(query = '', options = {}) {
-    const { backend, size = SIZE, fragment = '', before = [], context = {}, expectTrouble = false, ownTime = false, firefox = false } = options;
+    const { backend, fragment = '', expectTrouble = false } = options;
     const address = options.at ?? (await serve());
-    for (const lab of opened) await lab.close({ errors: true });
-    const { context: own, page, first } = await emptyPage(firefox, size, context);
-    const lab = new Lab(own, page);
-    opened.add(lab);
-    // Of what Playwright waits for by itself.
-    page.setDefaultTimeout(2 * PATIENCE);
-    for (const script of ownTime ? [before] : [driveTime, before]) {
-        for (const part of [script].flat()) await first(part);
-    }
+    const lab = await blank(options);
     const parts = [query, backend ? `renderer=${backend}` : ''].filter(Boolean).join('&');
-    await page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
+    await lab.page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
     await lab.started();
     if (!expectTrouble) {
         const trouble = await lab.ask(() => globalThis.jointplay.trouble);
@@ -173,15 +164,11 @@ export async function open(query = '', options = {}) {
     return lab;
 }
 
-/** An empty page of Chromium, or of Firefox. */
-export async function blank(firefox = false) {
-    return (await (firefox ? launchFirefox() : launch())).newPage();
-}
-
 /** A page under test. */
 export class Lab {
-    constructor(context, page) {
+    constructor({ context, page, end }) {
         this.context = context;
+        this.end = end;
         /** The Playwright page. */
         this.page = page;
         /** What the console said as an error. */
@@ -193,7 +180,7 @@ export class Lab {
     /** Closes the page. Errors on its console fail the test unless `errors` says that they belong to it. */
     async close({ errors = false } = {}) {
         opened.delete(this);
-        await this.context.close();
+        await this.end();
         if (!errors) assert.deepEqual(this.errors, [], 'errors on the console');
     }
 
@@ -279,6 +266,33 @@ export class Lab {
         }
         await mouse.up();
         // The first shows what the release did at once, the second what follows from it.
+        await this.frame(2);
+    }
+
+    /** An element by what a screen reader says of it; the laboratory is asked for what it shows now. */
+    async element(role, name) {
+        await this.frame(2);
+        const found = this.page.getByRole(role, { name, exact: true });
+        await this.until(async () => {
+            await this.page.evaluate(() => globalThis.jointplay.mirror.follow());
+            return (await found.count()) > 0;
+        }, `no ${role} "${name}"`);
+        return found.first();
+    }
+
+    /** Activates an element without pointer or keyboard, also where it is out of sight. */
+    async activate(role, name) {
+        await (await this.element(role, name)).evaluate((element) => element.click());
+        await this.frame(2);
+    }
+
+    /** Adjusts a field likewise: its value becomes `value`, or goes `steps` steps on. */
+    async adjust(role, name, { value, steps }) {
+        await (await this.element(role, name)).evaluate((element, [value, steps]) => {
+            if (steps) element.stepUp(steps);
+            else element.value = value;
+            element.dispatchEvent(new Event('input', { bubbles: true }));
+        }, [value, steps]);
         await this.frame(2);
     }
 
@@ -390,21 +404,27 @@ export class Lab {
         }
     }
 
-    /** Lets what workers say through up to the next message of this kind, and gives that one. Needs `holdWorkers`. */
+    /** Lets what workers say through up to the next message of this kind, waits for that and gives it. Needs `holdWorkers`. */
     async hear(kind) {
         // A worker computes as long as the machine takes.
-        const end = Date.now() + 2 * PATIENCE;
-        while (Date.now() < end) {
-            const message = await this.page.evaluate((kind) => globalThis.heldPost.pass(kind), kind);
-            if (message) return message;
-            // The worker has the machine for itself meanwhile.
-            await new Promise((done) => setTimeout(done, 100));
-        }
-        return assert.fail(`the worker says no ${kind}`);
+        const message = await this.page.evaluate(([kind, patience]) => globalThis.heldPost.pass(kind, patience), [kind, 2 * PATIENCE]);
+        assert.ok(message, `the worker says no ${kind}`);
+        return message;
+    }
+
+    /** From here on what the page shows is drawn. */
+    async draw() {
+        await this.page.evaluate(() => (globalThis.drawsNothing = false));
+        // It draws what is news; a pointer that moves is.
+        await this.page.mouse.move(1, 1);
+        await this.frame();
+        await this.page.mouse.move(2, 2);
+        await this.frame();
     }
 
     /** What stands on the screen, a pngjs picture. `clip`: {x, y, width, height}. */
     async pixels(clip) {
+        assert.ok(!(await this.page.evaluate(() => globalThis.drawsNothing)), 'opened without a picture');
         return PNG.sync.read(await this.page.screenshot({ clip }));
     }
 }

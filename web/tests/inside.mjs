@@ -3,14 +3,19 @@
 
 /**
  * Lets time pass by frames alone: each is `frame` ms after the last, however long it took, and a look at the clock within one
- * costs `look` ms. While `held`, frames come only as `step(count)` asks for them.
+ * costs `look` ms. While `held`, frames come only as `step(count)` asks for them. Where `hasty`, what the page waits for longer than
+ * a moment (the address that follows, lost graphics) comes after a twentieth of the time.
  */
 export function driveTime() {
     const ask = globalThis.requestAnimationFrame.bind(globalThis);
+    const wait = globalThis.setTimeout.bind(globalThis);
+    globalThis.setTimeout = (call, delay, ...rest) => wait(call, time.hasty && delay > 100 ? delay / 20 : delay, ...rest);
+    const soon = new MessageChannel();
+    soon.port2.onmessage = tick;
     const waiting = new Map();
     let steps = [];
     let [last, asked] = [0, false];
-    const time = { now: 0, frame: 50, look: 1e-3, held: false, step, free };
+    const time = { now: 0, frame: 50, look: 1e-3, held: false, hasty: true, step, free };
     globalThis.drivenTime = time;
     Performance.prototype.now = () => (time.now += time.look);
     globalThis.requestAnimationFrame = (call) => {
@@ -24,7 +29,9 @@ export function driveTime() {
     function arm() {
         if (asked || waiting.size === 0 || (time.held && steps.length === 0)) return;
         asked = true;
-        ask(tick);
+        // What nobody sees need not wait for the screen.
+        if (time.held && globalThis.drawsNothing) soon.port1.postMessage(null);
+        else ask(tick);
     }
 
     function tick() {
@@ -48,7 +55,7 @@ export function driveTime() {
 
     /** Draws so many frames. A page that wants none, as one that has stopped, is given a moment instead. */
     function step(count) {
-        if (waiting.size === 0) return new Promise((done) => setTimeout(done, 20));
+        if (waiting.size === 0) return new Promise((done) => wait(done, 10));
         return new Promise((done) => {
             steps.push({ left: count, done });
             arm();
@@ -61,27 +68,50 @@ export function driveTime() {
     }
 }
 
+/**
+ * Has WebGL2 draw nothing, until `drawsNothing` is false: of what a page costs where the processor draws, pixels that nobody looks at
+ * are most.
+ */
+export function drawNothing() {
+    globalThis.drawsNothing = true;
+    const { prototype } = WebGL2RenderingContext;
+    for (const name of ['blitFramebuffer', 'clear', 'drawArrays', 'drawArraysInstanced', 'drawElements', 'drawElementsInstanced']) {
+        const draw = prototype[name];
+        prototype[name] = function (...rest) {
+            if (!globalThis.drawsNothing) draw.apply(this, rest);
+        };
+    }
+}
+
 /** Keeps what workers say to the page until the test lets it through. */
 export function holdWorkers() {
     const post = { waiting: [], pass };
     globalThis.heldPost = post;
+    let arrived = () => {};
 
-    /** Lets messages through up to the first of this kind, and gives that one; `undefined` where none has come. */
-    function pass(kind) {
-        while (post.waiting.length > 0) {
-            const { data, tell } = post.waiting.shift();
-            tell();
-            const message = JSON.parse(data);
-            if (message === kind || kind in Object(message)) return message;
+    /** Lets messages through up to the first of this kind, and gives that one; `undefined` where none comes within `patience` ms. */
+    async function pass(kind, patience) {
+        const late = new Promise((done) => setTimeout(() => done(true), patience));
+        for (;;) {
+            while (post.waiting.length > 0) {
+                const { data, tell } = post.waiting.shift();
+                tell();
+                const message = JSON.parse(data);
+                if (message === kind || kind in Object(message)) return message;
+            }
+            const next = new Promise((done) => (arrived = done));
+            if (await Promise.race([next, late])) return undefined;
         }
-        return undefined;
     }
 
     const { Worker } = globalThis;
     globalThis.Worker = class extends Worker {
         addEventListener(kind, told, ...rest) {
             if (kind !== 'message') return super.addEventListener(kind, told, ...rest);
-            const hold = (event) => post.waiting.push({ from: this, data: event.data, tell: () => told(event) });
+            const hold = (event) => {
+                post.waiting.push({ from: this, data: event.data, tell: () => told(event) });
+                arrived();
+            };
             return super.addEventListener(kind, hold, ...rest);
         }
 

@@ -1,0 +1,19 @@
+// What the page weighs, packed as it is shipped.
+
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import { test } from 'node:test';
+
+import { PAGE } from './harness.mjs';
+
+test('the page weighs at most 2.5 MB as a browser downloads it', (t) => {
+    const LIMIT = 2_500_000;
+    const files = fs.readdirSync(PAGE).filter((file) => !/\.(br|gz)$/.test(file));
+    assert.ok(files.includes('jointplay_bg.wasm'));
+    const sizes = files.map((file) => [file, fs.statSync(path.join(PAGE, `${file}.br`)).size]);
+    for (const [file, size] of sizes) t.diagnostic(`${file}: ${size} bytes with brotli`);
+    const sum = sizes.reduce((sum, [, size]) => sum + size, 0);
+    t.diagnostic(`together: ${sum} bytes of ${LIMIT}`);
+    assert.ok(sum <= LIMIT, `${sum} bytes`);
+});
