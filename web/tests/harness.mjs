@@ -211,11 +211,6 @@ export class Lab {
         }, count);
     }
 
-    /** From here on each frame stands for so many milliseconds. */
-    async pace(milliseconds = 50) {
-        await this.ask((milliseconds) => (globalThis.drivenTime.frame = milliseconds), milliseconds);
-    }
-
     /** What the laboratory is doing: see `state` in src/web/page.rs. */
     async state() {
         return JSON.parse(await this.page.evaluate(() => globalThis.jointplay.page.state()));
@@ -406,10 +401,13 @@ export class Lab {
 
     /** Lets what workers say through up to the next message of this kind, waits for that and gives it. Needs `holdWorkers`. */
     async hear(kind) {
+        let timer;
         // A worker computes as long as the machine takes.
-        const message = await this.page.evaluate(([kind, patience]) => globalThis.heldPost.pass(kind, patience), [kind, 2 * PATIENCE]);
-        assert.ok(message, `the worker says no ${kind}`);
-        return message;
+        const late = new Promise((_, failed) => {
+            timer = setTimeout(() => failed(new Error(`the worker says no ${kind}`)), 2 * PATIENCE);
+        });
+        const heard = this.page.evaluate((kind) => globalThis.heldPost.pass(kind), kind);
+        return Promise.race([heard, late]).finally(() => clearTimeout(timer));
     }
 
     /** From here on what the page shows is drawn. */
@@ -429,7 +427,7 @@ export class Lab {
     }
 }
 
-export function middle({ rect: [x0, y0, x1, y1] }) {
+function middle({ rect: [x0, y0, x1, y1] }) {
     return [(x0 + x1) / 2, (y0 + y1) / 2];
 }
 
@@ -438,13 +436,6 @@ export function colours(picture) {
     const seen = new Set();
     for (let at = 0; at < picture.data.length; at += 4) seen.add(picture.data.readUInt32LE(at));
     return seen.size;
-}
-
-/** Part of a picture. */
-export function crop(picture, { x, y, width, height }) {
-    const part = new PNG({ width, height });
-    PNG.bitblt(picture, part, x, y, width, height, 0, 0);
-    return part;
 }
 
 /** Share of the pixels that differ visibly; with `name`, both pictures and their difference are kept if it is above `limit`. */

@@ -89,9 +89,8 @@ export function holdWorkers() {
     globalThis.heldPost = post;
     let arrived = () => {};
 
-    /** Lets messages through up to the first of this kind, and gives that one; `undefined` where none comes within `patience` ms. */
-    async function pass(kind, patience) {
-        const late = new Promise((done) => setTimeout(() => done(true), patience));
+    /** Lets messages through up to the first of this kind, and gives that one. */
+    async function pass(kind) {
         for (;;) {
             while (post.waiting.length > 0) {
                 const { data, tell } = post.waiting.shift();
@@ -99,8 +98,7 @@ export function holdWorkers() {
                 const message = JSON.parse(data);
                 if (message === kind || kind in Object(message)) return message;
             }
-            const next = new Promise((done) => (arrived = done));
-            if (await Promise.race([next, late])) return undefined;
+            await new Promise((done) => (arrived = done));
         }
     }
 

@@ -213,6 +213,7 @@ test('where WebGPU fails or is missing, WebGL2 draws; where both are, a plain pa
     const state = await lab.state();
     assert.match(state.renderer, /^gl /);
     assert.equal(state.changed_parameters['contact.clearance'], '0.2mm');
+    assert.match(await lab.page.evaluate(() => location.search), /renderer=webgl/);
 
     await withheld('both');
     await lab.page.goto(await serve());
@@ -251,7 +252,10 @@ test('the policy of the page lets nothing in that is not its own', async () => {
     assert.deepEqual(lab.errors, []);
     const outcome = await lab.page.evaluate(async () => {
         const refused = new Set();
-        addEventListener('securitypolicyviolation', ({ effectiveDirective }) => refused.add(effectiveDirective));
+        const all = new Promise((done) => {
+            addEventListener('securitypolicyviolation', ({ effectiveDirective }) => refused.add(effectiveDirective).size === 5 && done());
+            setTimeout(done, 10_000);
+        });
         const inline = document.createElement('script');
         inline.textContent = 'globalThis.foreign = true';
         const foreign = document.createElement('script');
@@ -264,7 +268,7 @@ test('the policy of the page lets nothing in that is not its own', async () => {
         document.body.append(inline, foreign, button, picture);
         button.click();
         const failed = await fetch('https://example.org/').then(() => false, () => true);
-        await new Promise((done) => setTimeout(done, 50));
+        await all;
         return { refused: [...refused].sort(), ran: globalThis.foreign === true, failed };
     });
     assert.deepEqual(outcome, {

@@ -133,11 +133,13 @@ test('loading the page anew goes on from what was shown, and what no address hol
     // Back in the address where it fits.
     await lab.page.evaluate(() => (location.hash = '#scene=pendulum&play=0'));
     await lab.until(async () => /^#scene=pendulum&.*hash=/.test(await hash()), 'the address stays behind');
-    // In another tab there is nothing of it, and the page says so.
-    await lab.page.evaluate((address) => {
+    // And from there to what is kept. In another tab there is nothing of it, and the page says so.
+    await lab.page.evaluate((address) => (location.hash = address), address);
+    await lab.until(async () => (await lab.state()).scene === 'lifted', 'what is kept does not come back');
+    await lab.page.evaluate(() => {
         sessionStorage.clear();
-        location.hash = address;
-    }, address);
+        location.hash = '#kept=1';
+    });
     await lab.says('kept in the tab');
     await lab.close();
 });
