@@ -353,7 +353,7 @@ mod tests {
         let cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
         let mut followed = task(&["contact.friction=0.1..0.3:26"]);
         (followed.start, followed.periods, followed.discard) = (Start::FollowUp, 2, 1);
-        followed.scene.changes.push(("spcmm.frequency".to_owned(), "20 Hz".to_owned()));
+        followed.scene.changes.push(("solver.preset".to_owned(), "preview".to_owned()));
         for task in [cold, followed] {
             let mut whole: Vec<_> = told(task.clone(), usize::MAX);
             let mut shared = Vec::new();
