@@ -7,6 +7,7 @@ mod common;
 mod bench_window;
 mod film;
 mod frames;
+mod golden;
 mod hands;
 mod headless_window;
 mod instruments;
