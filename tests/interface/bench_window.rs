@@ -6,10 +6,11 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
 
+use crate::golden::PLAIN;
 use crate::hands::{compare_window, opened, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
-    Harness, SnapshotResults,
+    Harness,
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::analysis::drive::observed;
@@ -411,44 +412,41 @@ fn an_ideal_mechanism_has_no_twin() {
     assert!(switch.accesskit_node().is_disabled());
 }
 
-/// After some periods, with a sweep and a twin.
-fn used(size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    let mut harness = sized("spcmm", &[FAST, ("contact.friction", "0.05")], size, theme);
-    harness.state_mut().player_mut().set_twin(true);
-    harness.state_mut().player_mut().run_to(1.0);
-    harness.run();
-    harness
-}
-
 #[test]
-fn pictures() {
-    let mut results = SnapshotResults::new();
+fn the_bench_shows_what_is_stored() {
+    let wide = [1280.0, 800.0];
+    // After some periods, with a twin.
+    let mut harness = sized("spcmm", &[&[FAST], &PLAIN[..]].concat(), wide, egui::Theme::Light);
+    harness.state_mut().player_mut().set_twin(true);
+    harness.state_mut().player_mut().run_to(0.5);
     for (name, size, theme) in [
-        ("bench_wide_light", [1280.0, 800.0], egui::Theme::Light),
-        ("bench_wide_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("bench_wide_light", wide, egui::Theme::Light),
         ("bench_narrow", [420.0, 800.0], egui::Theme::Light),
         ("bench_lying", [844.0, 390.0], egui::Theme::Dark),
+        ("bench_wide_dark", wide, egui::Theme::Dark),
     ] {
-        let mut harness = used(size, theme);
+        harness.set_size(size.into());
+        harness.ctx.set_theme(theme);
+        harness.run();
         compare_window(&mut harness, name);
-        results.extend_harness(&mut harness);
     }
-    // Parted long ago, seen from near.
-    let mut harness = used([1280.0, 800.0], egui::Theme::Dark);
+    // Parted, seen from near. It begins after a while of friction, in which the rounding of all before is forgotten.
     let player = harness.state_mut().player_mut();
+    player.set_twin(false);
     player.set("contact.friction", "0").expect("in range");
-    player.run_to(1.3);
+    player.set_twin(true);
+    player.run_to(0.6);
     harness.key_press(Key::Num5);
     harness.run();
     compare_window(&mut harness, "bench_ghost");
-    results.extend_harness(&mut harness);
-    let mut harness = window("spcmm", &[FAST]);
-    sweep(&mut harness, "0.05 mm", "0.8 mm", 9.0);
+
+    let mut harness = window("spcmm", &[&[("spcmm.frequency", "10 Hz")], &PLAIN[..]].concat());
+    harness.state_mut().player_mut().run_to(0.35);
+    sweep(&mut harness, "0.05 mm", "0.8 mm", 5.0);
     wait(&mut harness, |app| !app.bench().is_sweeping());
     harness.remove_cursor();
     harness.run();
     compare_window(&mut harness, "bench_sweep");
-    results.extend_harness(&mut harness);
 }
 
 #[test]

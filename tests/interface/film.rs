@@ -12,6 +12,7 @@ use eframe::egui::accesskit::Role;
 use egui_kittest::kittest::Queryable as _;
 use jointplay::film::{Film, FilmError, Format};
 
+use crate::hands::give_graphics;
 use crate::page::{click, decoded, label, next_file, window};
 
 /// A disc of `colour` that moves to the right on a light slope.
@@ -225,6 +226,7 @@ fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
 #[test]
 fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     let (mut harness, calls) = window("pendulum", [900.0, 640.0]);
+    give_graphics(&mut harness);
     harness.state_mut().player_mut().run_to(30e-3);
     harness.run();
     let state = |harness: &egui_kittest::Harness<'_, jointplay::app::App>| {

@@ -1,9 +1,39 @@
 //! The window as a user opens it, and gestures.
 
+use std::collections::BTreeSet;
+
 use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, Shape, TouchPhase, accesskit::Role};
-use egui_kittest::{Harness, kittest::Queryable as _};
+use eframe::egui_wgpu::{RenderState, RendererOptions};
+use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
+use egui_kittest::{Harness, HarnessBuilder, LazyRenderer, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions};
+use jointplay::integrate::Method;
 use jointplay::scene::Scene;
+
+use crate::golden::{self, PLAIN, Picture, compare};
+
+/// A graphics adapter of its own.
+fn graphics() -> RenderState {
+    create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE)
+}
+
+/// A window of `size` that takes a graphics adapter when a test first asks for its picture: most ask for what stands in it alone, and
+/// an adapter with its shaders takes longer than such a test.
+pub fn builder(size: [f32; 2], theme: egui::Theme) -> HarnessBuilder<App> {
+    let renderer = LazyRenderer::new(|| {
+        let graphics = graphics();
+        jointplay::render::install(&graphics);
+        WgpuTestRenderer::from_render_state(graphics)
+    });
+    Harness::builder().with_size(size).with_theme(theme).with_step_dt(1.0 / 60.0).with_max_steps(60).renderer(renderer)
+}
+
+/// Gives the window an adapter for what it draws off screen: pictures and films.
+pub fn give_graphics(harness: &mut Harness<'_, App>) {
+    let ctx = harness.ctx.clone();
+    let theme = ctx.theme();
+    harness.state_mut().attach(&ctx, Some(&graphics()), theme.into());
+}
 
 /// The window on `scene` with some changes, paused at t = 0, by a `clock` that the test drives.
 pub fn opened(
@@ -31,32 +61,72 @@ pub fn paced(
     options.playing = false;
     options.theme = theme.into();
     options.clock = clock;
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_theme(theme)
-        .with_step_dt(dt)
-        .with_max_steps(60)
-        .wgpu()
-        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    let builder = builder(size, theme).with_step_dt(dt);
+    let mut harness = builder.build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
     harness.run();
     harness
 }
 
-/// Compares the window with the stored picture `name`, and every text in it with those stored beside: a picture must leave room for
-/// other drivers, in which a digit would hide. `UPDATE_SNAPSHOTS=1` stores both.
+/// The window on `scene` with some changes by [`PLAIN`] steps, to be compared with what is stored.
+pub fn plain(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+    opened(scene, &[changes, &PLAIN].concat(), size, theme, crate::common::looks::<10>)
+}
+
+/// Where texts and pictures of the window are stored.
+const STORED: &str = "tests/golden/window";
+
+/// Windows that have a picture, too: between them they show all that is drawn.
+const PICTURED: [&str; 8] = [
+    "bench_sweep",
+    "energy_balance",
+    "ghosts_dark",
+    "lesson_twin",
+    "microscope_light",
+    "past_dark",
+    "presentation_dark",
+    "wear_phone",
+];
+
+/// Compares every text in sight, to the letter, with those stored under `name`; and the picture, at half its size, of the
+/// [`PICTURED`]: it must leave room for other drivers, in which a digit would hide.
+#[track_caller]
 pub fn compare_window(harness: &mut Harness<'_, App>, name: &str) {
-    let path = format!("{}/tests/snapshots/{name}.txt", env!("CARGO_MANIFEST_DIR"));
+    let method = harness.state().player().scene().solver.method;
+    assert_eq!(method, Method::RungeKutta4, "{name} follows the steps of an adaptive method");
+    let path = format!("{}/{STORED}/{name}.txt", env!("CARGO_MANIFEST_DIR"));
     let mut texts = String::new();
     for part in &harness.output().shapes {
         add_texts(&part.shape, part.clip_rect, &mut texts);
     }
-    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
-        std::fs::write(&path, &texts).expect("writes");
+    if golden::storing() {
+        std::fs::write(&path, &texts).expect("writable");
     }
     let stored = std::fs::read_to_string(&path).unwrap_or_default();
     let differs = stored.lines().zip(texts.lines()).find(|(a, b)| a != b);
     assert!(stored == texts, "{path}: {differs:?}");
-    harness.snapshot(name);
+    if PICTURED.contains(&name) {
+        let image = harness.render().expect("drawn");
+        let picture = Picture::new([image.width(), image.height()], image.as_raw());
+        compare(STORED, name, &picture.half(), "the window at half its size");
+    }
+}
+
+#[test]
+fn windows_that_are_stored_have_few_and_small_pictures() {
+    if golden::storing() {
+        return;
+    }
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(STORED);
+    let files = std::fs::read_dir(folder).expect("a folder").map(|file| file.expect("readable").path());
+    let (pictures, texts): (Vec<_>, Vec<_>) =
+        files.partition(|file| file.extension().is_some_and(|ending| ending == "png"));
+    let names = |files: &[std::path::PathBuf]| -> BTreeSet<String> {
+        files.iter().map(|file| file.file_stem().expect("a name").to_string_lossy().into_owned()).collect()
+    };
+    assert_eq!(names(&pictures), PICTURED.map(String::from).into());
+    assert!(names(&texts).is_superset(&names(&pictures)));
+    let size: u64 = pictures.iter().map(|file| file.metadata().expect("readable").len()).sum();
+    assert!(size < 1_000_000, "{size} bytes");
 }
 
 /// The texts of `shape` that are in sight within `clip`, a line each.

@@ -5,12 +5,12 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
-use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
+use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::analysis::task::{Job, Message};
 use jointplay::app::{App, Event, Host, Link, Log, OpenedFile, Player, Replay, Running, SceneText, Verdict};
 use jointplay::simulate::{ContactState, Quantity};
 
-use crate::hands::{compare_window, fingers, fingers_down, lift};
+use crate::hands::{compare_window, fingers, fingers_down, give_graphics, lift, plain};
 use crate::page::Calls;
 use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
@@ -277,14 +277,13 @@ fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
 }
 
 #[test]
-fn pictures_of_the_past() {
-    let mut results = SnapshotResults::new();
+fn the_past_shows_what_is_stored() {
     for (name, size, theme) in [
         ("past_light", [1280.0, 800.0], egui::Theme::Light),
         ("past_dark", [1280.0, 800.0], egui::Theme::Dark),
         ("past_phone", [390.0, 844.0], egui::Theme::Light),
     ] {
-        let mut harness = sized("spcmm", size, theme);
+        let mut harness = plain("spcmm", &[], size, theme);
         run_to(&mut harness, 25e-3);
         harness.state_mut().player_mut().set("contact.clearance", "0.6 mm").expect("in range");
         run_to(&mut harness, 60e-3);
@@ -295,20 +294,18 @@ fn pictures_of_the_past() {
         player.go_to(30e-3);
         harness.run();
         compare_window(&mut harness, name);
-        results.extend_harness(&mut harness);
     }
 }
 
 #[test]
-fn pictures_of_wear_and_of_a_pull() {
-    let mut results = SnapshotResults::new();
+fn wear_and_a_pull_show_what_is_stored() {
     for (name, size, theme) in [
         ("wear_light", [1280.0, 800.0], egui::Theme::Light),
         ("wear_dark", [1280.0, 800.0], egui::Theme::Dark),
         ("wear_phone", [390.0, 844.0], egui::Theme::Light),
         ("wear_phone_dark", [390.0, 844.0], egui::Theme::Dark),
     ] {
-        let mut harness = sized("spcmm", size, theme);
+        let mut harness = plain("spcmm", &[], size, theme);
         click(&mut harness, "View options");
         let choice = |harness: &Harness<'_, App>, scroll: bool| {
             let choice = harness.get_by_role_and_label(Role::RadioButton, "Wear map: Impulse");
@@ -329,7 +326,6 @@ fn pictures_of_wear_and_of_a_pull() {
         let purple = picture(&mut harness).coloured(area, [0x47, 0x2D, 0x7B], 12);
         assert!(purple.len() > 30, "{name}: nothing is mapped");
         compare_window(&mut harness, name);
-        results.extend_harness(&mut harness);
     }
     for (name, size, theme) in [
         ("pull_light", [1280.0, 800.0], egui::Theme::Light),
@@ -337,7 +333,7 @@ fn pictures_of_wear_and_of_a_pull() {
         ("pull_phone", [390.0, 844.0], egui::Theme::Light),
         ("pull_phone_dark", [390.0, 844.0], egui::Theme::Dark),
     ] {
-        let mut harness = sized("spcmm", size, theme);
+        let mut harness = plain("spcmm", &[], size, theme);
         let platform = platform(&harness);
         harness.drag_at(platform);
         harness.step();
@@ -346,7 +342,6 @@ fn pictures_of_wear_and_of_a_pull() {
             harness.step();
         }
         compare_window(&mut harness, name);
-        results.extend_harness(&mut harness);
     }
 }
 
@@ -602,6 +597,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
 /// Link, picture and film by `press`, from the menu `all` or from those of their own.
 fn to_the_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), all: Option<&str>) {
     let calls = class.share_with_page();
+    give_graphics(&mut class.harness);
     class.harness.state_mut().player_mut().run_to(10e-3);
     if let Some(menu) = all {
         press(class, Role::Button, menu);

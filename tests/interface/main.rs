@@ -8,6 +8,7 @@ mod bench_window;
 mod embed;
 mod film;
 mod frames;
+mod golden;
 mod hands;
 mod headless_window;
 mod instruments;

@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::hands::{compare_window, type_over};
+use crate::hands::{builder, compare_window, give_graphics, plain, type_over};
 use eframe::egui::{
     self, Event, Key, Modifiers, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase,
     accesskit::{Live, Role},
     pos2, vec2,
 };
 use egui_kittest::{
-    Harness, SnapshotResults,
+    Harness,
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window};
@@ -96,21 +96,20 @@ impl egui::DroppedFile for Dropped {
 }
 
 pub fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+    paced(options, size, 1.0 / 60.0)
+}
+
+/// The same with frames `dt` s after each other.
+pub fn paced(options: AppOptions, size: [f32; 2], dt: f32) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
     let mut options = options;
     options.theme = egui::Theme::Light.into();
     options.clock = crate::common::looks::<10>;
     let (page, calls) = Calls::host();
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_theme(egui::Theme::Light)
-        .with_step_dt(1.0 / 60.0)
-        .with_max_steps(60)
-        .wgpu()
-        .build_eframe(move |cc| {
-            let mut app = App::new(cc, options).expect("the scene starts");
-            app.set_host(page);
-            app
-        });
+    let mut harness = builder(size, egui::Theme::Light).with_step_dt(dt).build_eframe(move |cc| {
+        let mut app = App::new(cc, options).expect("the scene starts");
+        app.set_host(page);
+        app
+    });
     harness.run_steps(3);
     (harness, calls)
 }
@@ -553,6 +552,7 @@ fn a_finger_makes_the_controls_of_a_large_window_large_as_well() {
 #[test]
 fn scene_record_and_picture_are_saved() {
     let (mut harness, calls) = window("spcmm", LARGE);
+    give_graphics(&mut harness);
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.45 mm").expect("in range");
     player.run_to(12e-3);
@@ -660,6 +660,7 @@ fn ruler((info, rgba): &(png::Info<'_>, Vec<u8>)) -> usize {
 #[test]
 fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_show() {
     let (mut harness, calls) = window("spcmm", [900.0, 640.0]);
+    give_graphics(&mut harness);
     harness.state_mut().player_mut().run_to(7.85e-3);
     harness.run();
     let picture = |harness: &mut Harness<'_, App>, choices: &[&str]| {
@@ -865,6 +866,7 @@ fn what_goes_on_is_told_to_who_does_not_see_it() {
 #[test]
 fn the_about_box_names_version_state_and_adapter() {
     let (mut harness, _) = window("pendulum", LARGE);
+    give_graphics(&mut harness);
     click(&mut harness, "About");
     harness.get_by_label_contains("Drawn with ");
     harness.get_by_label(&format!("Version {}", jointplay::VERSION));
@@ -892,14 +894,14 @@ fn recorded_channels_have_the_columns_of_a_run() {
 }
 
 #[test]
-fn pictures() {
-    let mut results = SnapshotResults::new();
+fn phones_show_what_is_stored() {
     for (name, size) in [("phone_upright", UPRIGHT), ("phone_lying", LYING)] {
-        let (mut harness, _) = window("spcmm", size);
+        let mut harness = plain("spcmm", &[], size, egui::Theme::Light);
+        let (page, _) = Calls::host();
+        harness.state_mut().set_host(page);
         harness.state_mut().player_mut().run_to(7.85e-3);
         harness.run();
         compare_window(&mut harness, name);
-        results.extend_harness(&mut harness);
     }
 }
 

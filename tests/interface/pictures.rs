@@ -9,12 +9,13 @@ use jointplay::chart::{Axis, Chart, PALETTE, Series, Sheet};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
-use crate::frames::{Picture, compare, draw};
+use crate::frames::draw;
+use crate::golden::{Picture, compare};
 
 const FOLDER: &str = "docs/pictures";
 const SIZE: (u32, u32) = (512, 320);
 /// Largest file, bytes.
-const LARGEST: u64 = 60_000;
+const LARGEST: u64 = 40_000;
 
 /// The picture of the laws.
 const LAWS: &str = "drives";

@@ -15,6 +15,8 @@ use egui_kittest::{
 use jointplay::app::{App, AppOptions, Clock, DesktopHost, Host, Link, OpenedFile, SceneText};
 use jointplay::scene::{Scene, built_in_text};
 
+use crate::hands::builder;
+
 /// What a host was asked for, and what it has to tell.
 #[derive(Default)]
 struct Calls {
@@ -72,17 +74,11 @@ fn shown(scene: Scene, clock: Clock, host: Box<dyn Host>) -> Harness<'static, Ap
     options.playing = false;
     options.theme = egui::Theme::Light.into();
     options.clock = clock;
-    let mut harness = Harness::builder()
-        .with_size([1280.0, 800.0])
-        .with_theme(egui::Theme::Light)
-        .with_step_dt(1.0 / 60.0)
-        .with_max_steps(60)
-        .wgpu()
-        .build_eframe(move |cc| {
-            let mut app = App::new(cc, options).expect("the scene starts");
-            app.set_host(host);
-            app
-        });
+    let mut harness = builder([1280.0, 800.0], egui::Theme::Light).build_eframe(move |cc| {
+        let mut app = App::new(cc, options).expect("the scene starts");
+        app.set_host(host);
+        app
+    });
     harness.run_steps(3);
     harness
 }

@@ -131,9 +131,6 @@ fn in_a_small_window_the_panels_are_behind_one_button() {
     };
     choose(&mut harness);
     harness.get_by_label("Choose plots");
-    if let Ok(p) = std::env::var("SHOW") {
-        harness.render().unwrap().save(p).unwrap();
-    }
     choose(&mut harness);
     assert!(harness.query_by_label("Choose plots").is_none());
 }

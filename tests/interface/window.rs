@@ -1,9 +1,10 @@
 //! The window, driven by role and label as a person with a screen reader would.
 
-use crate::hands::{compare_window, opened, type_over};
+use crate::golden;
+use crate::hands::{compare_window, opened, plain, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
-    Harness, SnapshotResults,
+    Harness,
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::app::{App, AppOptions};
@@ -404,18 +405,16 @@ fn every_control_has_a_name() {
 }
 
 #[test]
-fn pictures() {
-    let mut results = SnapshotResults::new();
+fn wide_and_narrow_windows_show_what_is_stored() {
     for (name, size, theme) in [
         ("wide_light", [1280.0, 800.0], egui::Theme::Light),
         ("wide_dark", [1280.0, 800.0], egui::Theme::Dark),
         ("narrow_light", [420.0, 800.0], egui::Theme::Light),
     ] {
-        let mut harness = sized("spcmm", size, theme);
+        let mut harness = plain("spcmm", &[], size, theme);
         harness.state_mut().player_mut().run_to(7.85e-3);
         harness.run();
         compare_window(&mut harness, name);
-        results.extend_harness(&mut harness);
     }
 }
 
@@ -431,7 +430,9 @@ fn look() {
         return;
     };
     let save = |harness: &mut Harness<'_, App>, name: &str| {
-        harness.render().expect("drawn").save(format!("{folder}/{name}.png")).expect("written");
+        let image = harness.render().expect("drawn");
+        let picture = golden::Picture::new([image.width(), image.height()], image.as_raw());
+        picture.write(format!("{folder}/{name}.png").as_ref());
     };
     let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
     h.state_mut().player_mut().set_playing(true);
@@ -769,8 +770,8 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
 }
 
 #[test]
-fn the_energy_balance_is_stacked_from_both_sides() {
-    let mut harness = window("spcmm");
+fn the_energy_balance_is_stacked_from_both_sides_and_shows_what_is_stored() {
+    let mut harness = plain("spcmm", &[], [1280.0, 800.0], egui::Theme::Light);
     let plots = harness.state_mut().plots_mut();
     plots.chosen = vec![Quantity::EnergyBalance];
     plots.window = jointplay::app::Window::Everything;

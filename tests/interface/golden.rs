@@ -1,0 +1,171 @@
+//! Stored pictures: how they are kept, and what is compared with them.
+//!
+//! `UPDATE_GOLDEN=1 cargo test --test interface` stores all pictures and texts anew; look at each before committing it. A failure
+//! leaves `<name>.actual.png` and `<name>.diff.png` (differing pixels red) in `tests/golden/`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Distance of a colour channel, of 255, from which a pixel counts as different, and how many may.
+///
+/// The one tolerance of all pictures: another processor or driver rounds some tens of pixels along edges otherwise; the
+/// least of the things drawn, an arrow, covers hundreds.
+pub const TOLERANCE: (u8, usize) = (24, 120);
+
+/// Distance of a colour channel by which a stored pixel may be off, less than the tolerance: a palette holds 256 colours.
+const PALETTE_ERROR: u8 = 20;
+
+/// Fixed steps of one plain method, for all that is stored: nothing in it follows how an adaptive method chooses its steps.
+pub const PLAIN: [(&str, &str); 2] = [("solver.method", "rk4"), ("solver.step", "20 us")];
+
+/// Square distance of colours below which a palette does not tell them apart: the noise that keeps gradients from banding.
+const ALIKE: u32 = 32;
+
+/// Whether pictures and texts are stored instead of compared.
+pub fn storing() -> bool {
+    std::env::var_os("UPDATE_GOLDEN").is_some()
+}
+
+/// A picture without its opacity.
+pub struct Picture {
+    size: [u32; 2],
+    rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// Of so many pixels across and down.
+    pub fn new(size: [u32; 2], rgba: &[u8]) -> Self {
+        Self { size, rgb: rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect() }
+    }
+
+    pub fn read(path: &Path) -> Self {
+        let file = fs::File::open(path)
+            .unwrap_or_else(|error| panic!("{}: {error}; UPDATE_GOLDEN=1 stores it", path.display()));
+        let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().expect("a PNG file");
+        let mut pixels = vec![0; reader.output_buffer_size().expect("it fits")];
+        let info = reader.next_frame(&mut pixels).expect("a PNG file");
+        let size = [info.width, info.height];
+        match info.color_type {
+            png::ColorType::Rgb => Self { size, rgb: pixels },
+            _ => Self::new(size, &pixels),
+        }
+    }
+
+    /// The picture at half its size: each pixel the mean of four.
+    pub fn half(&self) -> Self {
+        let [width, height] = self.size.map(|edge| edge / 2);
+        let at = |x: u32, y: u32, part: usize| u32::from(self.rgb[3 * (y * self.size[0] + x) as usize + part]);
+        let mean = |x: u32, y: u32, part| {
+            let sum: u32 = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| at(2 * x + i, 2 * y + j, part)).iter().sum();
+            (sum / 4) as u8
+        };
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Self { size: [width, height], rgb: places.flat_map(|(x, y)| [0, 1, 2].map(|part| mean(x, y, part))).collect() }
+    }
+
+    /// Writes the picture with a palette: what is stored lives in the history for ever.
+    pub fn write(&self, path: &Path) {
+        let (palette, indices) = self.palette();
+        let file = fs::File::create(path).expect("writable");
+        let mut encoder = png::Encoder::new(file, self.size[0], self.size[1]);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(palette.concat());
+        encoder.set_compression(png::Compression::High);
+        encoder.set_filter(png::Filter::NoFilter);
+        let mut writer = encoder.write_header().expect("writable");
+        writer.write_image_data(&indices).expect("writable");
+        writer.finish().expect("writable");
+    }
+
+    /// At most 256 of its colours, and which of them each pixel has. The next one is always that which is farthest from all before, the
+    /// frequent ones a little earlier: so no pixel is far off, however few have its colour.
+    fn palette(&self) -> (Vec<[u8; 3]>, Vec<u8>) {
+        let far =
+            |a: [u8; 3], b: [u8; 3]| -> u32 { [0, 1, 2].map(|i| u32::from(a[i].abs_diff(b[i])).pow(2)).iter().sum() };
+        // Of each colour how many pixels have it, how far the nearest of the palette is, and its index there.
+        let mut colours: BTreeMap<[u8; 3], (f64, u32, u8)> = BTreeMap::new();
+        for colour in self.pixels() {
+            colours.entry(colour).or_insert((0.0, u32::MAX, 0)).0 += 1.0;
+        }
+        let mut palette = Vec::new();
+        for index in 0..=255 {
+            let gain = |(count, distance, _): (f64, u32, u8)| count.sqrt().sqrt() * f64::from(distance);
+            let others = colours.iter().filter(|(_, (_, distance, _))| *distance >= ALIKE);
+            let Some((&next, _)) = others.max_by(|a, b| gain(*a.1).total_cmp(&gain(*b.1))) else {
+                break;
+            };
+            palette.push(next);
+            for (colour, (_, distance, nearest)) in &mut colours {
+                let there = far(*colour, next);
+                if there < *distance {
+                    (*distance, *nearest) = (there, index);
+                }
+            }
+        }
+        let indices = self.pixels().map(|colour| colours[&colour].2).collect();
+        (palette, indices)
+    }
+
+    fn pixels(&self) -> impl Iterator<Item = [u8; 3]> {
+        self.rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2]])
+    }
+
+    /// Which pixels differ from `other`'s, which has the same size, by more than `most`.
+    fn differing(&self, other: &Self, most: u8) -> Vec<bool> {
+        let far = |(a, b): (&u8, &u8)| a.abs_diff(*b) > most;
+        self.rgb.chunks_exact(3).zip(other.rgb.chunks_exact(3)).map(|(a, b)| a.iter().zip(b).any(far)).collect()
+    }
+
+    /// How many pixels differ from `other`'s, which has the same size.
+    pub fn differences(&self, other: &Self) -> usize {
+        self.differing(other, TOLERANCE.0).into_iter().filter(|mark| *mark).count()
+    }
+
+    /// The picture, faded, with the marked pixels red.
+    fn marked(&self, marks: &[bool]) -> Self {
+        let pixel = |(p, mark): ([u8; 3], &bool)| if *mark { [220, 0, 0] } else { p.map(|c| 170 + c / 3) };
+        Self { size: self.size, rgb: self.pixels().zip(marks).flat_map(pixel).collect() }
+    }
+}
+
+/// Why `actual` is not `golden`; and where, if they have the same size.
+pub fn objection(actual: &Picture, golden: &Picture) -> Option<(String, Option<Picture>)> {
+    if actual.size != golden.size {
+        let text = format!("{:?} pixels instead of {:?}", actual.size, golden.size);
+        return Some((text, None));
+    }
+    let marks = actual.differing(golden, TOLERANCE.0);
+    let count = marks.iter().filter(|mark| **mark).count();
+    (count > TOLERANCE.1).then(|| {
+        let text = format!("{count} pixels differ, allowed are {}", TOLERANCE.1);
+        (text, Some(golden.marked(&marks)))
+    })
+}
+
+/// Compares a picture with the one of that `name` in a `folder` of the repository; `what` says how it is made.
+#[track_caller]
+pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let golden = root.join(format!("{folder}/{name}.png"));
+    let left = |ending: &str| root.join(format!("tests/golden/{name}.{ending}.png"));
+    for stale in ["actual", "diff"] {
+        let _ = fs::remove_file(left(stale));
+    }
+    if storing() {
+        fs::create_dir_all(golden.parent().expect("has one")).expect("writable");
+        actual.write(&golden);
+        let off = actual.differing(&Picture::read(&golden), PALETTE_ERROR);
+        assert!(!off.contains(&true), "{folder}/{name}.png: its colours are too many for a palette");
+        return;
+    }
+    if let Some((why, diff)) = objection(actual, &Picture::read(&golden)) {
+        actual.write(&left("actual"));
+        if let Some(diff) = diff {
+            diff.write(&left("diff"));
+        }
+        panic!("{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({what})");
+    }
+}
