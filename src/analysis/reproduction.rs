@@ -45,7 +45,7 @@ impl Extent {
         Self { settle: 30, runs: (200, 50), values: [100, 40], sweep: (100, 40), map: [16, 16], map_periods: (40, 16) };
     /// A shortened report that shows the layout within a minute.
     pub const QUICK: Self =
-        Self { settle: 1, runs: (2, 1), values: [2, 2], sweep: (2, 1), map: [2, 2], map_periods: (2, 1) };
+        Self { settle: 1, runs: (4, 1), values: [2, 2], sweep: (3, 1), map: [2, 2], map_periods: (2, 1) };
 }
 
 /// Why there is no report.
