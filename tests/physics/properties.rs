@@ -87,7 +87,7 @@ fn changed_scenes(scenes: &'static [&'static str]) -> impl Strategy<Value = (&'s
         let change = proptest::strategy::Union::new(rows);
         proptest::collection::vec((change, any::<usize>()), 1..=8).prop_map(move |changes| {
             let write = |((row, value), joint): ((&'static Parameter, Value), usize)| {
-                (key(&scene, row, joint), row.write(&value))
+                (key(scene, row, joint), row.write(&value))
             };
             (name, changes.into_iter().map(write).collect::<Vec<_>>())
         })
