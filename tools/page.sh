@@ -11,7 +11,8 @@ build_page() {
     local sources=${CARGO_HOME:-$HOME/.cargo}/registry/src
     # What the optimiser would copy into its callers beyond this makes the page a twentieth heavier and nothing faster; what is
     # marked #[inline], as all arithmetic is, has a limit of its own.
-    CARGO_ENCODED_RUSTFLAGS="--remap-path-prefix=$sources=" compile_page web -- -C llvm-args=-inline-threshold=25
+    local flags=("--remap-path-prefix=$sources=" -Cllvm-args=-inline-threshold=25)
+    CARGO_ENCODED_RUSTFLAGS=$(IFS=$'\x1f' && printf '%s' "${flags[*]}") compile_page web
     pack_page web "$@"
 }
 
