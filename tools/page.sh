@@ -16,10 +16,10 @@ build_page() {
     pack_page web "$@"
 }
 
-# Writes a page that does the same, compiled in a third of the time and heavier, into folder $1: for tests.
+# Writes a page that does the same, compiled as the tests are, and heavier, into folder $1.
 build_quick_page() {
-    compile_page quick-page
-    pack_page quick-page "$1"
+    compile_page dev
+    pack_page debug "$1"
 }
 
 compile_page() {
