@@ -75,14 +75,16 @@ fn quick() -> &'static (tempfile::TempDir, Outcome) {
 
 #[cfg(unix)]
 #[test]
-fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
+#[ignore = "half a minute for the report, part of `./test full`"]
+fn full_ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
     let (folder, run) = quick();
     assert!(run.stderr.contains("going on where report.partial stopped"), "{}", run.stderr);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing but the report is left");
 }
 
 #[test]
-fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
+#[ignore = "half a minute for the report, part of `./test full`"]
+fn full_a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
     let (folder, run) = quick();
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("Statements") && run.stdout.contains("report/index.html"));

@@ -1015,9 +1015,13 @@ fn nothing_moves_while_a_scene_plays() {
             .with_step_dt(1.0 / 60.0)
             .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
         harness.state_mut().player_mut().pacer.set_scale(0.5);
+        // How much is listed depends on the scene, and where it has room on the window: all scenes in one of each kind.
+        let all = [[900.0, 640.0], [390.0, 844.0]].contains(&size);
         for scene in jointplay::scene::BUILT_IN {
-            harness.state_mut().open(scene).expect("built in");
-            nothing_moves(&mut harness, &format!("{scene} in {size:?}"));
+            if all || scene == "chain" {
+                harness.state_mut().open(scene).expect("built in");
+                nothing_moves(&mut harness, &format!("{scene} in {size:?}"));
+            }
         }
         // The bench with a twin, and a run that raises doubts.
         harness.key_press(Key::B);

@@ -206,7 +206,7 @@ fn the_logistic_map_doubles_its_period_where_it_is_known_to() {
         (3.83, 3),
         (3.845, 6),
     ] {
-        let (regime, evidence) = logistic(r, 6000);
+        let (regime, evidence) = logistic(r, 3000);
         assert_eq!(regime, Regime::Periodic(period), "r = {r}: {}", brief(&evidence));
         assert_eq!(evidence.distinct, period, "r = {r}");
         assert!(exponent(&evidence).value < 0.0, "r = {r}");
@@ -223,14 +223,14 @@ fn a_cycle_near_its_doubling_is_not_settled_and_no_torus() {
 
 #[test]
 fn the_logistic_map_at_four_has_the_exponent_ln_two() {
-    let (regime, evidence) = logistic(4.0, 20_000);
+    let (regime, evidence) = logistic(4.0, 6000);
     assert_eq!(regime, Regime::Chaotic);
     let e = exponent(&evidence);
-    // Ten thousand iterations: the standard error says how far to trust it.
-    assert!((e.value - 2f64.ln()).abs() < 0.01, "{}", e.value);
-    assert!(e.standard_error < 0.01, "{}", e.standard_error);
+    // Three thousand iterations: the standard error says how far to trust it.
+    assert!((e.value - 2f64.ln()).abs() < 0.02, "{}", e.value);
+    assert!(e.standard_error < 0.02, "{}", e.standard_error);
     assert!(evidence.zero_one > 0.9, "{}", evidence.zero_one);
-    assert_eq!(e.running.len(), 10_000);
+    assert_eq!(e.running.len(), 3000);
     assert_eq!(e.running.last(), Some(&e.value));
 }
 
