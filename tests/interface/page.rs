@@ -203,7 +203,7 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
 
 #[test]
 fn a_long_way_shows_how_far_it_is_and_can_be_stopped() {
-    let link = "?scene=spcmm&method=rk4&solver.step=1us&t=100s";
+    let link = "?scene=pendulum&method=rk4&solver.step=1us&t=100s";
     let options = AppOptions::from_link(link).expect("a link");
     let (mut harness, _) = open(options, LARGE);
     let first = harness.state().replaying().expect("on its way");
