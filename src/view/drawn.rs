@@ -209,12 +209,17 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
                 .any(|j| j.ball.body == body && (j.ball.point - centre).norm() < 0.1 * j.contact.ball_radius);
             (!is_joint_ball).then(|| Form::Ball { centre: to_f32(centre), radius: *radius as f32 })
         }
-        Geometry::Plate { corners, thickness } => {
+        Geometry::Plate { corners, triangles, thickness } => {
             let corners: Vec<Vec3> = corners.iter().map(to_f32).collect();
-            let mesh = plate(&corners, *thickness as f32)?;
+            let mesh = plate(&corners, triangles, *thickness as f32)?;
             let points: Vec<Vec3> = mesh.vertices.iter().map(|(p, _)| Vec3::new(p[0], p[1], p[2])).collect();
-            let triangles =
-                OwnMesh { shape: SharedShape::convex_hull(&points), points: points.into(), mesh: meshes.add(mesh)? };
+            let faces = mesh.indices.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect();
+            let shape = if HAS_MESHES && !is_convex(&corners, triangles) {
+                SharedShape::trimesh(points.clone(), faces).ok()
+            } else {
+                SharedShape::convex_hull(&points)
+            };
+            let triangles = OwnMesh { shape, points: points.into(), mesh: meshes.add(mesh)? };
             let place = Pose::WORLD;
             Some(Form::Own { triangles, place })
         }
@@ -224,6 +229,10 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
         }),
     }
 }
+
+/// Whether a pointer finds the faces of meshes. The page reads no files: without this it holds none of that code, and finds a
+/// plate by its convex hull.
+const HAS_MESHES: bool = cfg!(not(target_arch = "wasm32"));
 
 /// Meshes that are not shared by all scenes.
 struct Meshes {
@@ -249,12 +258,7 @@ impl Meshes {
         let vertices = file.vertices().iter().map(scaled).collect();
         let bounds = file.bounds().map(|end| scaled(&end));
         let corner = |i: usize| Vec3::from([0, 1, 2].map(|axis| bounds[i >> axis & 1][axis]));
-        // The page reads no files: without this it holds none of that code.
-        let shape = if cfg!(target_arch = "wasm32") {
-            None
-        } else {
-            SharedShape::trimesh(vertices, file.triangles().to_vec()).ok()
-        };
+        let shape = if HAS_MESHES { SharedShape::trimesh(vertices, file.triangles().to_vec()).ok() } else { None };
         let own = OwnMesh { shape, points: (0..8).map(corner).collect(), mesh: self.add(surface(file, unit))? };
         self.of_files.push((file.clone(), unit, own.clone()));
         Some(own)
@@ -275,30 +279,34 @@ fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
     None
 }
 
-/// Prism over a convex polygon, extruded by half the thickness to both sides.
-fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
+/// Whether a polygon filled by `triangles` nowhere turns inwards.
+fn is_convex(corners: &[Vec3], triangles: &[[usize; 3]]) -> bool {
+    let area = |&[i, j, k]: &[usize; 3]| (corners[j] - corners[i]).cross(corners[k] - corners[i]);
+    let (normal, n) = (triangles.iter().map(area).sum::<Vec3>(), corners.len());
+    (0..n).all(|i| area(&[i, (i + 1) % n, (i + 2) % n]).dot(normal) >= 0.0)
+}
+
+/// Prism over a polygon filled by `triangles`, extruded by half the thickness to both sides.
+fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<MeshData> {
     let n = corners.len();
-    let normal = (1..n.saturating_sub(1))
-        .map(|i| (corners[i] - corners[0]).cross(corners[i + 1] - corners[0]))
-        .sum::<Vec3>()
-        .try_normalize()?;
+    let area = |&[i, j, k]: &[usize; 3]| (corners[j] - corners[i]).cross(corners[k] - corners[i]);
+    let normal = triangles.iter().map(area).sum::<Vec3>().try_normalize()?;
     let mut mesh = MeshData::default();
-    let mut face = |points: &[Vec3], normal: Vec3| {
-        let first = mesh.vertices.len() as u32;
+    let mut face = |points: &[Vec3], normal: Vec3, triangles: &[[usize; 3]]| {
+        let first = mesh.vertices.len();
         mesh.vertices.extend(points.iter().map(|p| ([p.x, p.y, p.z, 0.0], normal.to_array())));
-        for i in 1..points.len() as u32 - 1 {
-            mesh.indices.extend([first, first + i, first + i + 1]);
-        }
+        mesh.indices.extend(triangles.as_flattened().iter().map(|i| (first + i) as u32));
     };
     let half = normal * (thickness / 2.0);
     let top: Vec<Vec3> = corners.iter().map(|&c| c + half).collect();
-    let bottom: Vec<Vec3> = corners.iter().rev().map(|&c| c - half).collect();
-    face(&top, normal);
-    face(&bottom, -normal);
+    let bottom: Vec<Vec3> = corners.iter().map(|&c| c - half).collect();
+    let from_below: Vec<[usize; 3]> = triangles.iter().map(|&[i, j, k]| [k, j, i]).collect();
+    face(&top, normal, triangles);
+    face(&bottom, -normal, &from_below);
     for i in 0..n {
         let (a, b) = (corners[i], corners[(i + 1) % n]);
         let out = (b - a).cross(normal).normalize_or_zero();
-        face(&[a - half, b - half, b + half, a + half], out);
+        face(&[a - half, b - half, b + half, a + half], out, &[[0, 1, 2], [0, 2, 3]]);
     }
     Some(mesh)
 }

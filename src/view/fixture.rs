@@ -162,6 +162,7 @@ pub(crate) fn three_legs() -> (Scene, Frame) {
                 Vec3::new(0.0, 0.018, -0.058),
                 Vec3::new(0.0, -0.018, -0.058),
             ],
+            triangles: (1..5).map(|i| [0, i, i + 1]).collect(),
             thickness: 0.008,
         },
     )];

@@ -354,7 +354,7 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
             "corners",
             Takes::Vectors(D::Length, many(MOST_CORNERS, "corners")),
             "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]",
-            "corners of a convex polygon, in its order",
+            "corners of a polygon in one plane, in its order",
         )
         .of(&["plate"])
         .frame(BODY_FRAME),

@@ -381,10 +381,12 @@ pub enum Geometry {
         /// Radius.
         radius: f64,
     },
-    /// Flat plate: a convex polygon extruded to both sides of its plane.
+    /// Flat plate: a polygon extruded to both sides of its plane.
     Plate {
         /// Corners in order, in one plane.
         corners: Vec<Vec3>,
+        /// What fills it, as indices of corners: [`super::fill`].
+        triangles: Vec<[usize; 3]>,
         /// Thickness.
         thickness: f64,
     },

@@ -176,10 +176,8 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) ->
                 .iter()
                 .map(|corner| Ok(corner.vector()? + shift))
                 .collect::<Result<Vec<_>, SceneError>>()?;
-            if corners.len() < 3 {
-                return Err(node.error(format!("a plate needs at least 3 corners, has {}", corners.len())));
-            }
-            Geometry::Plate { corners, thickness: size("thickness")? }
+            let triangles = fill(&corners).map_err(|fault| node.error(fault.to_string()))?;
+            Geometry::Plate { corners, triangles, thickness: size("thickness")? }
         }
         Form::Capsule | Form::Cylinder | Form::Cone => {
             let (from, to, radius) = (point("from")?, point("to")?, size("radius")?);

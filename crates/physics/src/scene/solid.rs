@@ -49,7 +49,7 @@ impl Solid {
                 let bar = (from != to).then(|| Self::cylinder(from, to, *radius));
                 Self::together(ends.into_iter().chain(bar))
             }
-            Geometry::Plate { corners, thickness } => Self::plate(corners, *thickness),
+            Geometry::Plate { corners, triangles, thickness } => Self::plate(corners, triangles, *thickness),
             Geometry::Mesh { mesh, unit, position, rotation } => {
                 let Self { volume, centre, second } = Self::inside(mesh);
                 let turn = rotation.to_rotation_matrix().into_inner();
@@ -113,11 +113,11 @@ impl Solid {
         Self::new(volume, Vec3::from(origin.map(f64::from)) + centre, second)
     }
 
-    /// A convex polygon, as triangles with a common corner, extruded.
-    fn plate(corners: &[Vec3], thickness: f64) -> Self {
-        let origin = corners[0];
-        let triangles = corners.windows(2).skip(1).map(|pair| {
-            let (a, b) = (pair[0] - origin, pair[1] - origin);
+    /// A polygon as the triangles that fill it, extruded.
+    fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f64) -> Self {
+        let triangles = triangles.iter().map(|&[i, j, k]| {
+            let origin = corners[i];
+            let (a, b) = (corners[j] - origin, corners[k] - origin);
             let normal = a.cross(&b);
             let area = 0.5 * normal.norm();
             let volume = area * thickness;
@@ -176,7 +176,7 @@ mod tests {
                 let near = from + (to - from) * along.clamp(0.0, 1.0);
                 (point - near).norm() <= *radius
             }
-            Geometry::Plate { corners, thickness } => {
+            Geometry::Plate { corners, thickness, .. } => {
                 let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
                 let inside = |i: usize| {
                     let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
@@ -204,6 +204,7 @@ mod tests {
                     Vec3::new(0.7, 0.2, 0.1),
                     Vec3::new(0.0, 0.6, 0.207_407_407_407_407_4),
                 ],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
                 thickness: 0.2,
             },
         ];
