@@ -6,7 +6,7 @@ use super::output::significant;
 use super::summary;
 use crate::mechanism::Placement;
 use crate::scene::{Scene, format_quantity_digits};
-use crate::simulate::Simulation;
+use crate::simulate::{Doubt, Simulation};
 
 /// A body moved or turned by more than this is not where its scene puts it: m, rad.
 const FAR: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
@@ -72,9 +72,15 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     let far: Vec<String> = far.map(|(body, placement)| format!("{} {}", body.name, words(placement))).collect();
     let mut warnings = Vec::new();
     if !far.is_empty() {
-        let gap = assembly.widest.map_or_else(String::new, |(joint, gap)| {
+        let open = assembly.widest.filter(|(_, gap)| *gap > NEAR.moved);
+        let open = open.map(|(joint, gap)| {
             format!(" {} was {} open.", cut_joint(scene, joint), format_quantity_digits(gap, "mm", 4))
         });
+        let askew = assembly.most_turned.filter(|(_, turned)| *turned > NEAR.turned);
+        let askew = askew.map(|(joint, turned)| {
+            format!(" {} was {} askew.", cut_joint(scene, joint), format_quantity_digits(turned, "deg", 4))
+        });
+        let gap: String = open.into_iter().chain(askew).collect();
         warnings.push(format!(
             "assembling the start took bodies far from where the scene has them: {}.{gap} Look for a wrong axis, point or \
              start value.",
@@ -87,6 +93,8 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
                 .to_owned(),
         );
     }
+    let inside = simulation.doubts().into_iter().filter(|doubt| matches!(doubt, Doubt::StartsInside { .. }));
+    warnings.extend(inside.map(|doubt| doubt.to_string()));
     warnings
 }
 

@@ -10,8 +10,8 @@ use super::{Failure, load, print, start};
 use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
-use crate::mechanism::Summary;
-use crate::scene::{BallJoint, Body, Formulation, Joint, JointKind, Scene, format_quantity, to_display};
+use crate::mechanism::{ElementReport, Summary};
+use crate::scene::{BallJoint, Body, Element, Formulation, Joint, JointKind, Scene, format_quantity, to_display};
 use crate::simulate::{Frame, Listed, Simulation, channels_of};
 
 /// Runs `check`.
@@ -87,6 +87,12 @@ fn report(scene: &Scene, contents: &Summary, begun: &Start, start: &Frame) -> Re
             &format!("  {}", joint.name),
             &ball_joint(joint, report.normal_force.norm(), !begun.reactions.contains(&joint.name)),
         );
+    }
+    if !scene.elements.is_empty() {
+        line("Force elements", &format!("{}, with what they exert at the start", scene.elements.len()));
+    }
+    for (element, report) in scene.elements.iter().zip(&start.elements) {
+        line(&format!("  {}", element.name), &force_element(element, report));
     }
     begun.lines.iter().for_each(|(label, words)| line(label, words));
     line("Degrees of freedom", &freedoms(contents));
@@ -179,6 +185,14 @@ fn ball_joint(joint: &BallJoint, force: f64, unique: bool) -> String {
         contact.normal_law,
         contact.restitution,
     )
+}
+
+/// Kind of a force element, and its force and torque at the start.
+fn force_element(element: &Element, report: &ElementReport) -> String {
+    let force = report.own_force().map(|force| format!("{} N", significant(force.norm(), 6)));
+    let torque = report.torque.map(|torque| format!("{} N m", significant(torque.norm(), 6)));
+    let exerts: Vec<String> = force.into_iter().chain(torque).collect();
+    format!("{}: {}", element.kind.section, exerts.join(" and "))
 }
 
 fn freedoms(contents: &Summary) -> String {

@@ -7,6 +7,7 @@ use super::given::{FileNumber, Place};
 use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
 use super::parameters::{Kind, ValueFault};
 use super::reading::Reading;
+use super::units::{all_units, same_unit, split_unit};
 use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
 use crate::words::Words;
 use std::borrow::Cow;
@@ -64,7 +65,12 @@ impl<'d> Document<'d> {
     pub fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
         DeTable::parse(self.text).map_err(|error| {
             let span = error.span().unwrap_or(0..0);
-            let message = format!("not valid TOML: {}", error.message());
+            let from = self.text[..span.start].rfind('\n').map_or(0, |at| at + 1);
+            let line = self.text[from..].lines().next().unwrap_or_default();
+            let message = match unquoted(line) {
+                Some(quantity) => format!("a number with a unit is a text: \"{quantity}\", in quotes"),
+                None => format!("not valid TOML: {}", error.message()),
+            };
             self.error(span, "", None, message)
         })
     }
@@ -79,6 +85,14 @@ impl<'d> Document<'d> {
     pub fn excerpt(&self, span: Range<usize>) -> String {
         brief(self.text.get(span).unwrap_or(""))
     }
+}
+
+/// A number with a unit that `line` gives as a value without quotes.
+fn unquoted(line: &str) -> Option<&str> {
+    let value = line.split_once('=')?.1.split('#').next()?.trim();
+    let (unit, number) = (split_unit(value), value.trim_end_matches(split_unit(value)));
+    let known = all_units().any(|(of, ..)| same_unit(of, unit));
+    (!unit.is_empty() && known && number.trim().parse::<f64>().is_ok()).then_some(value)
 }
 
 impl<'d> Section<'d> {

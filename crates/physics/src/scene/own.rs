@@ -12,8 +12,9 @@ use super::*;
 /// Anything wrong in one.
 pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, SceneError> {
     let mut all: Vec<OwnParameter> = Vec::new();
-    for node in lists(files, "parameter", Vec::new())? {
-        let own = read_parameter(&node)?;
+    let nodes = lists(files, "parameter", Vec::new())?;
+    for (i, node) in nodes.iter().enumerate() {
+        let own = read_parameter(node).map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
         if all.iter().any(|other| other.key == own.key) {
             let name = node.section()?.require("name")?;
             return Err(name.error("there is already a parameter of this name; names must differ"));
@@ -23,6 +24,16 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, Scene
     // What follows from others, in no range of its own, is a number like any other.
     all.retain(|own| own.default.is_some() || own.range.is_some());
     Ok(all)
+}
+
+/// The error that the value of a parameter uses one of those defined after it, if it does.
+fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
+    let named = |node: &Node<'_>| Some(node.section().ok()?.require("name").ok()?.name().ok()?.to_string());
+    let value = node.section_as(node.title("parameter")).ok()?.require("value").ok()?;
+    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let words: Vec<&str> = value.scalar().ok()?.split(|c| !letters(c)).collect();
+    let name = later.iter().filter_map(named).find(|name| words.contains(&&**name))?;
+    Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
 }
 
 fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
