@@ -25,7 +25,7 @@ const NONE: &str = "—";
 const STEPS_OF_AN_IMPACT: u64 = 10;
 /// Error beyond which a measured preset is doubtful.
 const DOUBTFUL_ERROR: f64 = 0.05;
-/// Energy residual, relative to the exchanged energy, beyond which the balance is doubtful.
+/// Energy residual, of what the machine held and lost, beyond which the balance is doubtful.
 const BALANCED: f64 = 1e-3;
 
 /// A row: label, value, whether the value is doubtful, and its tooltip. The rows are always the same, so that nothing moves
@@ -291,7 +291,8 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         .map_or_else(|| "none yet".to_owned(), |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)));
     let ratio = |impact: &Impact| {
         let [given, asked] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
-        format!("{given}, asked {asked}")
+        // Only an undisturbed impact can be compared with what was asked for.
+        if impact.disturbed || impact.floored { given } else { format!("{given}, asked {asked}") }
     };
     let law = impact.map_or_else(String::new, |impact| {
         format!(" An undisturbed impact under its normal-force law gives {}.", value::number(impact.law, 3))
@@ -324,7 +325,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
                 !impact.disturbed && !impact.floored && (impact.achieved() - impact.law).abs() > 0.02
             }),
             format!(
-                "Separation speed over approach speed of the latest impact, and what was asked for.{law} Amber: it is \
+                "Separation speed over approach speed of the latest impact, and what was asked for if nothing disturbed it.{law} Amber: it is \
                  further than 0.02 from that, by too few steps, or by weight and drives where the impact is soft."
             ),
         ),
@@ -342,7 +343,7 @@ fn kind(impact: &Impact) -> &'static str {
 
 fn residual(player: &Player) -> AccuracyLine {
     let ledger = player.frame().ledger;
-    let share = ledger.map(|ledger| ledger.relative_residual().abs());
+    let share = ledger.map(|ledger| if ledger.scale() > 0.0 { ledger.residual().abs() / ledger.scale() } else { 0.0 });
     let exchanged = ledger.map_or_else(
         || "Not kept: see Energy ledger under Solver.".to_owned(),
         |ledger| {
@@ -355,7 +356,8 @@ fn residual(player: &Player) -> AccuracyLine {
         value: share.map_or_else(|| NONE.to_owned(), |share| format!("{}, relative", value::power_of_ten(share))),
         doubtful: share.is_some_and(|share| share > BALANCED),
         help: format!(
-            "Energy that the ledger cannot account for since the start, over the energy exchanged. {exchanged} Amber beyond {}.",
+            "Energy that the ledger cannot account for since the start, over the most that the machine held at once and what it lost \
+             since. {exchanged} Amber beyond {}.",
             value::power_of_ten(BALANCED)
         ),
     }

@@ -204,7 +204,7 @@ pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts
 /// Adds a line to a summary.
 pub fn line(text: &mut String, label: &str, words: &str) {
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "{label:<18}{words}");
+    let _ = writeln!(text, "{label:<17} {words}");
 }
 
 /// Adds to a summary that a file was written.

@@ -1,6 +1,6 @@
 //! A result that is not to be trusted says so, and why; one that is says nothing.
 
-use crate::common::{Changes, run_until, simulation};
+use crate::common::{Changes, frame_now, parse, run_until, simulation};
 use jointplay::simulate::{Doubt, Simulation};
 
 fn words(simulation: &Simulation) -> Vec<String> {
@@ -148,4 +148,110 @@ fn the_summary_of_a_run_marks_it() {
     assert!(json["doubts"].as_array().unwrap().is_empty(), "{json}");
     assert!(run("text", odd).contains("Not trusted       S1: "), "{}", run("text", odd));
     assert!(!run("text", usual).contains("Not trusted"));
+}
+
+/// A free ball of 0.1 kg in a socket at rest; its place along z in mm.
+fn ball(place: &str, gravity: &str, more: &str) -> String {
+    format!(
+        r#"
+        [gravity]
+        z = "{gravity} m/s^2"
+        [contact]
+        clearance = "0.3 mm"
+        friction_law = "none"
+        [[body]]
+        name = "ball"
+        mass = "0.1 kg"
+        inertia = "4e-6 4e-6 4e-6 kg m^2"
+        [[joint]]
+        name = "ball"
+        kind = "free"
+        child = "ball"
+        start = {{ position = "0 0 {place} mm" }}
+        [[ball_joint]]
+        name = "S"
+        socket = {{ body = "world" }}
+        ball = {{ body = "ball" }}
+        {more}
+        "#
+    )
+}
+
+/// What a bouncing ball exchanges grows with every bounce; what it holds does not.
+#[test]
+fn steady_drift_is_marked_however_often_energy_was_exchanged() {
+    let text = ball("0", "-9.81", "");
+    let cases: [(&Changes, bool); 4] = [
+        (&[("solver.preset", "preview")], true),
+        (&[("solver.method", "dopri5"), ("solver.tolerance", "1e-4")], true),
+        (&[("solver.method", "rosenbrock"), ("solver.tolerance", "1e-4")], true),
+        (&[], false),
+    ];
+    for (changes, drifts) in cases {
+        let changes = [changes, &[("contact.normal_law", "hertz")]].concat();
+        let mut simulation = Simulation::new(&parse(&text, &changes)).unwrap();
+        run_until(&mut simulation, 10.0);
+        let ledger = simulation.ledger().unwrap();
+        let share = ledger.residual().abs() / (0.1 * 9.81 * 3e-4);
+        let said = simulation.doubts().iter().any(|doubt| matches!(doubt, Doubt::Energy { .. }));
+        assert_eq!(said, drifts, "{changes:?}: {:?}", simulation.doubts());
+        assert_eq!(share > 0.1, drifts, "{changes:?}: {share}");
+    }
+}
+
+/// At rest under a load hardly anything is exchanged, so that rounding is a large part of it; and nothing rebounds.
+#[test]
+fn a_ball_at_rest_under_a_load_raises_no_doubt() {
+    let load = "[[load]]\nname = \"L\"\non = { body = \"ball\" }\nforce = \"0 0 -100 N\"";
+    let text = format!("start = \"settled\"\n{}", ball("0", "-9.81", load));
+    for changes in [
+        &[][..],
+        &[("solver.preset", "reference")],
+        &[("contact.normal_law", "hertz"), ("solver.tolerance", "1e-5")],
+        &[("contact.normal_law", "hertz"), ("solver.tolerance", "1e-7")],
+    ] {
+        let mut simulation = Simulation::new(&parse(&text, changes)).unwrap();
+        run_until(&mut simulation, 1.0);
+        assert_eq!(simulation.doubts(), [], "{changes:?}");
+        let force = frame_now(&mut simulation).joints[0].normal_force.norm();
+        assert!((force / 100.981 - 1.0).abs() < 1e-6, "{changes:?}: {force}");
+        assert!(
+            simulation.statistics().steps < 200 || changes.contains(&("solver.preset", "reference")),
+            "{changes:?}"
+        );
+    }
+}
+
+#[test]
+fn a_machine_that_starts_inside_a_stop_says_how_deep_and_how_hard() {
+    let text = |start: &str| {
+        format!(
+            r#"
+            [gravity]
+            z = 0
+            [[body]]
+            name = "a"
+            mass = "1 kg"
+            inertia = "1e-3 1e-3 1e-3 kg m^2"
+            [[joint]]
+            name = "j"
+            kind = "prismatic"
+            child = "a"
+            axis = [1, 0, 0]
+            start = {{ position = "{start} mm" }}
+            [[stop]]
+            name = "end"
+            joint = "j"
+            upper = "10 mm"
+            force = "100 N"
+            depth = "0.1 mm"
+            "#
+        )
+    };
+    let doubts = |start: &str| words(&Simulation::new(&parse(&text(start), &[])).unwrap());
+    let said = "end: the machine starts 40 mm inside this stop, whose depth is 0.1 mm: it pushes with 800000 N; the start or the \
+                limit is wrong.";
+    assert_eq!(doubts("50"), [said]);
+    // One that rests on it is where it may be.
+    assert!(doubts("10.05").is_empty() && doubts("5").is_empty());
 }

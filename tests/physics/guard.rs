@@ -1,7 +1,7 @@
 //! What cannot go on stops, says where, when and what to try, and leaves the last good state.
 
 use crate::common::{frame_now, parse, run_until, scene, simulation};
-use jointplay::scene::built_in_text;
+use jointplay::scene::{built_in_text, format_quantity_digits};
 use jointplay::simulate::{Simulation, Stopped};
 
 /// Steps until the guard speaks.
@@ -52,7 +52,10 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
             let joints = scene.ball_joints.iter().map(|j| format!("ball joint {}", j.name));
             let bodies = scene.bodies.iter().map(|b| format!("body {}", b.name));
             assert!(joints.chain(bodies).any(|named| text.contains(&named)), "{text}");
-            assert!(text.contains(&format!("{:.6e} s", stopped.time)), "{text}");
+            assert!(
+                text.starts_with(&format!("stopped at t = {}: ", format_quantity_digits(stopped.time, "s", 7))),
+                "{text}"
+            );
             assert!(stopped.advice.to_string().contains("solver.step"), "{text}");
             assert!(stopped.advice.to_string().contains("solver.method = automatic"), "{text}");
             still_good(&mut simulation, &stopped);

@@ -40,5 +40,6 @@ mod spring_curves;
 mod twin;
 mod two_degrees;
 mod tyres;
+mod walls;
 mod wear;
 mod written;

@@ -528,17 +528,9 @@ struct Scales {
 }
 
 impl Scales {
-    /// Length: the smallest ball radius, at most 1 m; a joint that closes a loop counts as a ball joint of the scene's radius.
-    /// Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
+    /// Length: [`Scene::length_scale`]. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
     fn of(scene: &Scene) -> Self {
-        let closing = scene.closing_joints.iter();
-        let length = scene
-            .ball_joints
-            .iter()
-            .map(|j| j.contact.ball_radius)
-            .chain(closing.map(|_| scene.contact.ball_radius))
-            .fold(f64::INFINITY, f64::min)
-            .min(1.0);
+        let length = scene.length_scale();
         Self { length, speed: length / 0.1, angle: 0.1, angular_speed: 1.0 }
     }
 }

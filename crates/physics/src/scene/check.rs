@@ -22,7 +22,20 @@ const LOOSEST: f64 = 1e-3;
 /// Most sentences about ball joints; a last one stands for the rest.
 const MOST_LISTED: usize = 40;
 
+/// A slide's stop counts as a ball this many times as large as its depth.
+const OF_A_DEPTH: f64 = 50.0;
+
 impl Scene {
+    /// Length that a relative tolerance multiplies, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
+    /// most 1 m. A joint that closes a loop counts as a ball joint of the scene's radius.
+    pub fn length_scale(&self) -> f64 {
+        let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
+        let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
+        let stops = self.elements.iter().filter(|element| element.kind.section == "stop" && !element.on_hinge);
+        let depths = stops.map(|stop| OF_A_DEPTH * stop.number("depth"));
+        radii.chain(closing).chain(depths).fold(1.0, f64::min)
+    }
+
     /// Checks the contact parameters of each joint for consistency.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
         let joints = self.ball_joints.iter().enumerate();

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::scene;
+use crate::scene::{self, format_quantity_digits};
 
 /// Ball joints that a doubt concerns.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +68,25 @@ pub enum Doubt {
         /// Steps that an impact needs.
         steps: u64,
     },
-    /// Contacts that began slower than `impact_speed_floor` or existed at the start.
+    /// A contact whose beginning was found only at the end of a step that locates them.
+    Late {
+        /// Where.
+        joints: Joints,
+        /// Penetration there, m.
+        depth: f64,
+    },
+    /// An undisturbed impact that rebounded faster than its law says.
+    Rebound {
+        /// Where.
+        joints: Joints,
+        /// When it ended, s.
+        time: f64,
+        /// Separation speed over approach speed.
+        achieved: f64,
+        /// The same by its law.
+        law: f64,
+    },
+    /// Contacts that ended after they began slower than `impact_speed_floor` or existed at the start.
     Floored {
         /// Where.
         joints: Joints,
@@ -76,6 +94,19 @@ pub enum Doubt {
         slow: u64,
         /// Contacts of the worst joint.
         contacts: u64,
+    },
+    /// A stop that is deeper than its own depth when the run starts.
+    StartsInside {
+        /// Its name.
+        stop: String,
+        /// On a hinge: angle and torque, not length and force.
+        turns: bool,
+        /// m or rad.
+        depth: f64,
+        /// The depth at which it exerts the force given, m or rad.
+        usual: f64,
+        /// N or N m.
+        force: f64,
     },
     /// A contact patch that is not small compared with its ball.
     Patch {
@@ -100,12 +131,19 @@ pub enum Doubt {
         /// Largest violation, m.
         distance: f64,
     },
-    /// Unaccounted energy, compared with the energy exchanged.
+    /// Unaccounted energy, compared with what the machine held at once and lost.
     Energy {
         /// J.
         residual: f64,
-        /// As a fraction of the energy exchanged.
+        /// As a fraction of [`super::Ledger::scale`].
         share: f64,
+    },
+    /// A loss that is negative: energy appeared there.
+    Gain {
+        /// The loss.
+        work: LedgerTerm,
+        /// Its value, J.
+        value: f64,
     },
     /// Unaccounted energy, compared with a work term of the ledger.
     Work {
@@ -127,6 +165,42 @@ pub enum Doubt {
     },
 }
 
+impl Doubt {
+    /// What each kind of doubt is about, in a word or two for files; [`Self::kind`] is the index.
+    pub const KINDS: [&str; 12] = [
+        "settings",
+        "unresolved impacts",
+        "late contact",
+        "rebound",
+        "slow impacts",
+        "contact patch",
+        "start inside a stop",
+        "damping",
+        "constraint drift",
+        "energy",
+        "works",
+        "stability",
+    ];
+
+    /// Its kind, an index into [`Self::KINDS`].
+    pub fn kind(&self) -> usize {
+        match self {
+            Self::Scene(_) => 0,
+            Self::Unresolved { .. } => 1,
+            Self::Late { .. } => 2,
+            Self::Rebound { .. } => 3,
+            Self::Floored { .. } => 4,
+            Self::Patch { .. } => 5,
+            Self::StartsInside { .. } => 6,
+            Self::Damping { .. } => 7,
+            Self::Drift { .. } => 8,
+            Self::Energy { .. } => 9,
+            Self::Gain { .. } | Self::Work { .. } => 10,
+            Self::Held { .. } => 11,
+        }
+    }
+}
+
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -140,6 +214,28 @@ impl fmt::Display for Doubt {
                 "{joints}: {slow} of {contacts} contacts began slower than impact_speed_floor or existed at the start: \
                  they rebound higher than asked."
             ),
+            Self::Late { joints, depth } => write!(
+                f,
+                "{joints}: a contact was found {:.2e} mm deep, after its beginning: its force and rebound are wrong; use a \
+                 smaller tolerance.",
+                1e3 * depth
+            ),
+            Self::Rebound { joints, time, achieved, law } => write!(
+                f,
+                "{joints}: an impact that nothing disturbed, over at {time:.6} s, rebounded with {achieved:.3} of its approach \
+                 speed, its law gives {law:.3}; use a smaller step or tolerance."
+            ),
+            Self::StartsInside { stop, turns, depth, usual, force } => {
+                let unit = if *turns { "deg" } else { "mm" };
+                write!(
+                    f,
+                    "{stop}: the machine starts {} inside this stop, whose depth is {}: it pushes with {}; the start or the \
+                     limit is wrong.",
+                    format_quantity_digits(*depth, unit, 4),
+                    format_quantity_digits(*usual, unit, 4),
+                    format_quantity_digits(*force, if *turns { "N m" } else { "N" }, 4)
+                )
+            }
             Self::Patch { joints, radii } => {
                 write!(f, "{joints}: the contact patch reached {radii:.2} ball radii: Hertz's theory wants it small.")
             }
@@ -155,9 +251,14 @@ impl fmt::Display for Doubt {
             ),
             Self::Energy { residual, share } => write!(
                 f,
-                "energy: {residual:.2e} J, {:.2} % of what was exchanged, {}; use a smaller step or tolerance.",
+                "energy: {residual:.2e} J, {:.2} % of what the machine held and lost, {}; use a smaller step or tolerance.",
                 100.0 * share,
                 unaccounted(*residual)
+            ),
+            Self::Gain { work, value } => write!(
+                f,
+                "energy: the {} is negative, {value:.2e} J, so that it came from nowhere; use a smaller step or tolerance.",
+                work.words()
             ),
             Self::Work { work, value, residual } => write!(
                 f,

@@ -7,6 +7,8 @@ use crate::contact::{Coefficients, undisturbed_restitution};
 
 /// How many of the latest impacts are kept.
 const KEPT: usize = 64;
+/// Work of what pushes besides the contact, over an impact's energy, beyond which its law alone does not set its restitution.
+const SOFT: f64 = 0.01;
 
 /// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
 /// start, or that a live change ended, does not count.
@@ -37,6 +39,8 @@ pub struct Impact {
     pub deepest: f64,
     /// Largest normal force in continuous time, N.
     pub peak: f64,
+    /// How the penetration rate changed over the step before it, m/s^2: what pushes besides the contact.
+    pub push: f64,
     /// Largest ratio of damping to elastic force: the damping factor at its start, unless it is hit again or began slower
     /// than the floor.
     pub damping: f64,
@@ -46,6 +50,14 @@ impl Impact {
     /// Actual restitution: separation speed over approach speed.
     pub fn achieved(&self) -> f64 {
         self.separation_speed / self.approach_speed
+    }
+
+    /// By how much its restitution exceeds that of its law, which friction and what it drives only lower; 0 where that says
+    /// nothing: it was disturbed, slow, or so soft that what pushes besides the contact changes it.
+    pub fn astray(&self) -> f64 {
+        let kinetic = self.approach_speed * self.approach_speed;
+        let soft = !(2.0 * self.push.abs() * self.deepest <= SOFT * kinetic);
+        if self.disturbed || self.floored || soft { 0.0 } else { (self.achieved() - self.law).max(0.0) }
     }
 }
 
@@ -92,13 +104,15 @@ impl Impacts {
             && known.all(|impact| impact.joint < joints.max(1))
     }
 
-    /// A contact of `joint` begins at `time` with the penetration rate `speed`; `touching`: another joint is in contact.
+    /// A contact of `joint` begins at `time` with the penetration rate `speed`, which changed at `push` (m/s^2) before;
+    /// `touching`: another joint is in contact.
     pub(super) fn begin(
         &mut self,
         joint: usize,
         time: f64,
         speed: f64,
         asked: f64,
+        push: f64,
         coefficients: &Coefficients,
         touching: bool,
     ) {
@@ -117,6 +131,7 @@ impl Impacts {
             law: law.1,
             floored: speed < coefficients.speed_floor,
             disturbed: touching,
+            push,
             ..Impact::default()
         });
     }
@@ -138,15 +153,15 @@ impl Impacts {
         impact.as_ref().map_or(f64::INFINITY, |impact| impact.peak)
     }
 
-    /// The contact of `joint` ends at `time` with the penetration rate `rate`.
-    pub(super) fn end(&mut self, joint: usize, time: f64, rate: f64) {
-        if let Some(mut impact) = self.under_way[joint].take() {
-            impact.end = time;
-            impact.separation_speed = (-rate).max(0.0);
-            let slot = (self.count % self.finished.len() as u64) as usize;
-            self.finished[slot] = impact;
-            self.count += 1;
-        }
+    /// The contact of `joint` ends at `time` with the penetration rate `rate`. Returns the impact that it was, if it was one.
+    pub(super) fn end(&mut self, joint: usize, time: f64, rate: f64) -> Option<Impact> {
+        let mut impact = self.under_way[joint].take()?;
+        impact.end = time;
+        impact.separation_speed = (-rate).max(0.0);
+        let slot = (self.count % self.finished.len() as u64) as usize;
+        self.finished[slot] = impact;
+        self.count += 1;
+        Some(impact)
     }
 
     /// A live change altered the contact of `joint`, ending it if `touching` is false.

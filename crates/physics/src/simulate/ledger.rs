@@ -32,6 +32,8 @@ pub struct Ledger {
     /// Energy exchanged: half the sum of the magnitudes of all terms over all steps, as each joule leaves one term and
     /// enters another.
     pub exchanged: f64,
+    /// Largest kinetic energy with the elastic energy in contacts at the end of any step: what the machine holds at once.
+    pub held: f64,
 }
 
 impl Ledger {
@@ -46,6 +48,14 @@ impl Ledger {
     pub fn relative_residual(&self) -> f64 {
         if self.exchanged > 0.0 { self.residual() / self.exchanged } else { 0.0 }
     }
+
+    /// Energy against which a residual is small or not, J. A machine that exchanges its energy again and again without losing
+    /// any keeps every error: what it exchanged grows, what it holds does not. One that dissipates forgets errors with what is
+    /// lost. And at rest, or turning freely, hardly anything is exchanged.
+    pub fn scale(&self) -> f64 {
+        let lost = [self.restitution_loss, self.friction_loss, self.damping_loss].map(|loss| loss.max(0.0));
+        self.held.max(self.exchanged.min(self.held + lost.iter().sum::<f64>()))
+    }
 }
 
 /// Energies at one instant, J.
@@ -54,6 +64,14 @@ pub(super) struct Energies {
     pub kinetic: f64,
     pub gravitational: f64,
     pub elastic: f64,
+    /// The part of it that is in contacts.
+    pub in_contacts: f64,
+}
+
+impl Energies {
+    fn held(&self) -> f64 {
+        self.kinetic + self.in_contacts
+    }
 }
 
 /// Largest number of quadrature nodes.
@@ -205,7 +223,7 @@ impl Account {
 
     /// Sum of the magnitudes of the energies at the end of the latest step, J.
     pub(super) fn energy(&self) -> f64 {
-        let Energies { kinetic, gravitational, elastic } = self.now.1;
+        let Energies { kinetic, gravitational, elastic, .. } = self.now.1;
         kinetic + gravitational.abs() + elastic.abs()
     }
 
@@ -249,6 +267,7 @@ fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> 
         external_work: ledger.external_work + works.external,
         change_work: ledger.change_work,
         exchanged: ledger.exchanged + 0.5 * moved,
+        held: ledger.held.max(start.held()).max(end.held()),
     }
 }
 
@@ -323,18 +342,18 @@ mod tests {
 
     #[test]
     fn what_is_not_booked_is_the_residual() {
-        let at = |kinetic: f64, gravitational: f64| Energies { kinetic, gravitational, elastic: 0.0 };
+        let at = |kinetic: f64, gravitational: f64| Energies { kinetic, gravitational, ..Energies::default() };
         let mut account = Account::start(true, at(0.0, 1.0));
         account.course.push(0.0, drive(2.0));
         // 2 J by the drive and 1 J by gravity, of which 2.75 J arrive.
         account.book(1.0, at(2.75, 0.0));
         let ledger = account.ledger();
         assert_eq!(ledger.residual(), -0.25);
-        assert_eq!(ledger.exchanged, 0.5 * 5.75);
+        assert_eq!((ledger.exchanged, ledger.held, ledger.scale()), (0.5 * 5.75, 2.75, 2.75));
         let half = account.within(0.5, 1.0, at(1.5, 0.5));
         assert_eq!((half.residual(), half.drive_work), (0.0, 1.0));
         // 4 J of elastic energy from a stiffer contact.
-        account.book_change(Energies { kinetic: 2.75, gravitational: 7.0, elastic: 4.0 });
+        account.book_change(Energies { kinetic: 2.75, gravitational: 7.0, elastic: 4.0, in_contacts: 4.0 });
         assert_eq!(account.ledger().change_work, 4.0);
         assert_eq!(account.ledger().residual(), -0.25);
     }

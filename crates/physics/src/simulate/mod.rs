@@ -113,11 +113,16 @@ pub struct Statistics {
     pub corners: u64,
     /// Contacts begun, per ball joint.
     pub impacts: Vec<u64>,
-    /// Contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
-    /// rebound higher than asked.
+    /// Contacts that ended and had begun slower than the scene's `impact_speed_floor` or existed at the start, per ball joint:
+    /// they rebounded higher than asked.
     pub floored: Vec<u64>,
     /// Contacts that ended after fewer fixed steps than needed to resolve one, per ball joint; 0 with an adaptive method.
     pub coarse: Vec<u64>,
+    /// Deepest penetration at which a contact was found whose beginning should have been located, per ball joint, m; 0 if all
+    /// were, or with fixed steps.
+    pub late: Vec<f64>,
+    /// The undisturbed impact whose restitution exceeds that of its law most, if any does, per ball joint.
+    pub astray: Vec<Option<Impact>>,
     /// Largest continuous-time normal force (reaction of an ideal joint), per ball joint, N.
     pub peak_normal: Vec<f64>,
     /// When it occurred, per ball joint, s.
@@ -140,6 +145,8 @@ impl Statistics {
             impacts: vec![0; joints],
             floored: vec![0; joints],
             coarse: vec![0; joints],
+            late: vec![0.0; joints],
+            astray: vec![None; joints],
             peak_normal: vec![0.0; joints],
             peak_time: vec![0.0; joints],
             last_separation: vec![None; joints],
@@ -154,6 +161,8 @@ impl Statistics {
         self.impacts.len() == joints
             && self.floored.len() == joints
             && self.coarse.len() == joints
+            && self.late.len() == joints
+            && self.astray.len() == joints
             && self.peak_normal.len() == joints
             && self.peak_time.len() == joints
             && self.last_separation.len() == joints

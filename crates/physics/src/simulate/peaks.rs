@@ -13,6 +13,13 @@ pub(super) struct Approach {
     pub speed: f64,
 }
 
+impl Approach {
+    /// Exactly at the wall, and moving into it.
+    pub(super) fn arrives(&self) -> bool {
+        self.penetration == 0.0 && self.rate > 0.0
+    }
+}
+
 /// A quantity at the latest two instants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Recent {

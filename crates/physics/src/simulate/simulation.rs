@@ -30,6 +30,7 @@ use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
 use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, Touching};
 use crate::scene::Scene;
+use adaptive::Whole;
 use automatic::{Choice, controller_of, prepare_implicit};
 use corners::Piece;
 use flights::{clear_flights, put_flights};
@@ -122,6 +123,9 @@ struct Attempt {
     corner: Option<(usize, Piece)>,
     /// Restarted on another piece.
     turned: bool,
+    /// The step that it was before an event cut it, if one did; and that which the next one is to be, beside another run.
+    whole: Option<Whole>,
+    beside: Option<Whole>,
     /// It may hold the largest force of a contact.
     near_peak: bool,
     /// Largest normal force of each joint that was in contact over it, N, and at which fraction of it.
@@ -185,6 +189,9 @@ struct Record {
     contact_steps: Vec<u64>,
     /// Of each ball joint since they were last taken.
     peaks: Vec<Peak>,
+    /// The stop that was pressed deepest at the start, compared with its own depth, if any was deeper: its index, how deep (m or
+    /// rad) and its force (N or N m).
+    starts_inside: Option<(usize, [f64; 2], f64)>,
     /// On which side of singular poses a kinematic scene started.
     determinant_positive: bool,
 }
@@ -227,6 +234,7 @@ impl State {
                 reactions: vec![Recent::default(); joints],
                 contact_steps: vec![0; joints],
                 peaks: vec![Peak::default(); joints],
+                starts_inside: None,
                 determinant_positive: true,
             },
         }
@@ -254,6 +262,7 @@ impl Simulation {
         let reference = Reference::of(&scene, mechanism.has_closed_form());
         let mut simulation = Self::assembled(&scene, mechanism, state, reference);
         simulation.begin_contacts_at_start();
+        simulation.choose_first_member();
         simulation.refresh();
         simulation.state.record.determinant_positive = simulation.mechanism.is_determinant_positive();
         if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
@@ -262,7 +271,18 @@ impl Simulation {
         simulation.track_peaks(0.0);
         simulation.track_reactions();
         simulation.open_account();
+        simulation.state.record.starts_inside = simulation.deepest_in_stop();
         Ok(simulation)
+    }
+
+    /// As [`Record::starts_inside`], of the latest evaluation.
+    fn deepest_in_stop(&self) -> Option<(usize, [f64; 2], f64)> {
+        let reports = self.mechanism.element_reports(self.state.now.t).enumerate();
+        let inside = reports.filter_map(|(i, report)| {
+            let force = report.torque.unwrap_or(report.force).norm();
+            report.depth.filter(|[depth, usual]| depth > usual).map(|depth| (i, depth, force))
+        });
+        inside.max_by(|a, b| (a.1[0] / a.1[1]).total_cmp(&(b.1[0] / b.1[1])))
     }
 
     /// Takes `state` as it is.
@@ -279,6 +299,8 @@ impl Simulation {
                 located: None,
                 corner: None,
                 turned: false,
+                whole: None,
+                beside: None,
                 near_peak: false,
                 strongest: vec![(0.0, 0.0); joints],
                 stiffness: 0.0,
@@ -298,19 +320,6 @@ impl Simulation {
         self.running.solver.method.is_adaptive()
     }
 
-    /// Contacts that exist at the start take the floor as their approach speed: how they began is unknown.
-    fn begin_contacts_at_start(&mut self) {
-        self.mechanism.measure(self.state.now.t, &self.state.now.y);
-        for j in 0..self.state.now.memory.len() {
-            if self.mechanism.contacts.has_clearance(j) && self.mechanism.contacts.gap(j).separation.penetration > 0.0 {
-                let coefficients = self.mechanism.contacts.coefficients(j);
-                self.state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
-                self.state.record.statistics.impacts[j] += 1;
-                self.state.record.statistics.floored[j] += 1;
-            }
-        }
-    }
-
     /// Recomputes derivative and gaps after anything but a step changed the state; discards the previous step.
     fn refresh(&mut self) {
         self.end_flights();
@@ -326,7 +335,8 @@ impl Simulation {
         self.stepper.invalidate();
         // Forces jump here: a parabola across the jump would have a spurious peak.
         state.record.reactions.fill(Recent::default());
-        state.discard_previous_step();
+        self.begin_contacts_at_walls();
+        self.state.discard_previous_step();
     }
 
     /// The scene with every change, including those that wait for a reset.

@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::scene::format_quantity_digits;
+
 /// Why the divergence guard stopped a simulation. The state is the last good one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
-#[error("stopped at t = {time:.6e} s: {fault}; {advice}")]
+#[error("stopped at t = {}: {fault}; {advice}", format_quantity_digits(*time, "s", 7))]
 pub struct Stopped {
     /// Time of the last good state, s.
     pub time: f64,

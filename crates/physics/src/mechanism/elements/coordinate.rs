@@ -137,6 +137,7 @@ impl Coordinate {
                 force: Vec3::zeros(),
                 torque: Some(force),
                 only_turns: true,
+                depth: None,
             };
         }
         let parent = &motion[self.parent.body];

@@ -158,6 +158,8 @@ pub struct ElementReport {
     pub torque: Option<Vec3>,
     /// Whether it is a pair of torques, without any force.
     pub only_turns: bool,
+    /// Of a stop that is touched: how deep, and the depth at which it exerts the force that its scene gives, m or rad.
+    pub depth: Option<[f64; 2]>,
 }
 
 impl ElementReport {

@@ -19,6 +19,8 @@ struct Stop {
     /// From there, m or rad; infinite where there is none.
     lower: f64,
     upper: f64,
+    /// At which it exerts the force given, m or rad.
+    depth: f64,
     /// K, N/m^1.5 or N m/rad^1.5.
     stiffness: f64,
     /// a, s/m or s/rad.
@@ -51,6 +53,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         middle,
         lower: lower - middle,
         upper: upper - middle,
+        depth,
         stiffness: element.number("force") / (depth * depth.sqrt()),
         damping: if chi > 0.0 { chi / element.number("speed") } else { 0.0 },
     })
@@ -112,7 +115,8 @@ impl ForceElement for Stop {
 impl SceneElement for Stop {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let (place, press) = self.at(motion);
-        let force = press.map_or(0.0, |press| -press.side * press.force);
-        self.on.report(&place, force, motion)
+        let force = press.as_ref().map_or(0.0, |press| -press.side * press.force);
+        let depth = press.map(|press| [press.depth, self.depth]);
+        ElementReport { depth, ..self.on.report(&place, force, motion) }
     }
 }

@@ -22,6 +22,15 @@ const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
 const BLOWN_UP: f64 = 100.0;
 
+/// The step that one was before an event cut it.
+#[derive(Clone, Copy)]
+pub(super) struct Whole {
+    /// s.
+    size: f64,
+    /// It was repeated to its end; otherwise it ended on its interpolant.
+    repeated: bool,
+}
+
 /// A gap at one instant of a step, positive where it contradicts the recorded contact state.
 #[derive(Clone, Copy)]
 struct SignedGap {
@@ -81,10 +90,15 @@ impl Simulation {
         let t = self.state.now.t;
         let tolerance = self.running.solver.tolerance;
         let asked = self.state.control.h_next;
+        let beside = self.attempt.beside.take();
+        self.attempt.whole = None;
         let mut h = asked.min(LONGEST_STEP);
         let mut t_end = t + h;
         let cut = t_end >= limit - NEARLY * h;
-        if cut {
+        if let Some(whole) = beside {
+            h = whole.size;
+            t_end = t + h;
+        } else if cut {
             t_end = limit;
             h = limit - t;
         }
@@ -112,6 +126,11 @@ impl Simulation {
         self.finish_gaps(t_end);
         let event = self.first_event(h);
         let corner = self.first_corner(h);
+        // Beside another run it ends where that did, as that, but for an event of its own before.
+        let last = beside.map(|whole| ((limit - t) / h, whole.repeated));
+        let before_last = |theta: f64| last.is_none_or(|(last, _)| theta < last);
+        let event = event.filter(|theta| before_last(*theta));
+        let corner = corner.filter(|corner| before_last(corner.theta));
         self.attempt.corner = None;
         let corner = corner.filter(|corner| event.is_none_or(|theta| corner.theta < theta));
         if let Some(corner) = &corner
@@ -136,15 +155,31 @@ impl Simulation {
             self.attempt.corner = Some((corner.joint, corner.next));
             t_end = t + corner.theta * h;
             self.end_at(corner.theta, t_end, h);
+            self.attempt.whole = Some(Whole { size: h, repeated: false });
             h *= corner.theta;
-        } else if let Some(theta) = event {
+        } else if let Some((last, false)) = last
+            && event.is_none()
+        {
+            self.attempt.located = None;
+            self.end_at(last, limit, h);
+            return Some((limit, limit - t));
+        } else if let Some(theta) = event.or(last.map(|(last, _)| last)) {
+            if event.is_none() {
+                self.attempt.located = None;
+            }
             t_end = t + theta * h;
             if tolerance >= END_ON_INTERPOLANT && self.stepper.ends_on_interpolant() {
                 self.end_at(theta, t_end, h);
+                self.attempt.whole = Some(Whole { size: h, repeated: false });
                 return Some((t_end, h * theta));
             }
             // Repeated, shortened, so that its end carries the method's error and not the interpolant's.
-            h *= theta;
+            self.attempt.whole = Some(Whole { size: h, repeated: true });
+            if event.is_some() {
+                h *= theta;
+            } else {
+                (t_end, h) = (limit, limit - t);
+            }
             if !self.try_step(h).is_finite() {
                 self.state.control.h_next = 0.5 * h;
                 self.state.control.contact_began = contact_began;
@@ -215,7 +250,8 @@ impl Simulation {
         left: SignedGap,
         right: SignedGap,
     ) -> Option<(SignedGap, SignedGap)> {
-        if left.gap < 0.0 && right.gap > 0.0 {
+        // At 0 a piece may end, and the next one begins: the gap opens or closes in the latter.
+        if left.gap <= 0.0 && right.gap > 0.0 {
             return Some((left, right));
         }
         // An extremum inside: a brief contact that both ends miss, or a brief separation.
@@ -231,10 +267,10 @@ impl Simulation {
                 return None;
             }
             let middle = self.signed_gap(j, 0.5 * (a.theta + b.theta), h, sign);
-            if right.gap > 0.0 && middle.gap < 0.0 {
+            if right.gap > 0.0 && middle.gap <= 0.0 {
                 return Some((middle, right));
             }
-            if right.gap <= 0.0 && middle.gap > 0.0 && left.gap < 0.0 {
+            if right.gap <= 0.0 && middle.gap > 0.0 && left.gap <= 0.0 {
                 return Some((left, middle));
             }
             if (middle.rate > 0.0) == (a.rate > 0.0) {

@@ -100,6 +100,23 @@ impl Choice {
 }
 
 impl Simulation {
+    /// Lets the implicit member take the first steps where balls touch from the start, without a law that damps them: explicit
+    /// steps hold their ringing at a multiple of the tolerance, from which the implicit ones would have to follow it.
+    pub(super) fn choose_first_member(&mut self) {
+        let Self { mechanism, running, state, .. } = self;
+        let touching = || state.now.memory.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
+        let undamped = |j| mechanism.contacts.coefficients(j).damping == 0.0;
+        let velocities = state.now.y.len() - mechanism.positions();
+        if running.solver.method == Method::Automatic
+            && velocities <= mechanism.largest_implicit()
+            && touching().next().is_some()
+            && touching().all(undamped)
+            && !mechanism.is_kinematic()
+        {
+            self.put_member(Member::Implicit);
+        }
+    }
+
     /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
     pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
         let before = self.state.control.member;

@@ -2,9 +2,15 @@
 
 use super::search::NEAR_PEAK;
 use super::{Simulation, State};
-use crate::contact::{Coefficients, Memory};
+use crate::contact::{Coefficients, Memory, Separation};
 use crate::scene::least_impact_steps;
 use crate::simulate::peaks::PenetrationCubic;
+
+/// Deepest penetration, as a fraction of the clearance, of a ball that is at its wall but for rounding.
+const AT_WALL: f64 = 1e-9;
+
+/// What pushes a ball whose motion before its contact is not known, m/s^2.
+const UNKNOWN: f64 = f64::MAX;
 
 /// What the end of a step changed in the contact memory.
 #[derive(Clone, Copy)]
@@ -16,6 +22,21 @@ pub(super) struct Switched {
 }
 
 impl State {
+    /// Records that contact `j` begins at `time` with the penetration rate `rate` (m/s), which changed at `push` (m/s^2)
+    /// before, and the restitution `asked`; returns its memory.
+    fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, asked: f64, coefficients: &Coefficients) -> Memory {
+        let among_others = self.now.memory.iter().any(|m| m.active);
+        self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others);
+        let memory = Memory::begun(coefficients, rate);
+        self.record.statistics.impacts[j] += 1;
+        let peak = &mut self.record.peaks[j];
+        peak.impacts += 1;
+        peak.approach_speed = peak.approach_speed.max(rate);
+        self.control.contact_began = true;
+        self.control.h_next = self.control.h_next.min(self.control.h_contact);
+        memory
+    }
+
     /// Records a step of contact `j`, from fraction `from` on, with the largest normal force `force` (N).
     fn follow(
         &mut self,
@@ -36,6 +57,48 @@ impl State {
 }
 
 impl Simulation {
+    /// Contacts that exist at the start take the floor as their approach speed: how they began is unknown. One whose ball is
+    /// at its wall within rounding begins there, at the rate it has.
+    pub(super) fn begin_contacts_at_start(&mut self) {
+        let Self { mechanism, running, state, .. } = self;
+        mechanism.measure(state.now.t, &state.now.y);
+        for (j, joint) in running.ball_joints.iter().enumerate() {
+            if !mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            let Separation { penetration, rate, .. } = mechanism.contacts.gap(j).separation;
+            let coefficients = mechanism.contacts.coefficients(j);
+            if !(penetration > 0.0) {
+                continue;
+            }
+            if penetration <= AT_WALL * joint.contact.clearance && rate > 0.0 {
+                state.now.memory[j] = state.begin(j, 0.0, rate, UNKNOWN, joint.contact.restitution, coefficients);
+            } else {
+                state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
+                state.record.statistics.impacts[j] += 1;
+            }
+        }
+    }
+
+    /// Begins the contacts of balls that are exactly at their walls and move into them: over the next step no sign changes. The
+    /// force is still 0.
+    pub(super) fn begin_contacts_at_walls(&mut self) {
+        let Self { mechanism, running, state, .. } = self;
+        let mut begins = false;
+        for (j, joint) in running.ball_joints.iter().enumerate() {
+            let gap = state.now.gaps[j];
+            if mechanism.contacts.has_clearance(j) && gap.arrives() && !state.now.memory[j].active {
+                let (asked, coefficients) = (joint.contact.restitution, mechanism.contacts.coefficients(j));
+                state.now.memory[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN, asked, coefficients);
+                state.record.contact_steps[j] = 0;
+                begins = true;
+            }
+        }
+        if begins {
+            self.hold_pieces(false);
+        }
+    }
+
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
         let located = self.attempt.located.take();
@@ -58,8 +121,10 @@ impl Simulation {
             // A located switch ends within rounding of the wall, on either side; but the repeated step may show that a ball
             // about to separate turned around before.
             let turned = state.now.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
-            let touching =
-                if located == Some(j) { !state.now.memory[j].active || turned } else { end.penetration > 0.0 };
+            let touching = match located {
+                Some(located) if located == j => !state.now.memory[j].active || turned,
+                _ => end.penetration > 0.0 || end.arrives(),
+            };
             state.record.contact_steps[j] += 1;
             if touching == state.now.memory[j].active {
                 if touching {
@@ -74,14 +139,17 @@ impl Simulation {
             let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
             if touching {
                 let course = PenetrationCubic::new(start, end, h);
-                let crosses = start.penetration < 0.0 && end.penetration > 0.0;
+                let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
                 let theta = if crosses { course.crossing() } else { 1.0 };
                 let rate = if crosses { course.at(theta).1 } else { end.rate };
                 let time = state.before.t + theta * h;
                 let asked = running.ball_joints[j].contact.restitution;
-                let among_others = state.now.memory.iter().any(|m| m.active);
-                state.record.impacts.begin(j, time, rate, asked, coefficients, among_others);
-                let mut memory = Memory::begun(coefficients, rate);
+                let push = (rate - start.rate) / (theta * h);
+                let mut memory = state.begin(j, time, rate, push, asked, coefficients);
+                if !fixed && located != Some(j) && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
+                    let late = &mut state.record.statistics.late[j];
+                    *late = late.max(end.penetration);
+                }
                 // A located contact begins where the step ends.
                 if fixed {
                     memory.rise(coefficients, end.rate, || course.fastest(theta).0);
@@ -89,12 +157,6 @@ impl Simulation {
                     state.follow(j, &course, coefficients, force, &memory, theta);
                 }
                 state.now.memory[j] = memory;
-                state.record.statistics.impacts[j] += 1;
-                state.record.statistics.floored[j] += u64::from(memory.floored);
-                state.record.peaks[j].impacts += 1;
-                state.record.peaks[j].approach_speed = state.record.peaks[j].approach_speed.max(rate);
-                state.control.contact_began = true;
-                state.control.h_next = state.control.h_next.min(state.control.h_contact);
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && located != Some(j) {
@@ -104,7 +166,14 @@ impl Simulation {
                 } else {
                     (state.now.t, end.rate)
                 };
-                state.record.impacts.end(j, time, rate);
+                let statistics = &mut state.record.statistics;
+                statistics.floored[j] += u64::from(state.now.memory[j].floored);
+                if let Some(impact) = state.record.impacts.end(j, time, rate) {
+                    let farthest = statistics.astray[j].map_or(0.0, |impact| impact.astray());
+                    if impact.astray() > farthest {
+                        statistics.astray[j] = Some(impact);
+                    }
+                }
                 let coarse = fixed && steps < least;
                 state.record.statistics.coarse[j] += u64::from(coarse);
                 state.now.memory[j] = Memory::default();

@@ -2,6 +2,7 @@
 
 use super::Simulation;
 use crate::contact::Memory;
+use crate::simulate::Stopped;
 
 impl Simulation {
     /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there: quaternions
@@ -41,6 +42,29 @@ impl Simulation {
         self.state.record.wear = None;
         self.refresh();
         self.book_change();
+    }
+
+    /// Takes the approach speeds that its contacts remember towards those of `other`, a run in the same state but for a little, by
+    /// the fraction `part` of their difference.
+    pub fn remember_like(&mut self, other: &Self, part: f64) {
+        for (own, other) in self.state.now.memory.iter_mut().zip(&other.state.now.memory) {
+            own.approach_speed += part * (other.approach_speed - own.approach_speed);
+        }
+    }
+
+    /// Steps to where `other`, a run in the same state but for a little, is after its latest step: by the same step, which ends as
+    /// that did. One that is cut there errs otherwise, by about the tolerance.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_beside(&mut self, other: &Self) -> Result<(), Stopped> {
+        if self.state.now.t == other.step_start() {
+            self.attempt.beside = other.attempt.whole;
+        }
+        while self.state.now.t < other.state.now.t {
+            self.step_until(other.state.now.t)?;
+        }
+        Ok(())
     }
 
     /// Steps from here on as `other` is about to, in the same state but for a little: with its step size and its member of the

@@ -1,9 +1,9 @@
 //! Reasons to doubt a result: from the scene's settings, and from what happened in the run.
 
 use super::Simulation;
-use crate::contact::settled_penetration;
+use crate::contact::{FrictionVelocity, settled_penetration};
 use crate::integrate::Method;
-use crate::scene::least_impact_steps;
+use crate::scene::{BallJoint, least_impact_steps};
 use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
@@ -16,11 +16,13 @@ const DRIFT_OF_CLEARANCE: f64 = 0.1;
 const DRIFT: f64 = 1e-4;
 /// Damping over elastic force, less that of an undisturbed impact, beyond which a force is an artefact of the law.
 const MOST_DAMPING: f64 = 1.0;
-/// Fraction of the energy exchanged that may be unaccounted for.
+/// By how much the restitution of an undisturbed impact may exceed that of its law.
+const MOST_ASTRAY: f64 = 0.1;
+/// Fraction of the energy by which a residual is judged that may be unaccounted for.
 const RESIDUAL: f64 = 5e-3;
-/// Fraction of each work that may be unaccounted for, and the smallest residual, as a fraction of the energy exchanged, for
-/// which this is checked: a restitution loss may be tiny compared with everything else, and correct although the residual
-/// is as large.
+/// Fraction of each work that may be unaccounted for, and the smallest residual, as a fraction of the energy by which it is judged,
+/// for which this is checked: a restitution loss may be tiny compared with everything else, and correct although the residual is
+/// as large.
 const RESIDUAL_OF_WORK: f64 = 0.1;
 const NOTEWORTHY: f64 = 1e-3;
 /// Fraction of the energies present below which a residual is rounding.
@@ -54,6 +56,13 @@ impl Simulation {
             slow: statistics.floored[j],
             contacts: statistics.impacts[j],
         }));
+        let late = self.worst(0.0, |j| statistics.late[j]);
+        doubts.extend(late.map(|(joints, j)| Doubt::Late { joints, depth: statistics.late[j] }));
+        let rebounds = self.worst(MOST_ASTRAY, |j| statistics.astray[j].map_or(0.0, |impact| impact.astray()));
+        doubts.extend(rebounds.and_then(|(joints, j)| {
+            let impact = statistics.astray[j]?;
+            Some(Doubt::Rebound { joints, time: impact.end, achieved: impact.achieved(), law: impact.law })
+        }));
         let patch = self.worst(LARGEST_PATCH, |j| self.largest_patch(j));
         doubts.extend(patch.map(|(joints, j)| Doubt::Patch { joints, radii: self.largest_patch(j) }));
         let usual = |j: usize| self.mechanism.contacts.coefficients(j).damping;
@@ -63,6 +72,10 @@ impl Simulation {
             time: statistics.damping_time[j],
             ratio: statistics.damping[j],
             usual: usual(j),
+        }));
+        doubts.extend(self.state.record.starts_inside.map(|(i, [depth, usual], force)| {
+            let element = &self.running.elements[i];
+            Doubt::StartsInside { stop: element.name.clone(), turns: element.on_hinge, depth, usual, force }
         }));
         let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).reduce(f64::min);
@@ -77,17 +90,30 @@ impl Simulation {
         doubts
     }
 
-    /// Unaccounted energy, compared with the energy exchanged or, where that is large, with each work.
+    /// Unaccounted energy, compared with what the machine held and lost, or with each work; and losses that are gains.
     fn energy_doubt(&self, ledger: &Ledger) -> Option<Doubt> {
         let residual = ledger.residual();
         let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).fold(DRIFT, f64::min);
         let mass: f64 = self.running.bodies.iter().map(|body| body.mass).sum();
-        let energy = self.state.record.account.energy() + mass * (least / CREEP) * (least / CREEP);
-        if !(residual.abs() > ROUNDING * energy) {
+        let slow = mass * (least / CREEP) * (least / CREEP);
+        let scale = ledger.scale() + slow;
+        let driven = |joint: &BallJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
+        let losses = [
+            (LedgerTerm::Restitution, ledger.restitution_loss),
+            (
+                LedgerTerm::Friction,
+                if self.running.ball_joints.iter().any(driven) { 0.0 } else { ledger.friction_loss },
+            ),
+            (LedgerTerm::Damping, ledger.damping_loss),
+        ];
+        if let Some((work, value)) = losses.into_iter().find(|(_, loss)| *loss < -RESIDUAL * scale) {
+            return Some(Doubt::Gain { work, value });
+        }
+        if !(residual.abs() > ROUNDING * (self.state.record.account.energy() + slow)) {
             return None;
         }
-        let share = residual.abs() / ledger.exchanged;
+        let share = residual.abs() / scale;
         if share > RESIDUAL {
             return Some(Doubt::Energy { residual, share });
         }

@@ -144,8 +144,12 @@ impl Simulation {
         if frame.time >= to {
             return self.ledger().copied();
         }
-        let energies =
-            Energies { kinetic: frame.kinetic, gravitational: frame.potential - frame.elastic, elastic: frame.elastic };
+        let energies = Energies {
+            kinetic: frame.kinetic,
+            gravitational: frame.potential - frame.elastic,
+            elastic: frame.elastic,
+            in_contacts: 0.0,
+        };
         let h = to - from;
         account.on.then(|| account.within((frame.time - from) / h, h, energies))
     }
@@ -159,5 +163,6 @@ fn energies(mechanism: &Mechanism, state: &State) -> Energies {
         .filter(|&j| contacts.has_clearance(j))
         .map(|j| contacts.coefficients(j).elastic_energy(state.now.gaps[j].penetration))
         .sum();
-    Energies { kinetic, gravitational, elastic: in_contacts + mechanism.energy_in_elements(state.now.t) }
+    let elastic = in_contacts + mechanism.energy_in_elements(state.now.t);
+    Energies { kinetic, gravitational, elastic, in_contacts }
 }

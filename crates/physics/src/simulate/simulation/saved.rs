@@ -60,6 +60,7 @@ impl State {
             // Only a window has a hand.
             && self.pull.is_none()
             && record.account.fits()
+            && record.starts_inside.is_none_or(|(element, ..)| element < simulation.running.elements.len())
             && record.impacts.fits(joints)
             && record.statistics.fits(joints)
             && worn.is_none_or(|wear| wear.fits(&simulation.running))
