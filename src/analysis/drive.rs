@@ -131,6 +131,10 @@ impl Orbit for Machine {
         Ok(self.simulation.step_until(end)?)
     }
 
+    fn step_beside(&mut self, other: &Self) -> Result<(), MachineError> {
+        Ok(self.simulation.step_beside(&other.simulation)?)
+    }
+
     fn state(&self) -> &[f64] {
         self.simulation.state()
     }
@@ -145,6 +149,10 @@ impl Orbit for Machine {
 
     fn displace(&mut self, offset: &[f64]) {
         self.simulation.displace(offset);
+    }
+
+    fn remember_like(&mut self, other: &Self, part: f64) {
+        self.simulation.remember_like(&other.simulation, part);
     }
 
     fn step_like(&mut self, other: &Self) {

@@ -1,23 +1,20 @@
 //! Largest Lyapunov exponent from two nearby runs with renormalisation.
 //!
 //! Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338. The twin starts at a small separation d0 and is rescaled to
-//! it whenever the separation has grown or shrunk by more than a given factor; the exponent is the sum of the logarithms
-//! of these factors divided by the time.
+//! it at every section, and between two of them whenever the separation has grown or shrunk by more than a given factor; the
+//! exponent is the sum of the logarithms of these factors divided by the time. The twin takes the steps of the run, so that the two
+//! differ by their motion, and not by the errors of different steps.
 
 use super::orbit::Orbit;
 
-/// The twin is rescaled once its separation has changed by more than this factor.
-const RENORMALISE_AT: f64 = 4.0;
-/// If a comparison finds a larger change than this, it came late: the interval to the next one is halved.
-const LATE_AT: f64 = 16.0;
-/// Time between comparisons over the section interval: the longest, which is also the initial one, and the shortest;
-/// powers of two.
-const FEWEST: f64 = 1.0 / 16.0;
-const MOST: f64 = 1.0 / 65536.0;
-/// A separation this many times the nominal one is renormalised even if the two runs differ in their contacts.
-const FAR: f64 = 1e3;
+/// Between sections the twin is rescaled once its separation has changed by more than this factor.
+const RENORMALISE_AT: f64 = 100.0;
+/// Beyond this multiple of the nominal separation growth is no longer that of a small one.
+const LOST_AT: f64 = 1e5;
 /// A separation lost in rounding counts as this fraction of the nominal one.
 const VANISHED: f64 = 1e-9;
+/// Sections that a twin placed anew runs before its growth counts, so that its offset aligns with the fastest-growing direction.
+pub const ALIGNMENT: usize = 5;
 /// Blocks for the standard error.
 const BLOCKS: usize = 10;
 
@@ -34,147 +31,127 @@ pub struct Exponent {
 }
 
 /// Separation of the twin and its history.
+///
+/// What a small separation grows by says something only where both runs are in the same contacts: while one ball touches and its
+/// twin's does not yet, the difference of their velocities is that before and after an impact, whatever the separation. So growth
+/// is taken, and the twin rescaled, only where [`Orbit::comparable`] holds. A section that ends between two such events is counted
+/// with the next. A twin that is lost meanwhile is placed anew, and what had grown since the latest section counts for nothing.
 #[derive(Clone, Debug)]
 pub struct Benettin {
     separation: f64,
     interval: f64,
-    check: f64,
-    next: f64,
-    /// Separation after the latest renormalisation, and at the latest comparison.
+    /// Separation after the latest renormalisation.
     from: f64,
-    latest: f64,
-    /// Sum of the logarithms since counting began, without that of `latest` over `from`.
-    sum: f64,
+    /// Logarithm of the growth since the latest section that counted, and how many sections that is.
+    grown: f64,
+    open: usize,
+    /// Sections before growth counts again.
+    aligning: usize,
     counting: bool,
-    /// ln of the growth from the start of counting to the end of each section.
-    at_sections: Vec<f64>,
-    /// To be subtracted: `ln(latest / from)` at the start of counting.
-    offset: f64,
+    /// Growth and number of sections of each interval between sections that counted.
+    parts: Vec<(f64, usize)>,
+    /// Separation of the twin, and its direction when it was last comparable.
     difference: Vec<f64>,
 }
 
 impl Benettin {
-    /// For a twin at `separation` (in units of the scales), with at most `sections` sections at every `interval`,
-    /// starting at time `now`.
-    pub fn new(separation: f64, interval: f64, now: f64, sections: usize) -> Self {
-        let check = interval * FEWEST;
+    /// For a twin at `separation` (in units of the scales), with at most `sections` sections at every `interval`.
+    pub fn new(separation: f64, interval: f64, sections: usize) -> Self {
         Self {
             separation,
             interval,
-            check,
-            next: now + check,
             from: separation,
-            latest: separation,
-            sum: 0.0,
+            grown: 0.0,
+            open: 0,
+            aligning: 0,
             counting: false,
-            at_sections: Vec::with_capacity(sections),
-            offset: 0.0,
+            parts: Vec::with_capacity(sections),
             difference: Vec::new(),
         }
     }
 
-    /// Displaces a new twin.
+    /// Displaces a new twin in a generic direction.
     pub fn start<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
-        self.push_away(orbit, twin);
-        self.from = distance(orbit, twin);
-        self.latest = self.from;
+        self.difference.clear();
+        self.difference.extend(offset(orbit.scales(), self.separation));
+        self.place(orbit, twin);
     }
 
     /// Starts accumulating growth.
     pub fn begin_counting(&mut self) {
         self.counting = true;
-        self.sum = 0.0;
-        self.offset = ln_ratio(self.latest, self.from);
-        self.at_sections.clear();
+        self.parts.clear();
     }
 
-    /// Whether the twin is due for comparison at `time`.
-    pub fn is_due(&self, time: f64) -> bool {
-        time >= self.next
-    }
-
-    /// Advances the twin to the orbit's time and measures the separation.
+    /// Advances the twin to the orbit's time, after a step of the orbit, and measures the separation.
     ///
     /// # Errors
     /// The twin cannot continue.
-    pub fn compare<O: Orbit>(&mut self, orbit: &O, twin: &mut O) -> Result<(), O::Stop> {
-        let now = orbit.time();
-        while twin.time() < now {
-            twin.step_until(now)?;
-        }
-        if orbit.comparable(twin) {
-            twin.step_like(orbit);
-        }
-        let before = self.latest;
-        self.latest = distance(orbit, twin);
-        if !self.latest.is_finite() || self.latest < VANISHED * self.separation {
-            self.latest = VANISHED * self.separation;
-            self.sum += ln_ratio(self.latest, self.from);
-            self.push_away(orbit, twin);
-            self.from = distance(orbit, twin);
-            self.latest = self.from;
-            self.next = now + self.check;
+    pub fn follow<O: Orbit>(&mut self, orbit: &O, twin: &mut O, at_section: bool) -> Result<(), O::Stop> {
+        twin.step_beside(orbit)?;
+        self.open += usize::from(at_section);
+        let off = distance(orbit, twin) / self.separation;
+        if !orbit.comparable(twin) {
+            if at_section && !(off < LOST_AT) {
+                *twin = orbit.twin();
+                self.place(orbit, twin);
+                self.aligning = ALIGNMENT;
+            }
             return Ok(());
         }
-        let change = self.latest / before;
-        if change > LATE_AT || change * LATE_AT < 1.0 {
-            self.check = (0.5 * self.check).max(self.interval * MOST);
-        } else if change < RENORMALISE_AT && change * RENORMALISE_AT > 1.0 {
-            self.check = (2.0 * self.check).min(self.interval * FEWEST);
+        twin.step_like(orbit);
+        if at_section || !(off < RENORMALISE_AT && off * RENORMALISE_AT > 1.0) {
+            self.renormalise(orbit, twin, off);
         }
-        self.next = now + self.check;
-        let off = self.latest / self.separation;
-        if off < RENORMALISE_AT && off * RENORMALISE_AT > 1.0 {
-            return Ok(());
+        if at_section {
+            if self.aligning > 0 {
+                self.aligning -= 1;
+            } else if self.counting {
+                self.parts.push((self.grown, self.open));
+            }
+            (self.grown, self.open) = (0.0, 0);
         }
-        if !orbit.comparable(twin) && off < FAR {
-            // After the orbit's next step both may be in contact.
-            self.next = now;
-            return Ok(());
-        }
-        self.difference.clear();
-        // twin + (1 - f) (orbit - twin) = orbit + f (twin - orbit)
-        let part = 1.0 - self.separation / self.latest;
-        let pairs = orbit.state().iter().zip(twin.state());
-        self.difference.extend(pairs.map(|(a, b)| part * (a - b)));
-        self.sum += ln_ratio(self.latest, self.from);
-        twin.displace(&self.difference);
-        // The requested and the actual separation differ because loops are closed again.
-        self.from = distance(orbit, twin).max(VANISHED * self.separation);
-        self.latest = self.from;
         Ok(())
     }
 
-    /// Records a section, at which the twin has been compared.
-    pub fn end_section(&mut self) {
-        if self.counting {
-            let growth = self.sum + ln_ratio(self.latest, self.from) - self.offset;
-            self.at_sections.push(growth);
+    /// Counts growth to `off` times the nominal separation, and takes the twin back to that.
+    fn renormalise<O: Orbit>(&mut self, orbit: &O, twin: &mut O, off: f64) {
+        let reached = self.separation * if off.is_finite() { off.max(VANISHED) } else { VANISHED };
+        self.grown += libm::log(reached / self.from);
+        if off > VANISHED && off.is_finite() {
+            self.difference.clear();
+            let pairs = orbit.state().iter().zip(twin.state());
+            self.difference.extend(pairs.map(|(a, b)| (b - a) / off));
+            // What a settled contact remembers of its beginning matters no more, and does not fade: it is not made to grow.
+            twin.remember_like(orbit, (1.0 - 1.0 / off).max(0.0));
         }
+        self.place(orbit, twin);
     }
 
-    /// The exponent so far; `None` before the first counted section.
-    pub fn result(&self) -> Option<Exponent> {
-        let n = self.at_sections.len();
-        let last = *self.at_sections.last()?;
-        let running = self.at_sections.iter().enumerate();
-        Some(Exponent {
-            value: last / (n as f64 * self.interval),
-            standard_error: standard_error(&self.at_sections) / self.interval,
-            running: running.map(|(k, growth)| growth / ((k + 1) as f64 * self.interval)).collect(),
-        })
-    }
-
-    /// Displaces the twin from the orbit in a generic direction.
-    fn push_away<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
-        let scales = orbit.scales();
-        self.difference.clear();
-        self.difference.extend(offset(scales, self.separation));
+    /// Takes the twin to the orbit's state displaced by `difference`.
+    fn place<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         let states = orbit.state().iter().zip(twin.state());
-        for (d, (a, b)) in self.difference.iter_mut().zip(states) {
-            *d += a - b;
-        }
-        twin.displace(&self.difference);
+        let away: Vec<f64> = self.difference.iter().zip(states).map(|(d, (a, b))| d + (a - b)).collect();
+        twin.displace(&away);
+        // The requested and the actual separation differ because loops are closed again.
+        self.from = distance(orbit, twin).max(VANISHED * self.separation);
+        (self.grown, self.open) = if self.aligning > 0 { (0.0, 0) } else { (self.grown, self.open) };
+    }
+
+    /// The exponent so far; `None` before the first section that counts.
+    pub fn result(&self) -> Option<Exponent> {
+        let (mut growth, mut sections) = (0.0, 0);
+        let running: Vec<f64> = self
+            .parts
+            .iter()
+            .map(|(grown, open)| {
+                growth += grown;
+                sections += open;
+                growth / (sections as f64 * self.interval)
+            })
+            .collect();
+        let value = *running.last()?;
+        Some(Exponent { value, standard_error: standard_error(&self.parts) / self.interval, running })
     }
 }
 
@@ -204,21 +181,17 @@ pub fn scaled_distance(a: &[f64], b: &[f64], scales: &[f64]) -> f64 {
     square.sqrt()
 }
 
-fn ln_ratio(a: f64, b: f64) -> f64 {
-    libm::log(a / b)
-}
-
 /// Standard error of the mean growth per section, from block means: neighbouring sections are not independent.
-fn standard_error(cumulative: &[f64]) -> f64 {
-    let blocks = cumulative.len().min(BLOCKS);
+fn standard_error(parts: &[(f64, usize)]) -> f64 {
+    let blocks = parts.len().min(BLOCKS);
     if blocks < 2 {
         return f64::INFINITY;
     }
-    let at = |n: usize| if n == 0 { 0.0 } else { cumulative[n - 1] };
-    let edge = |b: usize| b * cumulative.len() / blocks;
+    let edge = |b: usize| b * parts.len() / blocks;
     let rate = |b: usize| {
-        let (from, to) = (edge(b), edge(b + 1));
-        (at(to) - at(from)) / (to - from) as f64
+        let part = &parts[edge(b)..edge(b + 1)];
+        let sections: usize = part.iter().map(|(_, sections)| sections).sum();
+        part.iter().map(|(grown, _)| grown).sum::<f64>() / sections as f64
     };
     let count = blocks as f64;
     let mean = (0..blocks).map(rate).sum::<f64>() / count;

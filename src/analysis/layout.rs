@@ -50,7 +50,7 @@ pub struct Layout {
 /// An array with one value per point: its name, whether it is an integer, and how to read it from a result.
 type OfPoint = (&'static str, bool, fn(&PointResult, Status) -> f64);
 
-const POINT: [OfPoint; 10] = [
+const POINT: [OfPoint; 12] = [
     ("status", true, |_, status| status.code() as f64),
     ("stopped_at_s", false, |r, _| r.stopped.unwrap_or(f64::NAN)),
     // A point that did not reach its end has no regime: code -1.
@@ -65,6 +65,8 @@ const POINT: [OfPoint; 10] = [
     ("exponent_per_s", false, |r, _| exponent(r, |e| e.value)),
     ("exponent_standard_error_per_s", false, |r, _| exponent(r, |e| e.standard_error)),
     ("exponent_bound_per_s", false, |r, status| known(status, r.evidence.exponent_bound)),
+    ("doubts", true, |r, _| f64::from(r.doubts)),
+    ("energy_residual", false, |r, _| r.residual),
 ];
 
 /// The same per ball joint, prefixed with the joint's name.

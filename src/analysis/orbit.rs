@@ -17,6 +17,17 @@ pub trait Orbit: Sized {
     /// The system cannot continue; its state is then unchanged.
     fn step_until(&mut self, end: f64) -> Result<(), Self::Stop>;
 
+    /// Steps until the time of `other`, whose twin it is, by steps like its latest.
+    ///
+    /// # Errors
+    /// As [`Self::step_until`].
+    fn step_beside(&mut self, other: &Self) -> Result<(), Self::Stop> {
+        while self.time() < other.time() {
+            self.step_until(other.time())?;
+        }
+        Ok(())
+    }
+
     /// The continuous part of the state: coordinates and velocities.
     fn state(&self) -> &[f64];
 
@@ -28,6 +39,9 @@ pub trait Orbit: Sized {
 
     /// Adds `offset` to the state.
     fn displace(&mut self, offset: &[f64]);
+
+    /// Takes what it remembers besides its state towards what `other` does, by the fraction `part` of their difference.
+    fn remember_like(&mut self, _other: &Self, _part: f64) {}
 
     /// Whether the two states differ in continuous variables alone: while only one of them is in contact, a small
     /// difference is about to jump.

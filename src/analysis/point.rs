@@ -9,12 +9,13 @@ use crate::simulate::{Effect, Peak};
 
 /// Largest number of samples per period for the means and the probe error.
 const SAMPLES: f64 = 400.0;
-/// Twin separation over the tolerance: well above the difference between two runs due to their steps alone.
-const OVER_TOLERANCE: f64 = 10.0;
-/// Above this tolerance the twin separation is no longer well above the error of a step.
-pub const LOOSEST_FOR_EXPONENT: f64 = SEPARATIONS.1 / OVER_TOLERANCE;
-/// Range of the separation, in units of the scales of the tolerance: 10 nm to 1 um in every built-in scene.
-const SEPARATIONS: (f64, f64) = (1e-6, 1e-4);
+/// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: at a tolerance of 1e-6 10 nm
+/// in a machine with balls of 10 mm. So small that the two part only where one grazes, and well above what two runs differ by that
+/// take the same steps: the last iteration of an implicit step.
+const OVER_TOLERANCE: f64 = 1.0;
+const SEPARATIONS: (f64, f64) = (1e-6, 1e-5);
+/// Loosest tolerance at which a run keeps so near the motion of its scene that they have the same exponent.
+pub const LOOSEST_FOR_EXPONENT: f64 = 1e-5;
 /// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and
 /// a stiff contact turns coordinate errors into larger rate errors.
 const RESOLUTION: [f64; 2] = [10.0, 100.0];
@@ -65,6 +66,10 @@ pub struct PointResult {
     pub regime: Regime,
     /// Evidence for the regime.
     pub evidence: Evidence,
+    /// Reasons not to trust it: bit k for one of the kind k of [`crate::simulate::Doubt::KINDS`].
+    pub doubts: u32,
+    /// Unaccounted energy over what the machine held and lost, since the run's start; NaN without a ledger.
+    pub residual: f64,
     /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
     pub sections: Vec<f64>,
 }
@@ -202,6 +207,8 @@ impl PointRun {
     pub fn finish(mut self) -> (PointResult, Machine) {
         let simulation = self.watch.orbit_mut().simulation_mut();
         simulation.take_peaks(&mut self.peaks);
+        let doubts = simulation.doubts().iter().fold(0, |bits, doubt| bits | 1 << doubt.kind());
+        let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.residual() / ledger.scale());
         let statistics = simulation.statistics();
         let span = self.means.span;
         let joints = (0..self.peaks.len())
@@ -221,7 +228,7 @@ impl PointRun {
         let exponent = self.watch.exponent().and_then(|benettin| benettin.result());
         let sections = self.watch.sections().to_vec();
         let (regime, evidence) = classify(&sections, &self.resolution, self.period, exponent);
-        let result = PointResult { stopped: None, joints, probe, regime, evidence, sections };
+        let result = PointResult { stopped: None, joints, probe, regime, evidence, doubts, residual, sections };
         (result, self.watch.into_orbit())
     }
 
@@ -239,15 +246,16 @@ impl PointResult {
     pub fn empty(joints: usize) -> Self {
         let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
         let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
-        Self { stopped: None, joints: vec![unknown; joints], probe: None, regime, evidence, sections: Vec::new() }
+        let (doubts, residual) = (0, f64::NAN);
+        let joints = vec![unknown; joints];
+        Self { stopped: None, joints, probe: None, regime, evidence, doubts, residual, sections: Vec::new() }
     }
 }
 
 /// Smallest differences that distinguish two sections of `scene`, in the order of [`OBSERVABLES`]: the tolerance times
 /// its scales and a factor.
 pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
-    let radii = scene.ball_joints.iter().map(|j| j.contact.ball_radius);
-    let length = radii.fold(1.0, f64::min);
+    let length = scene.length_scale();
     let of_group = [length, 0.1, length / 0.1, 1.0];
     (0..OBSERVABLES.len()).map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3]).collect()
 }

@@ -1,8 +1,8 @@
 //! Classification of a motion from its sections, with the evidence.
 //!
-//! In this order: sections that return to themselves within the resolution are periodic, whatever happens below it;
-//! otherwise an exponent clearly above 0 is chaos, one clearly below 0 an unfinished transient, and one indistinguishable
-//! from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still converge to a cycle. Anything
+//! In this order: sections that return to themselves within the resolution are periodic, unless an exponent clearly above 0
+//! contradicts them, which makes them unclear; otherwise an exponent clearly above 0 is chaos, one clearly below 0 a cycle if the
+//! sections stay near one, else an unfinished transient, and one indistinguishable from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still converge to a cycle. Anything
 //! else is unclear.
 
 use super::exponent::Exponent;
@@ -100,6 +100,11 @@ pub struct Evidence {
 pub const FEWEST: usize = 8;
 /// At least this many sections are examined, if there are that many.
 const LOOKED_AT: usize = 32;
+/// Resolutions within which sections repeat that attract one another for all the errors of their steps.
+const NEARBY: f64 = 100.0;
+/// How often such a cycle must be seen, and how far its places may move, as a fraction of their extent: errors come and go.
+const SEEN: usize = 8;
+const DRIFT: f64 = 0.3;
 /// A period must be seen this many times.
 const RETURNS: usize = 3;
 /// Sections whose spread falls below this fraction of their earlier spread are converging to a cycle.
@@ -128,6 +133,15 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
     let regime = match judge(period, &evidence) {
         // Close to a bifurcation a cycle attracts so weakly that its exponent is indistinguishable from 0.
         Regime::QuasiPeriodic if still_closing(used, resolution) => Regime::NotSettled,
+        // Errors of the steps keep a cycle that attracts from returning within the resolution, but not from staying near.
+        Regime::NotSettled if !still_closing(used, resolution) => {
+            let stays = |n: &usize| {
+                let spread = spread(used, *n, resolution);
+                spread <= NEARBY && drift(used, *n, resolution) <= DRIFT * spread
+            };
+            let near = (1..=used.len() / SEEN).find(stays);
+            near.map_or(Regime::NotSettled, Regime::Periodic)
+        }
         regime => regime,
     };
     (regime, evidence)
@@ -148,10 +162,13 @@ fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
     if evidence.sections < FEWEST {
         return Regime::Unclear;
     }
-    if let Some(n) = period {
-        return Regime::Periodic(n);
-    }
     let regular = evidence.zero_one < 0.5;
+    let diverges = |e: &Exponent| e.value - 2.0 * e.standard_error > evidence.exponent_bound;
+    if let Some(n) = period {
+        // Sections say that it repeats, and the twin that it could not: one of them is wrong.
+        let contradicted = evidence.exponent.as_ref().is_some_and(diverges);
+        return if contradicted { Regime::Unclear } else { Regime::Periodic(n) };
+    }
     let Some(exponent) = &evidence.exponent else {
         return match evidence.zero_one {
             k if k > CHAOS => Regime::Chaotic,
@@ -160,7 +177,7 @@ fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
         };
     };
     let (bound, doubt) = (evidence.exponent_bound, 2.0 * exponent.standard_error);
-    if exponent.value - doubt > bound {
+    if diverges(exponent) {
         Regime::Chaotic
     } else if exponent.value + doubt < -bound {
         Regime::NotSettled
@@ -182,6 +199,21 @@ fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
                 high = high.max(section[i]);
             }
             largest = largest.max((high - low) / resolution);
+        }
+    }
+    largest
+}
+
+/// How far the sections that would coincide if the motion repeated after `n` move from their first half to their second, in
+/// resolutions.
+fn drift(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
+    let mut largest: f64 = 0.0;
+    for first in 0..n.min(sections.len()) {
+        let places: Vec<&&[f64]> = sections[first..].iter().step_by(n).collect();
+        let (before, after) = places.split_at(places.len() / 2);
+        for (i, resolution) in resolution.iter().enumerate() {
+            let mean = |half: &[&&[f64]]| half.iter().map(|section| section[i]).sum::<f64>() / half.len() as f64;
+            largest = largest.max((mean(after) - mean(before)).abs() / resolution);
         }
     }
     largest

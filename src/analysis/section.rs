@@ -1,7 +1,7 @@
 //! A motion sampled at equal intervals of time, the Poincaré section of a driven system, with a twin run beside it that
 //! measures how fast neighbouring motions diverge.
 
-use super::exponent::Benettin;
+use super::exponent::{ALIGNMENT, Benettin};
 use super::orbit::Orbit;
 
 /// When sections are taken, and from which one on they are kept.
@@ -28,9 +28,6 @@ impl Schedule {
         self.sections - self.discard
     }
 }
-
-/// Sections for which the twin runs before growth counts, so that its offset aligns with the fastest-growing direction.
-const ALIGNMENT: usize = 5;
 
 /// A motion being run through its sections.
 pub struct SectionRun<O: Orbit> {
@@ -139,8 +136,7 @@ impl<O: Orbit> SectionRun<O> {
         let start = self.schedule.discard.saturating_sub(ALIGNMENT);
         if self.taken == start {
             let mut twin = self.orbit.twin();
-            let mut benettin =
-                Benettin::new(separation, self.schedule.interval, self.orbit.time(), self.schedule.kept());
+            let mut benettin = Benettin::new(separation, self.schedule.interval, self.schedule.kept());
             benettin.start(&self.orbit, &mut twin);
             self.twin = Twin::Running(Box::new(twin), Box::new(benettin));
         }
@@ -151,21 +147,14 @@ impl<O: Orbit> SectionRun<O> {
         }
     }
 
-    /// Advances the twin to the time of the motion if it is due. The motion itself never waits for its twin.
+    /// Advances the twin to the time of the motion. The motion itself never waits for its twin.
     fn follow(&mut self, at_section: bool) {
-        let Twin::Running(twin, benettin) = &mut self.twin else {
-            return;
-        };
-        if at_section || benettin.is_due(self.orbit.time()) {
-            match benettin.compare(&self.orbit, twin) {
-                Ok(()) if at_section => benettin.end_section(),
-                Ok(()) => {}
-                // A failing twin costs the motion its exponent, not its sections.
-                Err(_) => {
-                    self.twin = Twin::None;
-                    self.separation = None;
-                }
-            }
+        if let Twin::Running(twin, benettin) = &mut self.twin
+            && benettin.follow(&self.orbit, twin, at_section).is_err()
+        {
+            // A failing twin costs the motion its exponent, not its sections.
+            self.twin = Twin::None;
+            self.separation = None;
         }
     }
 }

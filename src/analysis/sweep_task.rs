@@ -92,6 +92,8 @@ pub struct SweptPoint {
     pub peak: Option<f64>,
     /// Largest and root-mean-square error of the probe over the kept periods, m.
     pub probe: Option<(f64, f64)>,
+    /// Reasons not to trust it: bit k for one of the kind k of [`crate::simulate::Doubt::KINDS`].
+    pub doubts: u32,
 }
 
 /// Messages of a running sweep.
@@ -229,6 +231,7 @@ impl<'a> Block<'a> {
             sections: Vec::new(),
             peak: None,
             probe: None,
+            doubts: 0,
         };
         let indices = self.sweep.grid().indices(*index).into_iter();
         let axes = self.sweep.grid().axes().iter().zip(indices);
@@ -260,6 +263,7 @@ fn tell_result(point: &mut SweptPoint, result: &PointResult) {
     let peaks = result.joints.iter().map(|joint| joint.peak_kept);
     point.peak = finite(peaks.fold(f64::NEG_INFINITY, f64::max));
     point.probe = result.probe;
+    point.doubts = result.doubts;
 }
 
 #[cfg(test)]

@@ -592,9 +592,9 @@ fn a_full_disk_is_told_in_one_line_and_leaves_nothing() {
     let run = "run spcmm --duration 20ms --every 50us --quiet --out";
     let sweep =
         "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:2 --periods 2 --discard 0 --no-exponent --quiet --out";
-    for (line, out) in [(run, "a.csv"), (run, "a.json"), (run, "a.npz"), (sweep, "b.npz")] {
+    for (line, out, blocks) in [(run, "a.csv", 16), (run, "a.json", 16), (run, "a.npz", 16), (sweep, "b.npz", 40)] {
         let program = env!("CARGO_BIN_EXE_jointplay");
-        let full = format!("trap '' XFSZ; ulimit -f 16; exec {program} {line} {out}");
+        let full = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {line} {out}");
         let mut shell = Command::new("sh");
         let output = shell.args(["-c", &full]).current_dir(folder.path());
         let output = output.output().unwrap();

@@ -1,6 +1,6 @@
 //! A state moved by hand, and what twin runs of a mechanism tell.
 
-use crate::common::{Changes, frame_now, run_until, scene, simulation};
+use crate::common::{Changes, frame_now, parse, run_until, scene, simulation};
 use jointplay::analysis::drive::{drive_period, observed};
 use jointplay::analysis::point::{Plan, PointResult, PointRun};
 use jointplay::analysis::regime::Regime;
@@ -153,4 +153,86 @@ fn drives_tell_their_common_period() {
     for without in ["pendulum", "chain", "slider-crank"] {
         assert!(drive_period(&scene(without, &[])).is_err(), "{without}");
     }
+}
+
+/// The exponent of a scene over so many periods, the first ones discarded.
+fn exponent_of(scene: &jointplay::scene::Scene, periods: usize, discard: usize) -> PointResult {
+    let period = drive_period(scene).expect("a drive");
+    let plan = Plan { periods, discard, phase: 0.0, exponent: true };
+    let mut run = PointRun::cold(scene, plan, period).expect("starts");
+    while !run.is_done() {
+        run.step().expect("runs");
+    }
+    run.finish().0
+}
+
+/// A scene whose motion repeats has no exponent above 0, whatever steps its method takes: single periods once gave +165 1/s.
+#[test]
+fn a_motion_that_repeats_has_no_positive_exponent() {
+    for method in ["automatic", "dopri5", "radau5"] {
+        let changes = [("parameter.speed", "22.6271186440678 rad/s"), ("solver.method", method)];
+        let result = exponent_of(&scene("four-bar", &changes), 30, 20);
+        assert_eq!(result.regime, Regime::Periodic(1), "{method}");
+        let value = result.evidence.exponent.expect("a twin").value;
+        assert!(value < 0.2, "{method}: {value}");
+    }
+}
+
+/// Exponents that independent computations give (SciPy DOP853 at 1e-12 with located contacts, eight neighbours): of a mass between
+/// two stops on a shaken carriage, and of the frictionless slider-crank of Flores & Ambrosio (2004) with 0.5 mm of play.
+#[test]
+fn exponents_are_those_of_independent_computations() {
+    let shaken = |rate: &str| {
+        let text = format!(
+            r#"
+            [gravity]
+            z = 0
+            [[body]]
+            name = "carriage"
+            mass = "1 kg"
+            inertia = "1e-3 1e-3 1e-3 kg m^2"
+            [[joint]]
+            name = "carriage"
+            kind = "prismatic"
+            child = "carriage"
+            axis = [1, 0, 0]
+            drive = {{ law = "harmonic", amplitude = "10 mm", frequency = "{rate} Hz" }}
+            [[body]]
+            name = "mass"
+            mass = "0.5 kg"
+            inertia = "1e-3 1e-3 1e-3 kg m^2"
+            [[joint]]
+            name = "mass"
+            kind = "prismatic"
+            parent = "carriage"
+            child = "mass"
+            axis = [1, 0, 0]
+            start = {{ position = "0.3 mm" }}
+            [[joint_spring]]
+            name = "spring"
+            joint = "mass"
+            stiffness = "200 N/m"
+            damping = "0.5 N s/m"
+            [[stop]]
+            name = "stop"
+            joint = "mass"
+            lower = "-3 mm"
+            upper = "2 mm"
+            force = "100 N"
+            depth = "0.2 mm"
+            restitution = 0.7
+            speed = "0.3 m/s"
+            "#
+        );
+        parse(&text, &[("solver.tolerance", "1e-8")])
+    };
+    let value = |result: &PointResult| result.evidence.exponent.as_ref().expect("a twin").value;
+    for (rate, right, doubt) in [("4.2", 2.30, 0.4), ("5.4", 3.20, 0.4), ("5.8", 2.83, 0.4)] {
+        let result = exponent_of(&shaken(rate), 600, 100);
+        assert_eq!(result.regime, Regime::Chaotic, "{rate} Hz");
+        assert!((value(&result) - right).abs() < doubt, "{rate} Hz: {}", value(&result));
+    }
+    let result = exponent_of(&shaken("10"), 160, 60);
+    assert_eq!(result.regime, Regime::Periodic(2));
+    assert!((value(&result) + 12.51).abs() < 2.0, "{}", value(&result));
 }

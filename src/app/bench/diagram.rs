@@ -11,6 +11,7 @@ use crate::analysis::regime::Regime;
 use crate::analysis::sweep_task::SweptPoint;
 use crate::app::{theme, value};
 use crate::scene::{table, to_display};
+use crate::simulate::Doubt;
 
 const HEIGHT: f32 = 230.0;
 /// How near a click must come to a point, points.
@@ -68,6 +69,8 @@ pub struct Diagram {
     made: Option<(Ordinate, Coordinate)>,
     marks: [Vec<PlotPoint>; REGIMES.len()],
     all: Vec<Mark>,
+    /// Of points that are not to be trusted.
+    doubtful: Vec<PlotPoint>,
     diverged: Vec<f64>,
     transform: Option<PlotTransform>,
     /// Where it was last drawn, points of the screen, and what share of that was in sight.
@@ -125,6 +128,7 @@ impl Diagram {
         );
         let dark = ui.visuals().dark_mode;
         let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);
+        let warn = ui.visuals().warn_fg_color;
         let (from, to) = (shown(swept.range.from), shown(swept.range.to));
         let margin = if to > from { 0.03 * (to - from) } else { 0.5 * from.abs().max(1e-3) };
         let picked = self.picked;
@@ -143,6 +147,8 @@ impl Diagram {
                 let points = Points::new(regime.word(), PlotPoints::Borrowed(marks));
                 plot.points(points.color(theme::series(*colour, dark)).radius(1.8));
             }
+            let rings = Points::new("doubtful", PlotPoints::Borrowed(&self.doubtful));
+            plot.points(rings.color(warn).filled(false).radius(3.5));
             if let Some(now) = now {
                 let ring = Points::new("loaded", PlotPoints::Owned(vec![now]));
                 plot.points(ring.color(faint).filled(false).radius(6.0));
@@ -202,6 +208,16 @@ impl Diagram {
         let help = "Values at which the divergence guard stopped the run, or that could not start";
         let bad = ui.visuals().error_fg_color;
         entries.push((self.diverged.len(), "diverged", bad, help));
+        let doubtful = swept.points.iter().flatten().filter(|point| point.doubts != 0);
+        let kinds = doubtful.clone().fold(0, |kinds, point| kinds | point.doubts);
+        let of_kind = Doubt::KINDS.iter().enumerate().filter(|(k, _)| kinds >> k & 1 == 1).map(|(_, kind)| *kind);
+        let help = format!(
+            "Values whose runs say why they are not to be trusted, ringed above{}{}",
+            if kinds == 0 { "" } else { ": " },
+            of_kind.collect::<Vec<_>>().join(", ")
+        );
+        let warn = ui.visuals().warn_fg_color;
+        entries.push((doubtful.count(), "doubtful", warn, &help));
         ui.scope(|ui| {
             // No controls: they need no height for fingers.
             ui.spacing_mut().interact_size.y = 0.0;
@@ -221,6 +237,7 @@ impl Diagram {
     fn make(&mut self, swept: &Swept, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
         self.marks.iter_mut().for_each(Vec::clear);
         self.all.clear();
+        self.doubtful.clear();
         self.diverged.clear();
         for point in swept.points.iter().flatten() {
             let Some(value) = point.values.first().map(|&si| shown(si)) else {
@@ -235,6 +252,9 @@ impl Diagram {
             let mut add = |up: f64, section| {
                 let at = PlotPoint::new(value, up);
                 self.marks[place].push(at);
+                if point.doubts != 0 {
+                    self.doubtful.push(at);
+                }
                 self.all.push((at, point.index, section));
             };
             match self.ordinate {

@@ -31,6 +31,7 @@ use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
 use crate::files::OutputFile;
 use crate::scene::WarningKind;
+use crate::simulate::Doubt;
 
 /// Steps between two checks for Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 4096;
@@ -112,6 +113,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     let scene = sweep.scene();
     let (grid, plan) = (sweep.grid(), sweep.plan());
     let mut meta = super::provenance::meta(scene);
+    super::provenance::insert_texts(&mut meta, scene);
     let axes = grid.axes().iter().map(|axis| {
         json!({
             "key": axis.key(),
@@ -146,6 +148,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
             Status::NoStart.code().to_string(): "could not start",
         },
         "regimes": words,
+        "doubts": Doubt::KINDS.iter().enumerate().map(|(k, kind)| ((1_u32 << k).to_string(), json!(kind))).collect::<Map<_, _>>(),
     });
     if let Json::Object(own) = own {
         meta.extend(own);
@@ -198,7 +201,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     let loose = solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
     if loose && sweep.plan().exponent {
         all.push(format!(
-            "solver.tolerance {:e}: integration error alone separates two runs at this tolerance, so exponents and the \
+            "solver.tolerance {:e}: at this tolerance runs stray from the motion of their scene, so exponents and the \
              regimes classified from them are unreliable; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
             solver.tolerance
         ));
@@ -271,6 +274,16 @@ fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, 
         })
         .collect();
     summary.insert("regimes".into(), Json::Object(counts));
+    let doubts = archive.values("doubts", source)?;
+    let words = archive.meta().get("doubts").and_then(Json::as_object);
+    let of_kind = words.into_iter().flatten().filter_map(|(bit, word)| {
+        let bit: u32 = bit.parse().ok()?;
+        let number = doubts.iter().filter(|bits| **bits as u32 & bit != 0).count();
+        (number > 0).then(|| (word.as_str().unwrap_or_default().to_owned(), json!(number)))
+    });
+    let of_kind: Map<String, Json> = of_kind.collect();
+    summary.insert("doubtful".into(), json!(doubts.iter().filter(|bits| **bits > 0.0).count()));
+    summary.insert("doubts".into(), Json::Object(of_kind));
     Ok(summary)
 }
 
@@ -302,10 +315,16 @@ fn report(
         // Happens in a shard of a sweep with fewer points than shards.
         regimes.push("none".to_owned());
     }
+    let of_kind = summary.get("doubts").and_then(Json::as_object).into_iter().flatten();
+    let of_kind: Vec<String> = of_kind.map(|(word, number)| format!("{number} {word}")).collect();
+    let doubtful = match number("doubtful") {
+        0 => String::new(),
+        some => format!("\nNot trusted       {}: {}", count(some, "point"), of_kind.join(", ")),
+    };
     let wall = summary.get("wall_s").and_then(Json::as_f64);
     let wall = wall.map_or_else(String::new, |wall| format!("\nWall time         {wall:.1} s"));
     text += &format!(
-        "\nRegimes           {}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
+        "\nRegimes           {}{doubtful}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
         regimes.join(", "),
         count(number("points"), "point"),
         out.display(),
