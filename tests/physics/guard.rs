@@ -2,7 +2,7 @@
 
 use crate::common::{frame_now, parse, run_until, scene, simulation};
 use jointplay::scene::{built_in_text, format_quantity_digits};
-use jointplay::simulate::{Simulation, Stopped};
+use jointplay::simulate::{Simulation, StopAdvice, StopFault, Stopped};
 
 /// Steps until the guard speaks.
 fn run_to_stop(simulation: &mut Simulation) -> Stopped {
@@ -210,4 +210,56 @@ fn the_other_form_stops_before_a_singular_pose_too() {
     assert!(simulation.ledger().unwrap().drive_work.is_finite());
     let text = format!("{:?}", frame_now(&mut simulation));
     assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+}
+
+/// A crank that drives a four-bar linkage through a dead centre: no step passes it, whatever the tolerance, and no softer machine.
+#[test]
+fn a_dead_centre_is_named_where_it_stops_the_run() {
+    let text = r#"
+        start = "ideal"
+        [[body]]
+        name = "crank"
+        mass = "1 kg"
+        inertia = "1e-3 1e-3 1e-3 kg m^2"
+        [[body]]
+        name = "coupler"
+        mass = "1 kg"
+        inertia = "1e-3 1e-3 1e-3 kg m^2"
+        [[body]]
+        name = "rocker"
+        mass = "1 kg"
+        inertia = "1e-3 1e-3 1e-3 kg m^2"
+        [[joint]]
+        name = "crank"
+        kind = "revolute"
+        child = "crank"
+        axis = [0, 0, 1]
+        drive = { law = "constant", velocity = "1 rad/s" }
+        [[joint]]
+        name = "coupler"
+        kind = "revolute"
+        parent = "crank"
+        child = "coupler"
+        parent_point = "100 0 0 mm"
+        axis = [0, 0, 1]
+        start = { position = "60 deg" }
+        [[joint]]
+        name = "rocker"
+        kind = "revolute"
+        child = "rocker"
+        parent_point = "200 0 0 mm"
+        axis = [0, 0, 1]
+        start = { position = "100 deg" }
+        [[ball_joint]]
+        name = "S"
+        socket = { body = "coupler", at = "150 0 0 mm" }
+        ball = { body = "rocker", at = "80 0 0 mm" }
+        clearance = 0
+    "#;
+    for formulation in ["tree", "lagrange"] {
+        let mut simulation = Simulation::new(&parse(text, &[("formulation", formulation)])).unwrap();
+        let stopped = simulation.advance_to(8.0).unwrap_err();
+        assert_eq!((stopped.fault, stopped.advice), (StopFault::SingularLoops, StopAdvice::Dependent), "{formulation}");
+        assert!((stopped.time - 1.64336).abs() < 1e-4, "{formulation}: {}", stopped.time);
+    }
 }

@@ -7,6 +7,8 @@ use crate::scene::Vec3;
 
 /// Smallest pivot ratio of the constraints: below it they determine the motion to fewer than four digits.
 pub(super) const LEAST_PIVOT: f64 = 1e-12;
+/// The same where steps have become as short as rounding: below it the pose is the reason.
+pub(super) const NEARLY_DEPENDENT: f64 = 1e-6;
 
 /// Equations of motion in some coordinates. The `model` passed in is always the one they were made for.
 pub(super) trait Equations: Send {

@@ -55,7 +55,7 @@ use std::sync::Arc;
 
 use crate::scene::{Formulation, Scene, StartRule, Vec3, format_quantity_digits};
 use elements::{ForceElement, SceneElement, elements_of};
-use equations::{Equations, LEAST_PIVOT};
+use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
 use model::{Model, Motion};
@@ -534,6 +534,11 @@ impl Mechanism {
     /// Whether rows of the constraint matrix were dependent at the latest evaluation, up to rounding.
     pub fn has_dependent_rows(&self) -> bool {
         self.equations.least_pivot() < LEAST_PIVOT
+    }
+
+    /// Whether they were so nearly dependent there that steps cannot pass: the pose is singular.
+    pub fn is_nearly_singular(&self) -> bool {
+        self.equations.least_pivot() < NEARLY_DEPENDENT
     }
 
     /// Whether the constraints no longer determine the motion at the latest evaluation.

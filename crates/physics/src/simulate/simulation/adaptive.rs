@@ -59,6 +59,9 @@ impl Simulation {
             if !(self.state.control.h_next >= shortest) {
                 self.state.record.statistics.count(self.attempt.counts);
                 self.state.control.h_next = self.running.solver.step;
+                if self.mechanism.is_nearly_singular() {
+                    return Err(self.stopped(StopFault::SingularLoops, StopAdvice::Dependent));
+                }
                 let tolerance = self.running.solver.tolerance;
                 let advice = StopAdvice::LooserTolerance { tolerance };
                 return Err(self.stopped(StopFault::ShortStep { shortest }, advice));
