@@ -135,7 +135,6 @@ impl Benettin {
         twin.displace(&away);
         // The requested and the actual separation differ because loops are closed again.
         self.from = distance(orbit, twin).max(VANISHED * self.separation);
-        (self.grown, self.open) = if self.aligning > 0 { (0.0, 0) } else { (self.grown, self.open) };
     }
 
     /// The exponent so far; `None` before the first section that counts.

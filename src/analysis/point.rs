@@ -208,7 +208,7 @@ impl PointRun {
         let simulation = self.watch.orbit_mut().simulation_mut();
         simulation.take_peaks(&mut self.peaks);
         let doubts = simulation.doubts().iter().fold(0, |bits, doubt| bits | 1 << doubt.kind());
-        let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.residual() / ledger.scale());
+        let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.share());
         let statistics = simulation.statistics();
         let span = self.means.span;
         let joints = (0..self.peaks.len())

@@ -343,7 +343,7 @@ fn kind(impact: &Impact) -> &'static str {
 
 fn residual(player: &Player) -> AccuracyLine {
     let ledger = player.frame().ledger;
-    let share = ledger.map(|ledger| if ledger.scale() > 0.0 { ledger.residual().abs() / ledger.scale() } else { 0.0 });
+    let share = ledger.map(|ledger| ledger.share());
     let exchanged = ledger.map_or_else(
         || "Not kept: see Energy ledger under Solver.".to_owned(),
         |ledger| {

@@ -53,6 +53,33 @@ pub fn parse(text: &str, changes: &Changes) -> Scene {
     Scene::parse(text, None, &owned(changes)).unwrap()
 }
 
+/// The text of a scene: a free ball of 0.1 kg in a socket at rest, without friction, `place` (mm) from the middle along z and moving at
+/// `speed` (m/s), under a gravity along z (m/s^2); more lines of `[contact]`.
+pub fn free_ball(place: f64, speed: f64, gravity: f64, contact: &str) -> String {
+    format!(
+        r#"
+        [gravity]
+        z = "{gravity} m/s^2"
+        [contact]
+        friction_law = "none"
+        {contact}
+        [[body]]
+        name = "ball"
+        mass = "0.1 kg"
+        inertia = "4e-6 4e-6 4e-6 kg m^2"
+        [[joint]]
+        name = "ball"
+        kind = "free"
+        child = "ball"
+        start = {{ position = "0 0 {place} mm", velocity = "0 0 {speed} m/s" }}
+        [[ball_joint]]
+        name = "S"
+        socket = {{ body = "world" }}
+        ball = {{ body = "ball" }}
+        "#
+    )
+}
+
 /// A running built-in scene.
 pub fn simulation(name: &str, changes: &Changes) -> Simulation {
     Simulation::new(&scene(name, changes)).unwrap()

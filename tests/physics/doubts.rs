@@ -1,6 +1,6 @@
 //! A result that is not to be trusted says so, and why; one that is says nothing.
 
-use crate::common::{Changes, frame_now, parse, run_until, simulation};
+use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation};
 use jointplay::simulate::{Doubt, Simulation};
 
 fn words(simulation: &Simulation) -> Vec<String> {
@@ -150,37 +150,13 @@ fn the_summary_of_a_run_marks_it() {
     assert!(!run("text", usual).contains("Not trusted"));
 }
 
-/// A free ball of 0.1 kg in a socket at rest; its place along z in mm.
-fn ball(place: &str, gravity: &str, more: &str) -> String {
-    format!(
-        r#"
-        [gravity]
-        z = "{gravity} m/s^2"
-        [contact]
-        clearance = "0.3 mm"
-        friction_law = "none"
-        [[body]]
-        name = "ball"
-        mass = "0.1 kg"
-        inertia = "4e-6 4e-6 4e-6 kg m^2"
-        [[joint]]
-        name = "ball"
-        kind = "free"
-        child = "ball"
-        start = {{ position = "0 0 {place} mm" }}
-        [[ball_joint]]
-        name = "S"
-        socket = {{ body = "world" }}
-        ball = {{ body = "ball" }}
-        {more}
-        "#
-    )
-}
+/// Lines of `[contact]`.
+const PLAY: &str = r#"clearance = "0.3 mm""#;
 
 /// What a bouncing ball exchanges grows with every bounce; what it holds does not.
 #[test]
 fn steady_drift_is_marked_however_often_energy_was_exchanged() {
-    let text = ball("0", "-9.81", "");
+    let text = free_ball(0.0, 0.0, -9.81, PLAY);
     let cases: [(&Changes, bool); 4] = [
         (&[("solver.preset", "preview")], true),
         (&[("solver.method", "dopri5"), ("solver.tolerance", "1e-4")], true),
@@ -203,7 +179,7 @@ fn steady_drift_is_marked_however_often_energy_was_exchanged() {
 #[test]
 fn a_ball_at_rest_under_a_load_raises_no_doubt() {
     let load = "[[load]]\nname = \"L\"\non = { body = \"ball\" }\nforce = \"0 0 -100 N\"";
-    let text = format!("start = \"settled\"\n{}", ball("0", "-9.81", load));
+    let text = format!("start = \"settled\"\n{}{load}", free_ball(0.0, 0.0, -9.81, PLAY));
     for changes in [
         &[][..],
         &[("solver.preset", "reference")],

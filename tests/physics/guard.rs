@@ -217,18 +217,6 @@ fn the_other_form_stops_before_a_singular_pose_too() {
 fn a_dead_centre_is_named_where_it_stops_the_run() {
     let text = r#"
         start = "ideal"
-        [[body]]
-        name = "crank"
-        mass = "1 kg"
-        inertia = "1e-3 1e-3 1e-3 kg m^2"
-        [[body]]
-        name = "coupler"
-        mass = "1 kg"
-        inertia = "1e-3 1e-3 1e-3 kg m^2"
-        [[body]]
-        name = "rocker"
-        mass = "1 kg"
-        inertia = "1e-3 1e-3 1e-3 kg m^2"
         [[joint]]
         name = "crank"
         kind = "revolute"
@@ -256,8 +244,11 @@ fn a_dead_centre_is_named_where_it_stops_the_run() {
         ball = { body = "rocker", at = "80 0 0 mm" }
         clearance = 0
     "#;
+    let body = |name| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n");
+    let bodies: String = ["crank", "coupler", "rocker"].map(body).concat();
+    let text = text.to_owned() + &bodies;
     for formulation in ["tree", "lagrange"] {
-        let mut simulation = Simulation::new(&parse(text, &[("formulation", formulation)])).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
         let stopped = simulation.advance_to(8.0).unwrap_err();
         assert_eq!((stopped.fault, stopped.advice), (StopFault::SingularLoops, StopAdvice::Dependent), "{formulation}");
         assert!((stopped.time - 1.64336).abs() < 1e-4, "{formulation}: {}", stopped.time);

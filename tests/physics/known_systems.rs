@@ -227,8 +227,8 @@ fn the_logistic_map_at_four_has_the_exponent_ln_two() {
     assert_eq!(regime, Regime::Chaotic);
     let e = exponent(&evidence);
     // Three thousand iterations: the standard error says how far to trust it.
-    assert!((e.value - 2f64.ln()).abs() < 0.02, "{}", e.value);
-    assert!(e.standard_error < 0.02, "{}", e.standard_error);
+    assert!((e.value - 2f64.ln()).abs() < 0.01, "{}", e.value);
+    assert!(e.standard_error < 0.01, "{}", e.standard_error);
     assert!(evidence.zero_one > 0.9, "{}", evidence.zero_one);
     assert_eq!(e.running.len(), 3000);
     assert_eq!(e.running.last(), Some(&e.value));

@@ -1,33 +1,7 @@
 //! Contacts that begin where no sign changes: a ball that starts on its wall, or is there exactly where a search ends a piece.
 
-use crate::common::parse;
+use crate::common::{free_ball, parse};
 use jointplay::simulate::{Impact, Simulation};
-
-/// A free ball of 0.1 kg in a socket at rest, at a place (mm, along z) and with a speed along it, in m/s.
-fn ball(place: f64, speed: f64, contact: &str) -> String {
-    format!(
-        r#"
-        [gravity]
-        z = 0
-        [contact]
-        friction_law = "none"
-        {contact}
-        [[body]]
-        name = "ball"
-        mass = "0.1 kg"
-        inertia = "4e-6 4e-6 4e-6 kg m^2"
-        [[joint]]
-        name = "ball"
-        kind = "free"
-        child = "ball"
-        start = {{ position = "0 0 {place} mm", velocity = "0 0 {speed} m/s" }}
-        [[ball_joint]]
-        name = "S"
-        socket = {{ body = "world" }}
-        ball = {{ body = "ball" }}
-        "#
-    )
-}
 
 fn impacts_of(text: &str, changes: &[(&str, &str)], duration: f64) -> (Simulation, Vec<Impact>) {
     let mut simulation = Simulation::new(&parse(text, changes)).expect("starts");
@@ -53,7 +27,7 @@ const METHODS: [(&str, &[(&str, &str)]); 6] = [
 #[test]
 fn an_impact_that_starts_on_the_wall_is_an_impact() {
     for place in [-0.3, -0.300_000_000_000_1] {
-        let text = ball(place, -1.0, r#"clearance = "0.3 mm""#);
+        let text = free_ball(place, -1.0, 0.0, r#"clearance = "0.3 mm""#);
         for (name, changes) in METHODS {
             let (simulation, impacts) = impacts_of(&text, changes, 3e-4);
             let first = impacts[0];
@@ -71,7 +45,8 @@ fn a_ball_comes_back_from_every_round_clearance_at_every_round_speed() {
     for clearance in [0.01, 0.02, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 1.0] {
         for speed in [0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1.0, 2.0, 2.5, 4.0, 5.0, 10.0] {
             let contact = format!("clearance = \"{clearance} mm\"\nnormal_law = \"hertz\"");
-            let (simulation, impacts) = impacts_of(&ball(0.0, speed, &contact), &[], 4e-3 * clearance / speed + 4e-4);
+            let (simulation, impacts) =
+                impacts_of(&free_ball(0.0, speed, 0.0, &contact), &[], 4e-3 * clearance / speed + 4e-4);
             let what = format!("{clearance} mm, {speed} m/s");
             assert!(!impacts.is_empty(), "{what}");
             for impact in impacts {
@@ -87,12 +62,13 @@ fn a_ball_comes_back_from_every_round_clearance_at_every_round_speed() {
 fn a_contact_begins_where_a_step_or_a_change_ends_on_the_wall() {
     // 0.25 m/s over 2^-12 s is 2^-14 m, exactly the play.
     let play = 1e3 * 2f64.powi(-14);
-    let text = ball(0.0, 0.25, &format!("clearance = \"{play} mm\""));
+    let text = free_ball(0.0, 0.25, 0.0, &format!("clearance = \"{play} mm\""));
     let step = 2f64.powi(-18) * 1e6;
     let fixed = [("solver.method", "rk4"), ("solver.step", &*format!("{step} us"))];
     let (_, impacts) = impacts_of(&text, &fixed, 2e-3);
     assert_eq!(impacts[0].approach_speed, 0.25);
-    let mut simulation = Simulation::new(&parse(&ball(0.0, 0.25, r#"clearance = "1 mm""#), &[])).expect("starts");
+    let mut simulation =
+        Simulation::new(&parse(&free_ball(0.0, 0.25, 0.0, r#"clearance = "1 mm""#), &[])).expect("starts");
     simulation.step_until(2f64.powi(-12)).expect("runs");
     simulation.set("contact.clearance", &format!("{play} mm")).expect("a change");
     let mut impacts = Vec::new();

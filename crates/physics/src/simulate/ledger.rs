@@ -49,6 +49,12 @@ impl Ledger {
         if self.exchanged > 0.0 { self.residual() / self.exchanged } else { 0.0 }
     }
 
+    /// Magnitude of the residual over [`Self::scale`]; 0 where nothing was held.
+    pub fn share(&self) -> f64 {
+        let scale = self.scale();
+        if scale > 0.0 { self.residual().abs() / scale } else { 0.0 }
+    }
+
     /// Energy against which a residual is small or not, J. A machine that exchanges its energy again and again without losing
     /// any keeps every error: what it exchanged grows, what it holds does not. One that dissipates forgets errors with what is
     /// lost. And at rest, or turning freely, hardly anything is exchanged.

@@ -98,12 +98,12 @@ impl Simulation {
         let mass: f64 = self.running.bodies.iter().map(|body| body.mass).sum();
         let slow = mass * (least / CREEP) * (least / CREEP);
         let scale = ledger.scale() + slow;
-        let driven = |joint: &BallJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
+        let may_drive = |joint: &BallJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
         let losses = [
             (LedgerTerm::Restitution, ledger.restitution_loss),
             (
                 LedgerTerm::Friction,
-                if self.running.ball_joints.iter().any(driven) { 0.0 } else { ledger.friction_loss },
+                if self.running.ball_joints.iter().any(may_drive) { 0.0 } else { ledger.friction_loss },
             ),
             (LedgerTerm::Damping, ledger.damping_loss),
         ];
