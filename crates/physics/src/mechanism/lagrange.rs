@@ -16,6 +16,13 @@ use std::ops::Range;
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
 const BAUMGARTE: (f64, f64) = (5.0, 5.0);
 
+/// Pivot ratio of the rows below which a step ends on the constraints. In a pose in which rows become dependent, what stabilisation
+/// has not yet taken back would be divided by the pivot, and throw the mechanism onto another branch.
+const NEAR_SINGULAR: f64 = 1e-2;
+/// Corrections of the positions at most, and the violation that is rounding, m or rad.
+const CORRECTIONS: usize = 8;
+const CLOSED: f64 = 1e-14;
+
 /// Rows of one joint, between a child and a parent.
 pub struct Group {
     rows: Rows,
@@ -67,6 +74,8 @@ pub struct Lagrange {
     drift: f64,
     /// Smallest pivot ratio of the latest factorisation.
     least_pivot: f64,
+    /// The latest step was taken back onto the constraints.
+    projected: bool,
 }
 
 /// The constraint rows of a scene.
@@ -169,6 +178,7 @@ impl Lagrange {
             scale: body_scales(model),
             drift: 0.0,
             least_pivot: f64::INFINITY,
+            projected: false,
         }
     }
 
@@ -192,15 +202,93 @@ impl Lagrange {
         sum
     }
 
+    /// Factors J M^-1 J^T of the rows last linearised.
+    fn factor(&mut self, model: &Model) {
+        for (Row { j, turned }, &group) in self.rows.iter_mut().zip(&self.group_of) {
+            let group = &self.groups[group];
+            let [of_child, of_parent] = turned;
+            for (b, turned, j) in [(group.child, of_child, j.child[1]), (group.parent, of_parent, j.parent[1])] {
+                if b < model.bodies.len() {
+                    *turned = self.inverse_inertia[b] * j;
+                }
+            }
+        }
+        self.matrix.clear();
+        for &(i, j) in &self.pairs {
+            let value = self.mobility(model, i, j);
+            self.matrix.add(i, j, value);
+        }
+        self.least_pivot = self.matrix.factor();
+    }
+
+    /// Takes positions and then velocities back onto the constraints, in the metric of the masses.
+    fn take_back(&mut self, model: &Model, t: f64, y: &mut [f64]) {
+        let nq = 7 * model.massive;
+        let mut before = f64::INFINITY;
+        for _ in 0..CORRECTIONS {
+            self.violate(model, t, y, |[phi, _, _]| -phi);
+            // Rows that are dependent keep what the parts' dimensions contradict.
+            if self.drift <= CLOSED || self.drift >= 0.5 * before {
+                break;
+            }
+            before = self.drift;
+            self.matrix.solve(&mut self.residual);
+            self.visit_corrections(model, |b, moved, turned| {
+                for i in 0..3 {
+                    y[7 * b + i] += moved[i];
+                }
+                kinematics::turn_quaternion(&mut y[7 * b + 3..7 * b + 7], &turned);
+            });
+        }
+        self.violate(model, t, y, |[_, rate, _]| -rate);
+        self.matrix.solve(&mut self.residual);
+        self.visit_corrections(model, |b, moved, turned| {
+            for i in 0..3 {
+                y[nq + 6 * b + i] += moved[i];
+                y[nq + 6 * b + 3 + i] += turned[i];
+            }
+        });
+    }
+
+    /// Factors the rows at (t, y), with what `of` makes of each one's violation, its rate and its acceleration as the residual.
+    fn violate(&mut self, model: &Model, t: f64, y: &[f64], of: impl Fn([f64; 3]) -> f64) {
+        self.update_kinematics(model, t, y);
+        for (b, body) in model.bodies[..model.massive].iter().enumerate() {
+            let rotation = &self.motion[b].rotation;
+            self.inverse_inertia[b] = rotation * body.inertia_inverse * rotation.transpose();
+        }
+        self.linearise_with(of);
+        self.factor(model);
+    }
+
+    /// M^-1 J^T times the solution in the residual, by body: displacement, m, and turn, rad, or their rates.
+    fn visit_corrections(&self, model: &Model, mut visit: impl FnMut(BodyIndex, Vec3, Vec3)) {
+        for (row, (group, x)) in self.rows.iter().zip(self.group_of.iter().zip(&self.residual)) {
+            let group = &self.groups[*group];
+            for (b, j, turned) in
+                [(group.child, &row.j.child, &row.turned[0]), (group.parent, &row.j.parent, &row.turned[1])]
+            {
+                if b < model.bodies.len() {
+                    visit(b, j[0] * (x / model.bodies[b].mass), turned * *x);
+                }
+            }
+        }
+    }
+
     /// Jacobian rows, and the residual of the unconstrained accelerations: -(J a0 + bias) - 2 alpha Phi' - beta^2 Phi.
     fn linearise(&mut self) {
+        self.linearise_with(|[phi, rate, acceleration]| stabilised(phi, rate, acceleration));
+    }
+
+    /// Jacobian rows, with what `of` makes of the violation of each, its rate and its acceleration as the residual.
+    fn linearise_with(&mut self, of: impl Fn([f64; 3]) -> f64) {
         self.drift = 0.0;
         for group in &self.groups {
             let (c, p) = (&self.motion[group.child], &self.motion[group.parent]);
-            let found = |i: usize, row, [phi, rate, acceleration]: [f64; 3]| {
+            let found = |i: usize, row, violation: [f64; 3]| {
                 self.rows[group.first + i].j = row;
-                self.residual[group.first + i] = stabilised(phi, rate, acceleration);
-                self.drift = self.drift.max(phi.abs());
+                self.residual[group.first + i] = of(violation);
+                self.drift = self.drift.max(violation[0].abs());
             };
             group.rows.linearise(c, p, &self.driven.coordinates, found);
         }
@@ -299,21 +387,7 @@ impl Equations for Lagrange {
             self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
         }
         self.linearise();
-        for (Row { j, turned }, &group) in self.rows.iter_mut().zip(&self.group_of) {
-            let group = &self.groups[group];
-            let [of_child, of_parent] = turned;
-            for (b, turned, j) in [(group.child, of_child, j.child[1]), (group.parent, of_parent, j.parent[1])] {
-                if b < model.bodies.len() {
-                    *turned = self.inverse_inertia[b] * j;
-                }
-            }
-        }
-        self.matrix.clear();
-        for &(i, j) in &self.pairs {
-            let value = self.mobility(model, i, j);
-            self.matrix.add(i, j, value);
-        }
-        self.least_pivot = self.matrix.factor();
+        self.factor(model);
         self.multipliers.copy_from_slice(&self.residual);
         self.matrix.solve(&mut self.multipliers);
         for (i, row) in self.rows.iter().enumerate() {
@@ -354,15 +428,19 @@ impl Equations for Lagrange {
         }
     }
 
-    fn project(&mut self, model: &Model, _: f64, y: &mut [f64]) -> f64 {
+    fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64 {
         for b in 0..model.massive {
             kinematics::normalise_quaternion(&mut y[7 * b + 3..7 * b + 7]);
+        }
+        self.projected = self.least_pivot < NEAR_SINGULAR;
+        if self.projected {
+            self.take_back(model, t, y);
         }
         0.0
     }
 
     fn projects(&self) -> bool {
-        false
+        self.projected
     }
 
     fn visit_columns(&self, model: &Model, body: usize, point: &Vec3, mut visit: &mut dyn FnMut(usize, Vec3, Vec3)) {

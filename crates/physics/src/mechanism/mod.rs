@@ -613,6 +613,35 @@ impl Mechanism {
         of_scene.map(move |e| e.report(t, motion))
     }
 
+    /// How far inside the range in which they exert a force the elements are that have one, at `t`, the time of the motion last
+    /// measured: not above 0 outside.
+    pub fn insides(&self, t: f64) -> impl Iterator<Item = f64> {
+        let motion = self.equations.motion();
+        self.elements.iter().filter_map(move |e| e.inside(t, motion))
+    }
+
+    /// Whether any element for which `inside`, as by [`Self::insides`], is above 0 has a force whose slope begins vertically.
+    pub fn presses_vertically(&self, inside: &[f64]) -> bool {
+        let motion = self.equations.motion();
+        let with_edges = self.elements.iter().filter(|e| e.inside(0.0, motion).is_some());
+        inside.iter().zip(with_edges).any(|(inside, element)| *inside > 0.0 && element.begins_vertically())
+    }
+
+    /// Whether any element exerts a force in a part of its range only.
+    pub fn has_edges(&self) -> bool {
+        self.insides(0.0).next().is_some()
+    }
+
+    /// Lets the elements of [`Self::insides`] follow the law inside their range, or outside, wherever they are, as `inside` says;
+    /// with `None` as the motion has it.
+    pub fn hold_elements(&mut self, inside: Option<&[f64]>) {
+        let motion = self.equations.motion();
+        let have_edges = self.elements.iter_mut().filter(|e| e.inside(0.0, motion).is_some());
+        for (i, element) in have_edges.enumerate() {
+            element.hold(inside.map(|inside| inside[i] > 0.0));
+        }
+    }
+
     /// The hand's pull, if any.
     pub fn pull(&self) -> Option<Pull> {
         self.pull

@@ -6,6 +6,7 @@ mod contacts;
 mod corners;
 mod displace;
 mod doubts;
+mod edges;
 mod energy;
 mod flights;
 mod guard;
@@ -121,6 +122,12 @@ struct Attempt {
     located: Option<usize>,
     /// Joint that moves to another piece of a law there.
     corner: Option<(usize, Piece)>,
+    /// If it ends at edges, of the elements that have some: how far they are inside at its start, not above 0 outside.
+    sides: Vec<f64>,
+    /// It ends at an edge.
+    edge: bool,
+    /// The same at both ends of a part of it.
+    insides: [Vec<f64>; 2],
     /// Restarted on another piece.
     turned: bool,
     /// The step that it was before an event cut it, if one did; and that which the next one is to be, beside another run.
@@ -298,6 +305,9 @@ impl Simulation {
                 end: StepEnd::new(vec![0.0; n], joints),
                 located: None,
                 corner: None,
+                edge: false,
+                sides: Vec::with_capacity(scene.elements.len()),
+                insides: std::array::from_fn(|_| Vec::with_capacity(scene.elements.len())),
                 turned: false,
                 whole: None,
                 beside: None,
@@ -405,6 +415,7 @@ impl Simulation {
         let limit = end.min(self.ramp_end());
         // A fixed step is the user's choice.
         let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
+        self.attempt.sides.clear();
         if self.mechanism.is_kinematic() {
             self.kinematic_step(follows_drives)?;
         } else if self.running.solver.method.is_adaptive() {
@@ -464,6 +475,10 @@ impl Simulation {
         let Self { mechanism, stepper, state, attempt, running, .. } = self;
         let StepEnd { t, y, k, memory, .. } = &state.now;
         mechanism.contacts.forget_left_pieces();
+        let sides = &attempt.sides;
+        if !sides.is_empty() {
+            mechanism.hold_elements(Some(sides));
+        }
         let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
         let end = &mut attempt.end;
         let tolerance = running.solver.tolerance;
@@ -471,6 +486,9 @@ impl Simulation {
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
         attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
+        if !attempt.sides.is_empty() {
+            mechanism.hold_elements(None);
+        }
         error
     }
 

@@ -246,6 +246,20 @@ pub(super) trait SceneElement: ForceElement {
         f64::INFINITY
     }
 
+    /// How far inside the range of motion in which it exerts a force it is, of any scale, not above 0 outside: adaptive steps end
+    /// where its sign changes. `None` if it exerts one everywhere.
+    fn inside(&self, _t: f64, _motion: &[Kinematics]) -> Option<f64> {
+        None
+    }
+
+    /// Whether the slope of its force has a vertical tangent where it begins.
+    fn begins_vertically(&self) -> bool {
+        false
+    }
+
+    /// Follows from here on the law inside that range, or none outside, wherever it is; `None`: as the motion has it.
+    fn hold(&mut self, _inside: Option<bool>) {}
+
     /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }

@@ -25,6 +25,8 @@ struct Stop {
     stiffness: f64,
     /// a, s/m or s/rad.
     damping: f64,
+    /// Over a step: whether it presses, wherever the coordinate is.
+    held: Option<bool>,
 }
 
 /// A stop that is touched.
@@ -56,6 +58,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         depth,
         stiffness: element.number("force") / (depth * depth.sqrt()),
         damping: if chi > 0.0 { chi / element.number("speed") } else { 0.0 },
+        held: None,
     })
 }
 
@@ -63,17 +66,21 @@ impl Stop {
     /// The coordinate, and the stop that it touches.
     fn at(&self, motion: &[Kinematics]) -> (Place, Option<Press>) {
         let place = self.on.place(self.middle, motion);
-        let (side, depth) = if place.off > self.upper {
-            (1.0, place.off - self.upper)
-        } else if place.off < self.lower {
-            (-1.0, self.lower - place.off)
-        } else {
-            return (place, None);
-        };
+        let press = self.nearest(&place);
+        let touches = self.held.unwrap_or(press.depth > 0.0);
+        (place, touches.then_some(press))
+    }
+
+    /// The nearer stop as if it were touched.
+    fn nearest(&self, place: &Place) -> Press {
+        let [above, below] = [place.off - self.upper, self.lower - place.off];
+        let (side, depth) = if above > below { (1.0, above) } else { (-1.0, below) };
         let rate = side * place.rate;
-        let elastic = self.stiffness * depth * depth.sqrt();
-        let press = Press { side, depth, rate, elastic, force: (elastic * (1.0 + self.damping * rate)).max(0.0) };
-        (place, Some(press))
+        let elastic = self.stiffness * depth * depth.abs().sqrt();
+        let force = elastic * (1.0 + self.damping * rate);
+        // Held, it follows its law smoothly beyond the edge at which the step then ends.
+        let force = if self.held.is_some() { force } else { force.max(0.0) };
+        Press { side, depth, rate, elastic, force }
     }
 }
 
@@ -91,9 +98,9 @@ impl ForceElement for Stop {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let (place, press) = self.at(at.motion);
-        let press = press.filter(|press| press.force > 0.0)?;
+        let press = press.filter(|press| press.force > 0.0 || self.held.is_some())?;
         let slopes = Slopes {
-            by_position: -1.5 * press.force / press.depth,
+            by_position: -1.5 * self.stiffness * press.depth.abs().sqrt() * (1.0 + self.damping * press.rate),
             by_rate: -press.elastic * self.damping,
             by_time: 0.0,
         };
@@ -113,6 +120,20 @@ impl ForceElement for Stop {
 }
 
 impl SceneElement for Stop {
+    /// d (1 + a dd/dt): a stop lets go while it is still pressed in where it is left faster than it can follow.
+    fn inside(&self, _: f64, motion: &[Kinematics]) -> Option<f64> {
+        let Press { depth, rate, .. } = self.nearest(&self.on.place(self.middle, motion));
+        Some(depth.min(depth * (1.0 + self.damping * rate)))
+    }
+
+    fn begins_vertically(&self) -> bool {
+        true
+    }
+
+    fn hold(&mut self, inside: Option<bool>) {
+        self.held = inside;
+    }
+
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let (place, press) = self.at(motion);
         let force = press.as_ref().map_or(0.0, |press| -press.side * press.force);

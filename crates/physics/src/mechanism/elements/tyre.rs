@@ -20,6 +20,8 @@ struct Tyre {
     stiffness: f64,
     damping: f64,
     ground: Option<Arc<dyn Law>>,
+    /// Over a step: whether it presses, wherever the wheel is.
+    held: Option<bool>,
 }
 
 /// State at one instant.
@@ -28,7 +30,7 @@ struct State {
     arm: Vec3,
     /// Height of the ground along `up`, m.
     ground: Jet,
-    /// d, never below 0, m, and its rate.
+    /// d, below 0 above the ground, m, and its rate.
     depth: f64,
     rate: f64,
     /// N; not above 0 where it has let go.
@@ -43,6 +45,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         stiffness: element.number("stiffness"),
         damping: element.number("damping"),
         ground: law_of(element),
+        held: None,
     })
 }
 
@@ -51,12 +54,14 @@ impl Tyre {
         let (centre, velocity, arm) = point_of(&self.on, motion);
         let height = |law: &Arc<dyn Law>| law.at(t);
         let ground = self.ground.as_ref().map_or_else(Jet::default, height);
-        let depth = (ground.value + self.radius - self.up.dot(&centre)).max(0.0);
+        let depth = ground.value + self.radius - self.up.dot(&centre);
         let rate = ground.rate - self.up.dot(&velocity);
         // Where the spring has let go, its damper has, too.
-        let force = match depth > 0.0 {
-            true => (self.stiffness * depth + self.damping * rate).max(0.0),
-            false => 0.0,
+        let force = self.stiffness * depth + self.damping * rate;
+        let force = match self.held {
+            Some(true) => force,
+            None if depth > 0.0 => force.max(0.0),
+            _ => 0.0,
         };
         State { centre, arm, ground, depth, rate, force }
     }
@@ -77,7 +82,7 @@ impl ForceElement for Tyre {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let s = self.at(at.t, at.motion);
-        if s.force <= 0.0 {
+        if !self.held.unwrap_or(s.force > 0.0) {
             return None;
         }
         let along = self.up * self.up.transpose();
@@ -90,14 +95,14 @@ impl ForceElement for Tyre {
     }
 
     fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
-        let depth = self.at(t, motion).depth;
+        let depth = self.at(t, motion).depth.max(0.0);
         0.5 * self.stiffness * depth * depth
     }
 
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.at(t, motion);
         powers.drive += s.force * s.ground.rate;
-        powers.damping += (s.force - self.stiffness * s.depth) * s.rate;
+        powers.damping += (s.force - self.stiffness * s.depth.max(0.0)) * s.rate;
     }
 }
 
@@ -110,6 +115,16 @@ impl SceneElement for Tyre {
     fn step_end(&self, t: f64) -> f64 {
         let end = |law: &Arc<dyn Law>| law.step_end(t);
         self.ground.as_ref().map_or(f64::INFINITY, end)
+    }
+
+    /// d, or k d + c dd/dt where that is less: it lets go while it is still pressed in.
+    fn inside(&self, t: f64, motion: &[Kinematics]) -> Option<f64> {
+        let s = self.at(t, motion);
+        Some(s.depth.min(self.stiffness * s.depth + self.damping * s.rate))
+    }
+
+    fn hold(&mut self, inside: Option<bool>) {
+        self.held = inside;
     }
 
     /// From the ground below the centre to that.

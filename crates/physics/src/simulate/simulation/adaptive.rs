@@ -2,7 +2,7 @@
 
 use super::automatic::STABILITY_LIMIT;
 use super::corners::Piece;
-use super::{LONGEST_STEP, NEARLY, Simulation, shortest_step};
+use super::{LONGEST_STEP, NEARLY, Simulation, edges, shortest_step};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
@@ -17,6 +17,10 @@ const END_ON_INTERPOLANT: f64 = 1e-5;
 /// What the explicit member of the automatic choice may err by where the tolerance is looser: it takes the steps through impacts,
 /// which decide all that follows and are few beside those in lasting contact.
 const OF_IMPACTS: f64 = 1e-5;
+/// The same over an explicit step in which a stop presses, as a fraction: its force grows with d^1.5, whose slope begins with a
+/// vertical tangent. How the motion after an impact depends on that before it, which exponents go by, errs by much more than the
+/// motion itself.
+const WHILE_PRESSED: f64 = 0.001;
 /// Least and largest factor for the next try after one whose iteration failed.
 const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
@@ -50,6 +54,7 @@ impl Simulation {
         self.attempt.turned = false;
         self.attempt.counts = Counts::default();
         self.attempt.factorisations = 0;
+        self.hold_sides();
         let (t_end, h) = loop {
             if let Some(step) = self.attempt_adaptive(limit) {
                 break step;
@@ -82,10 +87,12 @@ impl Simulation {
     /// Scaled error that a step may have.
     fn allowed_error(&self) -> f64 {
         let solver = &self.running.solver;
-        match (solver.method, self.state.control.member) {
+        let allowed = match (solver.method, self.state.control.member) {
             (Method::Automatic, Member::Explicit) => solver.tolerance.min(OF_IMPACTS),
             _ => solver.tolerance,
-        }
+        };
+        let presses = self.mechanism.presses_vertically(&self.attempt.sides);
+        if presses { WHILE_PRESSED * allowed } else { allowed }
     }
 
     /// One attempt at a step with its event; `None` if it must be repeated with the smaller `h_next` it has set.
@@ -95,6 +102,7 @@ impl Simulation {
         let asked = self.state.control.h_next;
         let beside = self.attempt.beside.take();
         self.attempt.whole = None;
+        self.attempt.edge = false;
         let mut h = asked.min(LONGEST_STEP);
         let mut t_end = t + h;
         let cut = t_end >= limit - NEARLY * h;
@@ -149,7 +157,23 @@ impl Simulation {
             return None;
         }
         let corner = corner.filter(|corner| !corner.is_at_start());
-        if let Some(corner) = corner {
+        let edge = self.first_edge(h);
+        if edge.is_some_and(|theta| theta < edges::AT_START) {
+            // It was passed at the start: the step is repeated on the other side.
+            self.state.control.h_next = asked;
+            self.state.control.contact_began = contact_began;
+            return None;
+        }
+        let edge = edge.filter(|theta| before_last(*theta));
+        let first = event.into_iter().chain(corner.iter().map(|corner| corner.theta)).fold(f64::INFINITY, f64::min);
+        if let Some(theta) = edge.filter(|theta| *theta < first) {
+            self.attempt.located = None;
+            self.attempt.edge = true;
+            t_end = t + theta * h;
+            self.end_at(theta, t_end, h);
+            self.attempt.whole = Some(Whole { size: h, repeated: false });
+            h *= theta;
+        } else if let Some(corner) = corner {
             // The whole step worked; a rate that stops rising soon after the contact began is no evidence against it.
             if contact_began && matches!(corner.next, Piece::Approach(_)) {
                 self.state.control.h_contact = next.max(SHORTEST_FIRST);

@@ -53,6 +53,10 @@ impl Simulation {
         }
         let energies = energies(mechanism, state);
         if mechanism.has_powers() {
+            // Powers may jump at an edge at the step's end: those of the step count.
+            if !self.attempt.sides.is_empty() {
+                mechanism.hold_elements(Some(&self.attempt.sides));
+            }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
             let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
@@ -63,6 +67,10 @@ impl Simulation {
                 self.begin_wear_of_step();
             }
             self.lay_out_course(h, end);
+            if !self.attempt.sides.is_empty() {
+                self.mechanism.hold_elements(None);
+            }
+            let switched = switched || self.attempt.edge;
             let Record { account, wear, .. } = &mut self.state.record;
             account.powers = (!switched).then_some(end);
             if let Some(wear) = wear {

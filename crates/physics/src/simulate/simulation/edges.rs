@@ -1,0 +1,87 @@
+//! Edges of force elements as events: over a whole step a stop or a tyre presses, or does not, and the step ends where it begins or
+//! ceases to. Its force has a kink or a jump there, and a step across it errs in a way that its estimate does not see.
+
+use super::Simulation;
+use super::flights::put_flights;
+use crate::integrate::find_root;
+
+/// Parts of a step at whose ends elements are looked at.
+const PARTS: u32 = 4;
+/// An edge earlier than this fraction of the step was passed at its start.
+pub(super) const AT_START: f64 = 1e-9;
+
+impl Simulation {
+    /// Lets the elements that have edges stay on their side over the step about to be taken, if the method ends steps there: it
+    /// needs an interpolant as accurate as its steps.
+    pub(super) fn hold_sides(&mut self) {
+        if self.stepper.ends_on_interpolant() && self.mechanism.has_edges() {
+            let Self { mechanism, state, attempt, .. } = self;
+            mechanism.measure(state.now.t, &state.now.y);
+            attempt.sides.extend(mechanism.insides(state.now.t));
+        }
+    }
+
+    /// Fraction of the step just attempted at which the first element begins or ceases to press, if any does; 0 if one did so at
+    /// the start and has been put on the other side.
+    pub(super) fn first_edge(&mut self, h: f64) -> Option<f64> {
+        if self.attempt.sides.is_empty() {
+            return None;
+        }
+        let [mut left, mut right] = std::mem::take(&mut self.attempt.insides);
+        let mut from = AT_START;
+        self.look_inside(from, h, &mut left);
+        let turns = self.attempt.sides.iter().zip(&left).any(|(side, now)| (*side > 0.0) != (*now > 0.0));
+        // Once: if that leads back here, either side is as good.
+        if turns && !self.attempt.turned {
+            self.attempt.turned = true;
+            self.attempt.sides.copy_from_slice(&left);
+            self.attempt.insides = [left, right];
+            return Some(0.0);
+        }
+        let mut first: Option<f64> = None;
+        for n in 1..=PARTS {
+            let to = f64::from(n) / f64::from(PARTS);
+            self.look_inside(to, h, &mut right);
+            for (element, (&left, &right)) in left.iter().zip(&right).enumerate() {
+                if (left > 0.0) != (right > 0.0) {
+                    let width = (1e-15 / h).max(1e-12);
+                    // It returns an instant beyond the edge: before it the next step would start with the wrong force.
+                    let at = find_root(from, left, to, right, width, 0.0, |theta| self.inside(element, theta, h));
+                    first = Some(first.map_or(at, |first| first.min(at)));
+                }
+            }
+            if first.is_some() {
+                break;
+            }
+            std::mem::swap(&mut left, &mut right);
+            from = to;
+        }
+        self.attempt.insides = [left, right];
+        first
+    }
+
+    /// How far every element that has edges is inside, on the interpolant of the attempted step.
+    fn look_inside(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
+        let time = self.measure_all_at(theta, h);
+        out.clear();
+        out.extend(self.mechanism.insides(time));
+    }
+
+    /// The same of one of them.
+    fn inside(&mut self, element: usize, theta: f64, h: f64) -> f64 {
+        let time = self.measure_all_at(theta, h);
+        self.mechanism.insides(time).nth(element).unwrap_or_default()
+    }
+
+    /// Measures all bodies on the interpolant of the attempted step; returns the time there, s.
+    fn measure_all_at(&mut self, theta: f64, h: f64) -> f64 {
+        let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
+        let (now, end) = (&state.now, &attempt.end);
+        let all = 0..now.y.len();
+        stepper.interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, scratch_y);
+        let time = now.t + theta * h;
+        put_flights(mechanism, &state.flights, time, scratch_y);
+        mechanism.measure(time, scratch_y);
+        time
+    }
+}
