@@ -1,5 +1,5 @@
 //! Results computed from whole runs: cost and error of the methods, cost of the parts of the model, responses beside the
-//! ideal motion, Poincaré sections, Lyapunov exponents, regimes, sweeps, the paper's section 4. Starts no threads, and
+//! ideal motion, Poincaré sections, Lyapunov exponents, regimes, sweeps, the paper's section 4, cases with known answers. Starts no threads, and
 //! its clock comes from outside ([`RunContext`]).
 
 mod cost;
@@ -27,6 +27,7 @@ mod stretch;
 pub mod sweep;
 pub mod sweep_task;
 pub mod task;
+pub mod validation;
 mod work_precision;
 
 pub use cost::{CaseCost, CostCase, model_costs};

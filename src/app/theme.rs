@@ -170,7 +170,7 @@ mod tests {
         output.textures_delta.clear();
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut shown = vec![crate::scene::reference_page()];
-        for folder in ["src/app", "assets/scenes", "assets/lessons"] {
+        for folder in ["src/app", "assets/scenes", "assets/benchmarks", "assets/lessons"] {
             texts(&root.join(folder), &mut shown);
         }
         let shown: std::collections::BTreeSet<char> = shown.iter().flat_map(|text| text.chars()).collect();

@@ -23,7 +23,7 @@ pub struct Arguments {
 pub enum Command {
     /// Open the window on a scene.
     View(ViewArguments),
-    /// List the built-in scenes.
+    /// List the built-in scenes, and the benchmarks with which `validate` compares the program.
     Scenes,
     /// List the built-in lessons; or compute what a lesson measures, print it with its values and answers, and say what in it
     /// does not hold.
@@ -44,6 +44,8 @@ pub enum Command {
     Merge(MergeArguments),
     /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
+    /// Compute the cases whose answers are known otherwise, and set the right values beside ours: `docs/validation.md` (Markdown).
+    Validate(ValidateArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
     /// Print the page about scene files: a guide, and the reference of every key (Markdown).
@@ -55,7 +57,7 @@ pub enum Command {
 /// A scene and what to change in it.
 #[derive(Debug, Args)]
 pub struct SceneArguments {
-    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
+    /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`).
     pub scene: OsString,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
@@ -83,7 +85,7 @@ pub struct CheckArguments {
 /// `view`.
 #[derive(Debug, Args)]
 pub struct ViewArguments {
-    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved.
+    /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved.
     #[arg(default_value = super::DEFAULT_SCENE)]
     pub scene: OsString,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
@@ -311,7 +313,7 @@ pub struct RenderArguments {
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("what").required(true).args(["scene", "all"]))]
 pub struct TradeoffArguments {
-    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
+    /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`).
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change, conflicts_with = "all")]
@@ -354,6 +356,17 @@ pub struct ReproduceArguments {
     /// No progress.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// `validate`.
+#[derive(Debug, Args)]
+pub struct ValidateArguments {
+    /// File to write in place of standard output.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long, requires = "out")]
+    pub force: bool,
 }
 
 /// `bench`.

@@ -30,6 +30,7 @@ mod survival;
 mod sweep;
 mod tables;
 pub mod tradeoff;
+pub mod validate;
 mod wear;
 
 use std::fmt::Write as _;
@@ -41,7 +42,7 @@ use clap::Parser;
 use self::args::{Arguments, Command, LessonArguments, SceneArguments, ViewArguments};
 pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
-use crate::scene::{BUILT_IN, Scene, reference_page, visible};
+use crate::scene::{BENCHMARKS, BUILT_IN, Scene, reference_page, visible};
 use crate::simulate::Simulation;
 
 /// Runs the command line; returns the exit code.
@@ -91,6 +92,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
+        Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
         Some(Command::Reference) => print(&reference::page()),
         Some(Command::Schema) => print(&schema::page()),
@@ -141,7 +143,7 @@ fn no_graphics() -> Failure {
 
 fn scenes() -> Result<String, Failure> {
     let mut out = String::new();
-    for name in BUILT_IN {
+    for name in BUILT_IN.into_iter().chain(BENCHMARKS) {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{name:<22}{}", Scene::load(name, &[])?.title);
     }

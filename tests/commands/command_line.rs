@@ -487,6 +487,18 @@ fn lessons_are_listed_and_a_file_is_checked() {
 }
 
 #[test]
+fn cases_with_known_answers_make_their_page() {
+    let folder = folder();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
+    let kept = std::fs::read_to_string(path).unwrap();
+    assert!(jointplay(folder.path(), "validate").expect(0).stdout == kept);
+    let out = jointplay(folder.path(), "validate --out page.md").expect(0).stdout;
+    assert_eq!(out, "");
+    assert!(fs::read_to_string(folder.path().join("page.md")).unwrap() == kept);
+    jointplay(folder.path(), "validate --out page.md").expect(1);
+}
+
+#[test]
 fn scenes_are_listed_and_each_says_what_it_contains() {
     let folder = folder();
     let list = jointplay(folder.path(), "scenes").expect(0).stdout;
@@ -508,7 +520,11 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
             assert!(report.contains(word), "{scene}: `{word}` is not in:\n{report}");
         }
     }
-    assert_eq!(list.lines().count(), 10);
+    for scene in BENCHMARKS {
+        assert!(list.lines().any(|line| line.split_whitespace().next() == Some(scene)), "{list}");
+        jointplay(folder.path(), &format!("check {scene}")).expect(0);
+    }
+    assert_eq!(list.lines().count(), BUILT_IN.len() + BENCHMARKS.len());
 
     let line_of = |report: &str, label: &str| {
         let line = report.lines().find(|line| line.starts_with(label)).unwrap_or_else(|| panic!("{report}"));

@@ -40,6 +40,7 @@ mod spring_curves;
 mod twin;
 mod two_degrees;
 mod tyres;
+mod validation;
 mod walls;
 mod wear;
 mod written;

@@ -7,19 +7,30 @@ use std::ffi::OsStr;
 use std::io::Read;
 use std::path::Path;
 
-/// Names of the built-in scenes.
-pub const BUILT_IN: [&str; 10] = [
-    "spcmm",
-    "pendulum",
-    "slider-crank",
-    "slider-crank-driven",
-    "chain",
-    "hexapod",
-    "delta",
-    "four-bar",
-    "suspension",
-    "press",
-];
+/// Scenes that are embedded in the program: lists of their names, each with the folder of `assets/` in which they lie, and their texts.
+macro_rules! embedded {
+    ($($(#[$about:meta])* $list:ident in $folder:literal: $($name:literal),+;)+) => {
+        $($(#[$about])* pub const $list: [&str; [$($name),+].len()] = [$($name),+];)+
+
+        /// TOML text of a built-in scene or of a benchmark.
+        pub fn built_in_text(name: &str) -> Option<&'static str> {
+            Some(match name {
+                $($($name => include_str!(concat!("../../../../assets/", $folder, "/", $name, ".toml")),)+)+
+                _ => return None,
+            })
+        }
+    };
+}
+
+embedded! {
+    /// Names of the built-in scenes, which the window lists.
+    BUILT_IN in "scenes":
+        "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain", "hexapod", "delta", "four-bar", "suspension", "press";
+    /// Names of the benchmarks, with which `jointplay validate` compares the program: known by name alone.
+    BENCHMARKS in "benchmarks":
+        "simple-pendulum", "n-four-bar", "squeezer", "bricard", "governor", "flores", "flip", "cardan", "backlash", "ball",
+        "scott-russell", "trammel";
+}
 
 /// The scene that opens if none is named.
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
@@ -42,25 +53,14 @@ pub fn too_large() -> String {
     format!("too large for a scene file: more than {} MiB", LARGEST_FILE >> 20)
 }
 
-/// TOML text of a built-in scene.
-pub fn built_in_text(name: &str) -> Option<&'static str> {
-    Some(match name {
-        "spcmm" => include_str!("../../../../assets/scenes/spcmm.toml"),
-        "pendulum" => include_str!("../../../../assets/scenes/pendulum.toml"),
-        "slider-crank" => include_str!("../../../../assets/scenes/slider-crank.toml"),
-        "slider-crank-driven" => include_str!("../../../../assets/scenes/slider-crank-driven.toml"),
-        "chain" => include_str!("../../../../assets/scenes/chain.toml"),
-        "hexapod" => include_str!("../../../../assets/scenes/hexapod.toml"),
-        "delta" => include_str!("../../../../assets/scenes/delta.toml"),
-        "four-bar" => include_str!("../../../../assets/scenes/four-bar.toml"),
-        "suspension" => include_str!("../../../../assets/scenes/suspension.toml"),
-        "press" => include_str!("../../../../assets/scenes/press.toml"),
-        _ => return None,
-    })
+/// The name of a built-in scene or a benchmark that is nearest to `name`, as a question, and both lists.
+fn known_names(name: &str) -> (String, String) {
+    let near = nearest(name, BUILT_IN.into_iter().chain(BENCHMARKS));
+    (near, format!("{}; benchmarks: {}", BUILT_IN.join(", "), BENCHMARKS.join(", ")))
 }
 
 impl Scene {
-    /// A built-in scene by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; the last
+    /// A built-in scene or a benchmark by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; the last
     /// change of a key wins.
     ///
     /// # Errors
@@ -77,11 +77,10 @@ impl Scene {
         match built_in_text(argument) {
             Some(text) => Self::parse(text, None, changes),
             None => {
-                let near = nearest(argument, BUILT_IN);
+                let (near, known) = known_names(argument);
                 let message = format!(
-                    "no built-in scene `{}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
-                    visible_line(&brief(argument)),
-                    BUILT_IN.join(", ")
+                    "no built-in scene `{}`{near}; built in: {known}; the name of a file contains `/` or ends in `.toml`",
+                    visible_line(&brief(argument))
                 );
                 Err(SceneError { message, ..SceneError::default() })
             }
@@ -98,11 +97,8 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
     };
     let metadata = std::fs::metadata(path).map_err(|cause| {
         let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
-        let near = nearest(stem, BUILT_IN);
-        error(format!(
-            "cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {}{near}",
-            BUILT_IN.join(", ")
-        ))
+        let (near, known) = known_names(stem);
+        error(format!("cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {known}{near}"))
     })?;
     if metadata.is_dir() {
         return Err(error("this is a directory, not a scene file".to_owned()));
