@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use jointplay::scene::{BENCHMARKS, BUILT_IN};
 use serde_json::Value as Json;
 
 #[cfg(target_os = "linux")]
@@ -490,7 +491,7 @@ fn lessons_are_listed_and_a_file_is_checked() {
 fn cases_with_known_answers_make_their_page() {
     let folder = folder();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
-    let kept = std::fs::read_to_string(path).unwrap();
+    let kept = fs::read_to_string(path).unwrap();
     assert!(jointplay(folder.path(), "validate").expect(0).stdout == kept);
     let out = jointplay(folder.path(), "validate --out page.md").expect(0).stdout;
     assert_eq!(out, "");

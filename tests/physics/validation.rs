@@ -9,5 +9,8 @@ fn every_case_is_within_its_bound_and_the_page_says_so() {
     assert!(missed.is_empty(), "not within their bounds: {missed:#?}");
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
     let kept = std::fs::read_to_string(path).unwrap_or_default();
-    assert!(kept == page, "docs/validation.md is not what this makes: jointplay validate --out docs/validation.md --force");
+    assert!(
+        kept == page,
+        "docs/validation.md is not what this makes: jointplay validate --out docs/validation.md --force"
+    );
 }

@@ -21,6 +21,13 @@ fn the_page_of_parameters_is_what_the_program_prints() {
     assert!(read("docs/parameters.md") == reference_page(), "cargo run -- parameters > docs/parameters.md");
 }
 
+#[test]
+fn the_citation_names_this_version() {
+    let citation = read("CITATION.cff");
+    let version = citation.lines().find_map(|line| line.strip_prefix("version: "));
+    assert_eq!(version, Some(env!("CARGO_PKG_VERSION")));
+}
+
 /// The blocks of TOML of the page about scenes.
 fn examples() -> Vec<String> {
     let page = read("docs/scene-format.md");

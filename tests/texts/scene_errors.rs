@@ -388,7 +388,11 @@ fn what_is_no_scene_file_at_all_is_said_plainly() {
     let error = load("spcm");
     assert!(!error.unreadable);
     holds("misspelt", &error, &["no built-in scene `spcm`", "did you mean `spcmm`", "pendulum"]);
-    holds("misspelt benchmark", &load("squeezr"), &["did you mean `squeezer`", "built in: spcmm", "benchmarks: simple-pendulum"]);
+    holds(
+        "misspelt benchmark",
+        &load("squeezr"),
+        &["did you mean `squeezer`", "built in: spcmm", "benchmarks: simple-pendulum"],
+    );
     holds("misspelt file", &load("slider-crnk.toml"), &["did you mean `slider-crank`", "benchmarks"]);
 }
 

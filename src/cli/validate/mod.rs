@@ -57,11 +57,8 @@ fn row(case: &Case, check: &Check, comparison: &Comparison) -> Vec<String> {
     let difference = comparison.difference();
     // What is small against the bound may change with the compiler.
     let least = bound / 100.0;
-    let difference = if difference.abs() < least {
-        format!("below {}", significant(least, 1))
-    } else {
-        significant(difference, 2)
-    };
+    let difference =
+        if difference.abs() < least { format!("below {}", significant(least, 1)) } else { significant(difference, 2) };
     let unit = if check.unit.is_empty() { String::new() } else { format!(" ({})", check.unit) };
     vec![
         case.title.clone(),
@@ -100,7 +97,7 @@ mod tests {
     fn numbers_end_at_a_hundredth_of_the_bound() {
         assert_eq!(resolved(15.810_771_196_299, 1e-8), "15.8107711963");
         assert_eq!(resolved(45_924.953_2, 1.0), "45924.95");
-        assert_eq!(resolved(4.974_135_8e-8, 1e-13), "4.97414e-08");
+        assert_eq!(resolved(4.974_135_8e-8, 1e-13), "4.9741358e-08");
         assert_eq!(resolved(1.7e-15, 1e-9), "0");
         assert_eq!(resolved(0.0, 1e-9), "0");
     }
