@@ -65,6 +65,53 @@ fn a_body_weighs_what_its_mesh_encloses() {
 }
 
 #[test]
+fn a_mesh_that_does_not_fit_its_machine_is_warned_of_with_the_unit_that_does() {
+    let metres = BOX.replace("10", "0.01").replace("20", "0.02").replace("30", "0.03");
+    let folder = Folder::with(&[("arm.obj", BOX.as_bytes()), ("metres.obj", metres.as_bytes())]);
+    // A wheel on its hinge, beside an arm of 0.4 m.
+    let machine = "child_point = [0, 0, 0]\n\n[[body]]\nname = \"long\"\nmass = \"1 kg\"\ninertia = \"1e-6 1e-6 1e-6 kg m^2\"\n\n\
+                   [[joint]]\nname = \"end\"\nkind = \"revolute\"\nchild = \"long\"\nparent = \"arm\"\naxis = [0, 1, 0]\n\
+                   child_point = \"400 0 0 mm\"\n";
+    let held = "child_point = \"0 0 30 mm\"\n";
+    for (file, unit, keys, rest, better) in [
+        ("arm.obj", "m", HEAVY, held, Some("unit = \"mm\" would make it 37.4 mm")),
+        ("arm.obj", "m", GIVEN, "", Some("the rest of the machine 38.7 mm; unit = \"mm\"")),
+        (
+            "arm.obj",
+            "m",
+            HEAVY,
+            machine,
+            Some("with the unit 1 m this mesh reaches 37.4 m, the rest of the machine 400 mm"),
+        ),
+        ("metres.obj", "mm", HEAVY, held, Some("unit = \"m\" would make it 37.4 mm")),
+        ("metres.obj", "mm", GIVEN, "", Some("reaches 0.0374 mm, the rest of the machine 38.7 mm; unit = \"m\"")),
+        ("metres.obj", "mm", HEAVY, machine, Some("unit = \"m\"")),
+        // Nothing to compare it with, or nothing wrong: a part may be small in its machine, and reach beyond its points.
+        ("arm.obj", "m", HEAVY, "", None),
+        ("metres.obj", "mm", HEAVY, "", None),
+        ("arm.obj", "mm", HEAVY, held, None),
+        ("arm.obj", "mm", GIVEN, "", None),
+        ("arm.obj", "mm", HEAVY, machine, None),
+        ("metres.obj", "m", HEAVY, "child_point = \"0 0 2 mm\"\n", None),
+        ("arm.obj", "25.4 mm", HEAVY, machine, None),
+    ] {
+        let shape = format!("form = \"mesh\", file = \"{file}\", unit = \"{unit}\"");
+        let read = folder.read(&(scene(&shape, keys) + rest)).unwrap();
+        let warnings: Vec<String> = read.warnings().iter().map(ToString::to_string).collect();
+        match better {
+            None => assert_eq!(warnings, [""; 0], "{file} {unit} {keys} {rest}"),
+            Some(better) => {
+                let said = |w: &String| w.starts_with("body.arm.shapes[0]: with the unit 1 m") && w.contains(better);
+                assert!(warnings.len() == 1 && said(&warnings[0]), "{file} {unit} {keys} {rest}: {warnings:?}");
+            }
+        }
+    }
+    let two = format!("{OBJ} }}, {{ {OBJ}").replace("\"mm\"", "\"m\"");
+    let warnings = folder.read(&scene(&two, GIVEN)).unwrap().warnings();
+    assert!(warnings[0].to_string().contains(" (and 1 more): with the unit 1 m"), "{warnings:?}");
+}
+
+#[test]
 fn a_mesh_is_read_once() {
     let bytes = stl(0);
     let folder = Folder::with(&[("arm.stl", &bytes)]);

@@ -63,6 +63,7 @@ impl Scene {
                 warnings.push(Warning::StiffFriction { joints, slip_speed_high: contact.slip_speed_high });
             }
         }
+        warnings.extend(self.mesh_unit_warning());
         warnings
     }
 

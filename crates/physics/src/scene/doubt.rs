@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::format_quantity;
+use super::{format_quantity, format_quantity_digits};
 use crate::contact::{self, NormalLaw};
 
 /// Why a scene's results are not to be trusted, whatever happens in the run. Its `Display` is a sentence for the user.
@@ -123,19 +123,37 @@ pub enum Warning {
         /// `slip_speed_high`, m/s.
         slip_speed_high: f64,
     },
+    /// A mesh much larger or smaller than the machine around it.
+    MeshUnit {
+        /// Key of the shape.
+        shape: String,
+        /// How many others are like it.
+        others: usize,
+        /// Length of its unit, m.
+        unit: f64,
+        /// How far it reaches from its origin, m.
+        reach: f64,
+        /// How far everything else does, m.
+        rest: f64,
+        /// A unit that fits.
+        better: &'static str,
+        /// How far it reaches with that, m.
+        at_better: f64,
+    },
 }
 
 /// Kind of a warning: two of the same kind differ only in numbers and names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct WarningKind(Option<std::mem::Discriminant<Doubt>>);
+pub struct WarningKind(std::mem::Discriminant<Warning>, Option<std::mem::Discriminant<Doubt>>);
 
 impl Warning {
     /// Its kind.
     pub fn kind(&self) -> WarningKind {
-        WarningKind(match self {
+        let doubt = match self {
             Self::Doubt(doubt) => Some(std::mem::discriminant(doubt)),
-            Self::StiffFriction { .. } => None,
-        })
+            Self::StiffFriction { .. } | Self::MeshUnit { .. } => None,
+        };
+        WarningKind(std::mem::discriminant(self), doubt)
     }
 
     /// Whether other `[solver]` settings would remove it.
@@ -153,6 +171,19 @@ impl fmt::Display for Warning {
                 "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
                 format_quantity(*slip_speed_high, "mm/s")
             ),
+            Self::MeshUnit { shape, others, unit, reach, rest, better, at_better } => {
+                let length = |m: f64| format_quantity_digits(m, if m < 1.0 { "mm" } else { "m" }, 3);
+                let more = if *others > 0 { format!(" (and {others} more)") } else { String::new() };
+                write!(
+                    f,
+                    "{shape}{more}: with the unit {} this mesh reaches {}, the rest of the machine {}; unit = \"{better}\" would \
+                     make it {}.",
+                    length(*unit),
+                    length(*reach),
+                    length(*rest),
+                    length(*at_better)
+                )
+            }
         }
     }
 }

@@ -20,6 +20,7 @@ mod given;
 mod include;
 mod key;
 mod load;
+mod mesh_unit;
 mod model;
 mod numbers;
 mod outline;

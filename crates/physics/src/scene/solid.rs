@@ -85,6 +85,11 @@ impl Solid {
         Mat3::identity() * self.second.trace() - self.second
     }
 
+    /// Distance of the centroid from the origin and the radius of gyration about it, added, m: about how far it reaches.
+    pub fn reach(&self) -> f64 {
+        self.centre.norm() + (self.second.trace() / self.volume).sqrt()
+    }
+
     fn new(volume: f64, centre: Vec3, second: Mat3) -> Self {
         Self { volume, centre, second }
     }

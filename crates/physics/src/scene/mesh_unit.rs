@@ -1,0 +1,97 @@
+//! Meshes whose unit hardly fits the machine around them: millimetres read as metres, or the other way round.
+
+use super::solid::Solid;
+use super::*;
+
+/// A mesh that reaches this many times as far as anything else in the machine has the wrong unit: a part hung by points so close
+/// together is rare, and the slip is a factor of 1000.
+const LARGE: f64 = 30.0;
+
+/// So has one that reaches less than this fraction of what else belongs to its body,
+const SMALL_ON_BODY: f64 = 0.01;
+/// or than this of the machine, which may have screws.
+const SMALL_IN_MACHINE: f64 = 0.001;
+
+/// What a file is likely to be in, with what the key `unit` then says.
+const UNITS: [(&str, f64); 2] = [("mm", 1e-3), ("m", 1.0)];
+
+impl Scene {
+    /// The warning of the mesh whose unit fits worst, if another would make it fit.
+    pub(super) fn mesh_unit_warning(&self) -> Option<Warning> {
+        let is_mesh = |shape: &Shape| matches!(shape.geometry, Geometry::Mesh { .. });
+        if !self.bodies.iter().any(|body| body.shapes.iter().any(is_mesh)) {
+            return None;
+        }
+        let bodies = self.reaches_without_meshes();
+        let machine = bodies.iter().copied().fold(self.span_of_world_points(), f64::max);
+        let mut odd = Vec::new();
+        for (body, own) in self.bodies.iter().zip(bodies) {
+            for (index, shape) in body.shapes.iter().enumerate() {
+                let Geometry::Mesh { mesh, unit, .. } = &shape.geometry else { continue };
+                let corner = mesh.bounds().map(|corner| corner.map(|x| f64::from(x).abs()));
+                let corner = [0, 1, 2].map(|i| corner[0][i].max(corner[1][i]));
+                let of_unit = Vec3::from(corner).norm();
+                let fault = |unit: f64| {
+                    let reach = of_unit * unit;
+                    let large = reach / (LARGE * machine);
+                    let small = (SMALL_ON_BODY * own / reach).max(SMALL_IN_MACHINE * machine / reach);
+                    large.max(small)
+                };
+                let better = UNITS.into_iter().find(|(_, other)| other != unit && fault(*other) <= 1.0);
+                if let (true, Some((better, other))) = (machine > 0.0 && fault(*unit) > 1.0, better) {
+                    let shape = format!("body.{}.shapes[{index}]", body.name);
+                    let rest = if of_unit * unit < SMALL_ON_BODY * own { own } else { machine };
+                    odd.push((fault(*unit), shape, [of_unit * unit, of_unit * other, rest], *unit, better));
+                }
+            }
+        }
+        let others = odd.len().saturating_sub(1);
+        let worst = odd.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        worst.map(|(_, shape, [reach, at_better, rest], unit, better)| Warning::MeshUnit {
+            shape,
+            others,
+            unit,
+            reach,
+            rest,
+            better,
+            at_better,
+        })
+    }
+
+    /// How far from each body's origin lies what belongs to it and has no mesh, m: points where it is held or pushed, other
+    /// shapes, and the mass where the file gives it.
+    fn reaches_without_meshes(&self) -> Vec<f64> {
+        let mut reaches: Vec<f64> = vec![0.0; self.bodies.len()];
+        for point in self.points() {
+            if let Some(body) = point.body {
+                reaches[body] = reaches[body].max(point.point.norm());
+            }
+        }
+        for (reach, body) in reaches.iter_mut().zip(&self.bodies) {
+            let forms = body.shapes.iter().map(|shape| &shape.geometry);
+            let forms = forms.filter(|form| !matches!(form, Geometry::Mesh { .. }));
+            *reach = forms.map(|form| Solid::of(form).reach()).fold(*reach, f64::max);
+            if body.density.is_none() {
+                let gyration = (0.5 * body.inertia.trace() / body.mass).sqrt();
+                *reach = reach.max(body.centre.norm() + gyration);
+            }
+        }
+        reaches
+    }
+
+    /// Diagonal of the box around the points of the world to which joints and elements hold, m.
+    fn span_of_world_points(&self) -> f64 {
+        let mut points = self.points().filter(|point| point.body.is_none()).map(|point| point.point);
+        let Some(first) = points.next() else { return 0.0 };
+        let (low, high) = points.fold((first, first), |(low, high), point| (low.inf(&point), high.sup(&point)));
+        (high - low).norm()
+    }
+
+    /// The points of all joints and force elements.
+    fn points(&self) -> impl Iterator<Item = Attachment> {
+        let joints = self.joints.iter().chain(&self.closing_joints).flat_map(Joint::points);
+        let balls = self.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
+        let elements = self.elements.iter().flat_map(|element| element.points.iter().copied());
+        joints.chain(balls).chain(elements)
+    }
+}
