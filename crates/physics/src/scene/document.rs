@@ -2,12 +2,13 @@
 
 use super::beside::Beside;
 use super::copy::Copy as PatternCopy;
-use super::error::{brief, nearest};
+use super::error::{brief, nearest, place_of};
 use super::given::{FileNumber, Place};
 use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
 use super::parameters::{Kind, ValueFault};
 use super::reading::Reading;
 use super::units::{all_units, same_unit, split_unit};
+use super::visible::visible_line;
 use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
 use crate::words::Words;
 use std::borrow::Cow;
@@ -259,6 +260,16 @@ impl<'d> Node<'d> {
         }
         let span = self.value.span();
         self.document.error(span.clone(), &self.key, Some(&self.document.excerpt(span)), message)
+    }
+
+    /// The error that this names another `what` by the `name` that `first` has given to one.
+    pub fn repeats(&self, first: &Self, what: &str, name: &str) -> SceneError {
+        let (line, _) = place_of(first.document.text, first.place());
+        let file = first.document.file.filter(|_| first.document.file != self.document.file);
+        let of_file = file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
+        self.error(format!(
+            "there is already a {what} of this name, in line {line}{of_file}; names must differ, for example `{name}2`"
+        ))
     }
 
     fn wrong_type(&self, wanted: &str) -> SceneError {

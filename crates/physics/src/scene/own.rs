@@ -15,9 +15,11 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, Scene
     let nodes = lists(files, "parameter", Vec::new())?;
     for (i, node) in nodes.iter().enumerate() {
         let own = read_parameter(node).map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
-        if all.iter().any(|other| other.key == own.key) {
-            let name = node.section()?.require("name")?;
-            return Err(name.error("there is already a parameter of this name; names must differ"));
+        if let Some(first) = all.iter().position(|other| other.key == own.key) {
+            let [name, first] =
+                [node, &nodes[first]].map(|node| node.section_as(node.title("parameter"))?.require("name"));
+            let name = name?;
+            return Err(name.repeats(&first?, "parameter", &name.name()?));
         }
         all.push(own);
     }

@@ -1,6 +1,6 @@
 //! Patterns: a group of bodies, joints and elements of a scene file, repeated about an axis or along a line.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use toml::de::DeValue;
 
@@ -20,13 +20,13 @@ pub(super) struct Pattern<'d> {
 /// # Errors
 /// Anything wrong in their own keys, or too many copies.
 pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>>, SceneError> {
-    let mut names = BTreeSet::new();
+    let mut names = BTreeMap::new();
     let mut patterns = Vec::new();
     for node in lists(files, "pattern", Vec::new())? {
         let pattern = read_pattern(&node)?;
         let name = pattern.section.require("name")?;
-        if !names.insert(name.text()?) {
-            return Err(name.error("there is already a pattern of this name; names must differ"));
+        if let Some(first) = names.insert(name.text()?, name.clone()) {
+            return Err(name.repeats(&first, "pattern", name.text()?));
         }
         patterns.push(pattern);
     }

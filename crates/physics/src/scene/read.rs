@@ -3,7 +3,7 @@
 use super::beside::Beside;
 use super::document::{Document, Node, Section, lists};
 use super::elements::read_element;
-use super::error::{no_body, place_of};
+use super::error::no_body;
 use super::format::FILE;
 use super::include::{self, included_texts};
 use super::own::read_own;
@@ -408,15 +408,7 @@ impl<'d> Names<'d> {
         let node = section.require("name")?;
         match self.places.insert(name.to_owned(), node.clone()) {
             None => Ok(()),
-            Some(first) => {
-                let document = &first.document;
-                let (line, _) = place_of(document.text, first.place());
-                let file = document.file.filter(|_| document.included);
-                let of_file = file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
-                Err(node.error(format!(
-                    "there is already a {what} of this name, in line {line}{of_file}; names must differ, for example `{name}2`"
-                )))
-            }
+            Some(first) => Err(node.repeats(&first, what, name)),
         }
     }
 }

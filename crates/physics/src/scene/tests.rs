@@ -579,7 +579,31 @@ ball = { body = \"leg\" }
     for (leg, text, place, wanted) in [
         (leg.replace("2 kg", "2"), text.to_owned(), "leg.toml:8:8: body.leg.mass", "needs a unit"),
         (leg.replace("[[body]]", "[[body"), text.to_owned(), "leg.toml:6:7: ", "not valid TOML"),
-        (format!("start = \"ideal\"\n{leg}"), text.to_owned(), "leg.toml:1:1: start", "unknown key"),
+        (
+            format!("start = \"ideal\"\n{leg}"),
+            text.to_owned(),
+            "leg.toml:1:1: start",
+            "move it to the scene's own file",
+        ),
+        (
+            format!("include = [\"foot.toml\"]\n{leg}"),
+            text.to_owned(),
+            "leg.toml:1:1: include: ",
+            "name them in `include` of the scene's own file",
+        ),
+        (text.to_owned(), text.to_owned(), "scene.toml:2:12: include[0]", "cannot include itself"),
+        (
+            leg.to_owned(),
+            text.replace("[[ball", "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[ball"),
+            "leg.toml:7:8: body.leg.name = \"leg\"",
+            "in line 5 of scene.toml; names must differ, for example `leg2`",
+        ),
+        (
+            leg.to_owned(),
+            text.replace("[[ball", "[[parameter]]\nname = \"reach\"\nvalue = \"1 mm\"\n[[ball"),
+            "leg.toml:3:8: parameter.reach.name = \"reach\"",
+            "in line 5 of scene.toml; names must differ",
+        ),
         (leg.to_owned(), text.replace("leg.toml", "arm.toml"), "scene.toml:2:12: include[0]", "has no folder"),
         (
             leg.to_owned(),
