@@ -295,10 +295,10 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
 #[test]
 fn low_restitution_with_the_papers_law_is_commented_on() {
     let mut harness = window("spcmm");
-    assert!(harness.query_by_label_contains("right only near 1").is_none());
+    assert!(harness.query_by_label_contains("with lankarani-nikravesh gives").is_none());
     harness.get_by_role_and_label(Role::Slider, "Restitution").set_value_accesskit(0.3);
     harness.run();
-    let comments = harness.query_all_by_label_contains("right only near 1");
+    let comments = harness.query_all_by_label_contains("with lankarani-nikravesh gives");
     assert!(comments.count() > 0);
 }
 

@@ -236,6 +236,7 @@ pub fn rows() -> Vec<Row> {
             &[
                 ("joint.S1.clearance", "0"),
                 ("joint.S2.normal_law", "hertz"),
+                ("joint.S2.restitution", "1"),
                 ("joint.S2.friction_law", "none"),
                 ("joint.S3.normal_law", "gonthier"),
                 ("joint.S3.restitution", "0.3"),

@@ -3,19 +3,21 @@
 use std::fmt;
 
 use super::{format_quantity, format_quantity_digits};
-use crate::contact::{self, NormalLaw};
+use crate::contact::NormalLaw;
 
 /// Why a scene's results are not to be trusted, whatever happens in the run. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
-    /// A restitution for which the normal-force law was not derived.
+    /// A restitution that the normal-force law does not give.
     Restitution {
         /// Names of the joints.
         joints: String,
         /// Their law.
         law: NormalLaw,
         /// The restitution asked for.
-        restitution: f64,
+        asked: f64,
+        /// What an undisturbed impact gives.
+        given: f64,
     },
     /// A clearance so small that the contact patch is not small compared with the ball.
     Clearance {
@@ -63,12 +65,12 @@ impl fmt::Display for Doubt {
             Self::MoreJoints => {
                 f.write_str("More ball joints differ from one another: what speaks against each of them is not listed.")
             }
-            Self::Restitution { joints, law, restitution } => write!(
+            Self::Restitution { joints, law, asked, given } => write!(
                 f,
-                "{joints}: restitution {restitution} with {}, which is right only near 1 (asked for 0, it gives about \
-                 {:.2}); flores or gonthier suit low restitution.",
+                "{joints}: restitution {asked} with {} gives {given:.3} in an undisturbed impact; normal_law gonthier gives what \
+                 is asked for{}.",
                 law.word(),
-                contact::undisturbed_restitution(contact::damping_factor(*law, 0.0))
+                if *asked > 0.0 { "" } else { ", above 0" }
             ),
             Self::Clearance { joints, clearance, ball_radius } => write!(
                 f,

@@ -116,8 +116,8 @@ static TABLE: [Parameter; 29] = [
         number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
         Value::Number(DEFAULT.restitution),
         "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The law of Lankarani \
-         and Nikravesh is right only near 1 (asked for 0, it gives about 0.66); for low values choose flores or \
-         gonthier, which divide by this number and refuse 0.",
+         and Nikravesh is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
+         asked for, flores within 0.05; both divide by this number and refuse 0.",
         "Paper eq. (19)",
     ),
     contact(
@@ -179,8 +179,8 @@ static TABLE: [Parameter; 29] = [
         "High slip speed",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
         Value::Number(DEFAULT.slip_speed_high),
-        "v_theta: above this sliding speed friction is full; below it the joint counts as sticking. A smaller value \
-         is closer to true sticking and stiffer to compute.",
+        "v_theta: above this sliding speed friction is full; below it a ball creeps where dry friction would hold \
+         it. A smaller value creeps less and is stiffer to compute.",
         "Paper eq. (21)",
     ),
     contact(
@@ -212,8 +212,8 @@ static TABLE: [Parameter; 29] = [
         Kind::Choice(NormalLaw::WORDS),
         Value::Choice(DEFAULT.normal_law.word()),
         "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
-         elastic; hunt-crossley, flores and gonthier differ in their damping, and flores and gonthier suit low \
-         restitution.",
+         elastic; hunt-crossley, flores and gonthier differ in their damping, and gonthier alone gives the restitution \
+         asked for.",
         "Paper eq. (19) for lankarani-nikravesh",
     ),
     contact(

@@ -226,8 +226,26 @@ fn doubtful_choices_are_warned_of() {
     assert!(changed("spcmm", &[]).warnings().is_empty());
     let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).warnings();
     assert!(warnings.len() == 1 && warnings[0].to_string().contains("S1, S2, S3: restitution 0.3"), "{warnings:?}");
-    let fine = [("contact.restitution", "0.3"), ("contact.normal_law", "gonthier")];
-    assert!(changed("spcmm", &fine).warnings().is_empty());
+    for (law, asked, given) in [
+        ("lankarani-nikravesh", "0.9", None),
+        ("lankarani-nikravesh", "0.8", Some("0.847")),
+        ("hunt-crossley", "0.8", Some("0.833")),
+        ("hertz", "0.9", Some("1.000")),
+        ("hertz", "1", None),
+        ("flores", "0.7", None),
+        ("flores", "0.1", Some("0.069")),
+        ("gonthier", "0.1", None),
+    ] {
+        let warnings = changed("spcmm", &[("contact.restitution", asked), ("contact.normal_law", law)]).warnings();
+        let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        match given {
+            None => assert_eq!(said, [""; 0], "{law} {asked}"),
+            Some(given) => assert!(
+                said.len() == 1 && said[0].contains(&format!("restitution {asked} with {law} gives {given} ")),
+                "{law} {asked}: {said:?}"
+            ),
+        }
+    }
     let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).warnings();
     assert!(warnings.len() == 1 && warnings[0].to_string().starts_with("S2: clearance 0.01 mm"), "{warnings:?}");
     assert!(changed("spcmm", &[("contact.clearance", "0")]).warnings().is_empty());
