@@ -124,7 +124,7 @@ fn joints(player: &Player) -> Option<String> {
                 ContactState::Free => format!("{name} free"),
                 ContactState::Ideal => format!("{name} ideal, {force}"),
                 _ if settled => format!("{name} settled, {force}"),
-                ContactState::Stick => format!("{name} in contact, sticking, {force}"),
+                ContactState::Creep => format!("{name} in contact, creeping, {force}"),
                 ContactState::Slip => format!("{name} in contact, sliding, {force}"),
             }
         })

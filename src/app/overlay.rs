@@ -201,7 +201,7 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
             ContactState::Ideal => {
                 format!("{}  reaction {}", joint.name, newtons(&report.normal_force))
             }
-            ContactState::Stick | ContactState::Slip => format!(
+            ContactState::Creep | ContactState::Slip => format!(
                 "{}  normal {}, friction {}",
                 joint.name,
                 newtons(&report.normal_force),

@@ -1,4 +1,4 @@
-//! The timeline: the run so far from end to end. A lane for each ball joint shows when it was free, slid or stuck, and where
+//! The timeline: the run so far from end to end. A lane for each ball joint shows when it was free, slid or crept, and where
 //! its ball came into contact; flags show what was done. A click or a drag displays any instant.
 
 use eframe::egui::{
@@ -238,7 +238,7 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
 }
 
-/// The lanes between two times, s: sliding in half the joint's colour, sticking in full colour, and a mark where its ball came
+/// The lanes between two times, s: sliding in half the joint's colour, creeping in full colour, and a mark where its ball came
 /// into contact. A pixel column is coloured in proportion to the time in each state.
 fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), part: f32) {
     let dark = ui.visuals().dark_mode;
@@ -261,7 +261,7 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
             let weight = match state {
                 ContactState::Free => continue,
                 ContactState::Slip => 0.5,
-                ContactState::Stick | ContactState::Ideal => 1.0,
+                ContactState::Creep | ContactState::Ideal => 1.0,
             };
             let a = (begins.max(from) - scale.range.0) * per_second;
             let b = (ends.min(to) - scale.range.0) * per_second;
@@ -331,7 +331,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
             None => "not recorded",
             Some((.., ContactState::Free)) => "free",
             Some((.., ContactState::Slip)) => "sliding",
-            Some((.., ContactState::Stick)) => "sticking",
+            Some((.., ContactState::Creep)) => "creeping",
             Some((.., ContactState::Ideal)) => "ideal",
         };
         ui.label(format!("{name}: {words}"));
@@ -348,7 +348,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         ui.label(words);
     }
     let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half colour: \
-                sliding; full colour: sticking; mark: contact begins; pale: still to come, or abandoned.";
+                sliding; full colour: creeping, too slow for full friction; mark: contact begins; pale: still to come, or abandoned.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
 }
 

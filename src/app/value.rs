@@ -7,7 +7,7 @@ use crate::simulate::ContactState;
 pub fn contact(state: ContactState) -> &'static str {
     match state {
         ContactState::Free => "The ball touches nothing",
-        ContactState::Stick => "In contact, sticking",
+        ContactState::Creep => "In contact, creeping",
         ContactState::Slip => "In contact, sliding",
         ContactState::Ideal => "Ideal joint: no clearance",
     }

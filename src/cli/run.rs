@@ -209,7 +209,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if !arguments.channels.is_empty() {
             meta.insert("channels".into(), json!(arguments.channels));
         }
-        meta.insert("contact_states".into(), json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}));
+        meta.insert("contact_states".into(), json!({"0": "free", "1": "creep", "2": "slip", "3": "ideal"}));
         files.extend(file.fill(&table, meta)?);
         facts.insert("out".into(), json!(path.display().to_string()));
         summary::written(&mut text, table.len(), "row", &path);

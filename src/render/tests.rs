@@ -837,7 +837,7 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
         device.render(&list).expect("a picture")
     };
     let free = draw(ContactState::Free);
-    for state in [ContactState::Stick, ContactState::Slip] {
+    for state in [ContactState::Creep, ContactState::Slip] {
         let seen = differing(&draw(state), &free, 12);
         assert!(seen.len() > 60, "{state:?}: {} pixels", seen.len());
         // A ring: nothing at the point itself, and nothing far from it.

@@ -434,7 +434,7 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
 
 /// Unit vector from a joint's ball to where it touches, and 1 while it does.
 fn touch(report: &JointReport) -> [f32; 4] {
-    let touches = matches!(report.state, ContactState::Stick | ContactState::Slip);
+    let touches = matches!(report.state, ContactState::Creep | ContactState::Slip);
     let outwards = to_f32(&report.eccentricity).normalize_or_zero();
     outwards.extend(f32::from(u8::from(touches))).to_array()
 }

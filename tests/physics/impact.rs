@@ -182,7 +182,7 @@ fn contacts_that_exist_at_the_start_take_the_floor() {
     assert!(memory.active && memory.floored);
     assert_eq!(memory.approach_speed, 1e-3);
     assert_eq!(simulation.statistics().impacts[0], 1);
-    assert_eq!(frame.joints[0].state, ContactState::Stick);
+    assert_eq!(frame.joints[0].state, ContactState::Creep);
     assert_eq!(frame.joints[0].friction_force, Vec3::zeros());
     assert!(frame.bodies[0].acceleration.norm() < 1e-6);
 }
@@ -201,7 +201,7 @@ fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
             let off = (joint.friction_force - expected).norm();
             assert!(off < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
             assert!((joint.slip_speed - speed).abs() < 1e-12);
-            let state = if speed < 1e-4 { ContactState::Stick } else { ContactState::Slip };
+            let state = if speed < 1e-4 { ContactState::Creep } else { ContactState::Slip };
             assert_eq!(joint.state, state);
             // Newton and Euler about the centroid, the force at r n.
             let body = &frame.bodies[0];

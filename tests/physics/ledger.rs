@@ -211,7 +211,7 @@ fn live_changes_are_booked() {
         assert!((softer.residual() - arrived.residual()).abs() < 1e-15);
         simulation.set("contact.youngs_modulus", "400 GPa").unwrap();
         simulation.set("gravity.x", "-9.81 m/s^2").unwrap();
-        // Sticking is too stiff for a fixed step in the hard impacts that follow, and its ledger would say so.
+        // Creeping is too stiff for a fixed step in the hard impacts that follow, and its ledger would say so.
         simulation.set("contact.friction", "0").unwrap();
         let stiffer = ledger(&simulation);
         let jump = stiffer.elastic_change - softer.elastic_change;

@@ -1,4 +1,4 @@
-//! Machines with many loose joints: `automatic` steps friction implicitly while balls stick under load, and all of a long chain at
+//! Machines with many loose joints: `automatic` steps friction implicitly while balls creep under load, and all of a long chain at
 //! rest, at a part of the evaluations of explicit steps and with the same forces.
 
 use crate::common::{Changes, simulation};

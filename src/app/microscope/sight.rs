@@ -70,7 +70,7 @@ impl Sight {
         let (ball, ball_spin) = velocity_of(frame, &spec.ball);
         let (socket, socket_spin) = velocity_of(frame, &spec.socket);
         let velocity = ball - socket;
-        let touches = matches!(report.state, ContactState::Stick | ContactState::Slip);
+        let touches = matches!(report.state, ContactState::Creep | ContactState::Slip);
         let sliding = normal.filter(|_| touches).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);

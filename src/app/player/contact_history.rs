@@ -1,4 +1,4 @@
-//! When each ball joint was free, slid or stuck.
+//! When each ball joint was free, slid or crept.
 
 use crate::simulate::{ContactState, Frame};
 
@@ -91,7 +91,7 @@ impl ContactHistory {
         let first = states.partition_point(|(time, _)| *time < from);
         let pairs = states[first.saturating_sub(1)..].windows(2);
         let touches = |pair: &&[(f64, ContactState)]| {
-            pair[0].1 == ContactState::Free && matches!(pair[1].1, ContactState::Slip | ContactState::Stick)
+            pair[0].1 == ContactState::Free && matches!(pair[1].1, ContactState::Slip | ContactState::Creep)
         };
         pairs
             .filter(touches)
@@ -130,10 +130,10 @@ mod tests {
     }
 
     fn history() -> ContactHistory {
-        use ContactState::{Free, Slip, Stick};
+        use ContactState::{Creep, Free, Slip};
         let mut history = ContactHistory::default();
         history.begin(0.0);
-        let states = [Free, Free, Slip, Stick, Free, Slip, Slip];
+        let states = [Free, Free, Slip, Creep, Free, Slip, Slip];
         for (index, state) in states.into_iter().enumerate() {
             history.record(&frame(index as f64, state));
         }
@@ -142,10 +142,10 @@ mod tests {
 
     #[test]
     fn states_follow_one_another_without_gaps() {
-        use ContactState::{Free, Slip, Stick};
+        use ContactState::{Creep, Free, Slip};
         let history = history();
         let all: Vec<_> = history.states(0, 0.0, 9.0).collect();
-        let expected = [(0.0, 2.0, Free), (2.0, 3.0, Slip), (3.0, 4.0, Stick), (4.0, 5.0, Free), (5.0, 6.0, Slip)];
+        let expected = [(0.0, 2.0, Free), (2.0, 3.0, Slip), (3.0, 4.0, Creep), (4.0, 5.0, Free), (5.0, 6.0, Slip)];
         assert_eq!(all, expected);
         let part: Vec<_> = history.states(0, 2.5, 3.5).collect();
         assert_eq!(part, expected[1..3]);
@@ -164,12 +164,12 @@ mod tests {
             assert_eq!(history.next_contact(None, 5.0, false), Some(2.0));
             assert_eq!(history.next_contact(None, 5.1, false), Some(5.0));
             assert_eq!(history.next_contact(None, 2.0, false), None);
-            history.record(&frame(1.0, ContactState::Stick));
+            history.record(&frame(1.0, ContactState::Creep));
         }
         history.cut(2.5);
         assert_eq!(history.next_contact(None, 2.0, true), None);
         history.record(&frame(3.0, ContactState::Free));
-        history.record(&frame(4.0, ContactState::Stick));
+        history.record(&frame(4.0, ContactState::Creep));
         assert_eq!(history.next_contact(None, 2.0, true), Some(4.0));
     }
 

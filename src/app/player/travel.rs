@@ -76,7 +76,7 @@ impl Player {
         self.abandoned_future().map_or(self.reached, |left| left.to)
     }
 
-    /// When the ball joints were free, slid or stuck.
+    /// When the ball joints were free, slid or crept.
     pub fn contact_history(&self) -> &ContactHistory {
         &self.contact_history
     }

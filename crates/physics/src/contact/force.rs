@@ -340,10 +340,10 @@ mod tests {
         assert!((got - tangential).norm() < 1e-12 * 0.2);
         // Its dead band ends where the centres move at v_a |e| / delta.
         let ends = c.slip_low * at.distance / at.penetration;
-        for (part, sticks) in [(0.999, true), (1.001, false)] {
+        for (part, vanishes) in [(0.999, true), (1.001, false)] {
             let slow = tangential.normalize() * (part * ends);
             let force = c.force(&memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit), &at, || slow);
-            assert_eq!(force.friction == Vec3::zeros(), sticks, "{part}");
+            assert_eq!(force.friction == Vec3::zeros(), vanishes, "{part}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Friction of touching balls alone, linearised: what holds an explicit step back while a ball sticks under load.
+//! Friction of touching balls alone, linearised: what holds an explicit step back while a ball creeps under load.
 //!
 //! On the ramp of its friction law a joint under the load F_N answers to sliding like a damper of mu F_N / v_theta. With S the
 //! velocity of a contact point per velocity coordinate and W that of what friction reads, dQ/dv = sum S_c^T B_c W_c, three rows

@@ -86,8 +86,9 @@ pub enum ContactState {
     /// The ball touches nothing.
     #[default]
     Free,
-    /// In contact, sliding slower than `slip_speed_high`.
-    Stick,
+    /// In contact, sliding slower than `slip_speed_high`, where friction is below its full value: under any load along the wall
+    /// a ball creeps, and none sticks.
+    Creep,
     /// In contact and sliding.
     Slip,
     /// No clearance: a constraint.

@@ -87,7 +87,7 @@ fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, memory: 
     report.state = if !memory.active && gap.normal_force == 0.0 {
         ContactState::Free
     } else if gap.slip_speed < coefficients.slip_high {
-        ContactState::Stick
+        ContactState::Creep
     } else {
         ContactState::Slip
     };

@@ -416,7 +416,7 @@ pub(super) const TABLE: &[Signal] = &[
     listed(5, asked("@.penetration_rate", "@_penetration_rate_m_s", Joint(|joint| joint.penetration_rate), "rate of the penetration")),
     listed(5, asked("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the ball; of an ideal joint, its reaction")),
     listed(5, asked("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the ball")),
-    listed(5, asked("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 stick, 2 slip, 3 ideal")),
+    listed(5, asked("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 creep (slower than slip_speed_high), 2 slip, 3 ideal")),
 
     listed(0, asked(TIME, "t_s", Whole("time", |frame| frame.time), "simulated time")),
     both(Q::Position, 0, asked("@.pose.#", "#_m", Axes(|pose| pose.position), "origin of the output body")),
@@ -494,7 +494,7 @@ pub(super) const TIME: &str = "time";
 fn state_code(state: ContactState) -> f64 {
     match state {
         ContactState::Free => 0.0,
-        ContactState::Stick => 1.0,
+        ContactState::Creep => 1.0,
         ContactState::Slip => 2.0,
         ContactState::Ideal => 3.0,
     }
