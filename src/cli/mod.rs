@@ -14,6 +14,7 @@ mod measuring;
 pub mod output;
 #[cfg(feature = "gui")]
 mod page;
+mod peaks;
 mod progress;
 mod provenance;
 mod quantity;

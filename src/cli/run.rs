@@ -122,6 +122,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if let Some(impacts) = &mut impacts {
         impacts.begin_at(from);
     }
+    if simulation.load_peaks().is_none() {
+        simulation.keep_load_peaks();
+    }
     let wear_begins = wear.is_some() && simulation.wear().is_none();
     if wear_begins {
         simulation.keep_wear();

@@ -14,7 +14,7 @@ use crate::scene::{Scene, visible_line};
 use crate::simulate::{SavedState, Simulation};
 
 /// Counts the versions of the file's layout.
-const FORMAT: u64 = 2;
+const FORMAT: u64 = 3;
 /// Largest file that is read, bytes.
 const LARGEST: u64 = 1 << 30;
 

@@ -7,6 +7,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::impacts::Restitution;
 use super::output::significant;
+use super::peaks::{self, parts};
 use super::provenance;
 use crate::scene::{Preset, Scene};
 use crate::simulate::{Impact, Ledger, Simulation};
@@ -76,6 +77,7 @@ pub fn json(
     if let Json::Object(own) = own {
         summary.extend(own);
     }
+    peaks::describe(simulation, &mut summary);
     if let Some(ledger) = simulation.ledger() {
         summary.insert("energy_J".into(), energy(ledger));
     }
@@ -113,7 +115,7 @@ pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts
     let mut out = String::new();
     let mut line = |label: &str, value: String| {
         // Writing to a String cannot fail.
-        let _ = writeln!(out, "{label:<18}{value}");
+        let _ = writeln!(out, "{label:<17} {value}");
     };
     line("Scene", scene.name.clone());
     for (key, value) in &scene.changes {
@@ -157,6 +159,9 @@ pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts
             };
             line("  restitution", story);
         }
+    }
+    for part in parts(simulation) {
+        line(&part.label, part.words());
     }
     if let Some(ledger) = simulation.ledger() {
         let joules = |value: f64| significant(value, 4);

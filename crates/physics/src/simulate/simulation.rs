@@ -26,7 +26,7 @@ use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::{AnyStepper, Member};
-use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
+use super::{Frame, LoadPeaks, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
 use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, Touching};
@@ -75,6 +75,8 @@ pub struct Simulation {
     reference: Reference,
     /// Largest force seen by a sample, and when, by joint: not part of the state, which sampling must not change.
     sampled: Vec<(f64, f64)>,
+    /// Peaks of loads, if kept: not part of the state for the same reason.
+    loads: Option<LoadPeaks>,
     attempt: Attempt,
     scratch_y: Vec<f64>,
     scratch_k: Vec<f64>,
@@ -301,6 +303,7 @@ impl Simulation {
             stepper: AnyStepper::new(scene.solver.method, n),
             reference,
             sampled: vec![(0.0, 0.0); joints],
+            loads: None,
             attempt: Attempt {
                 end: StepEnd::new(vec![0.0; n], joints),
                 located: None,

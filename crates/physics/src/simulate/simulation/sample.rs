@@ -29,6 +29,9 @@ impl Simulation {
                 *sampled = (force, time);
             }
         }
+        if let Some(loads) = &mut self.loads {
+            loads.take(&mut self.mechanism, time);
+        }
         out.ledger = self.ledger_of(out);
         if !matches!(self.reference, Reference::Elsewhere) {
             out.probe_error = self.reference.error(out);

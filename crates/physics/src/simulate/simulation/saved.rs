@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::ideal::{Marks, Reference};
 use super::{Simulation, State, StepEnd};
 use crate::integrate::Polynomial;
-use crate::simulate::Snapshot;
+use crate::simulate::{LoadPeaks, Snapshot};
 
 /// Everything of a running simulation that its scene does not determine. It says nothing about the scene: whoever stores it
 /// stores that, too.
@@ -18,6 +18,8 @@ pub struct SavedState {
     ideal: Option<Box<SavedIdeal>>,
     /// Largest force seen by a sample, N, and when, s, by joint.
     sampled: Vec<(f64, f64)>,
+    /// Peaks of loads, if kept.
+    loads: Option<LoadPeaks>,
 }
 
 /// The state of the ideal motion alongside.
@@ -83,6 +85,7 @@ impl Simulation {
                 Reference::Elsewhere | Reference::Itself | Reference::None(_) => None,
             },
             sampled: self.sampled.clone(),
+            loads: self.loads.clone(),
         }
     }
 
@@ -94,6 +97,7 @@ impl Simulation {
         let polynomial = self.stepper.polynomial();
         let fits = saved.state.fits(self)
             && saved.sampled.len() == self.sampled.len()
+            && saved.loads.as_ref().is_none_or(|loads| loads.fits(&LoadPeaks::new(&self.running, &self.mechanism)))
             && saved.polynomial.is_some() == polynomial.is_some()
             && saved.polynomial.iter().all(|p| p.fits(self.state.now.y.len()));
         if !fits {
@@ -117,6 +121,7 @@ impl Simulation {
         };
         self.restore(&snapshot);
         self.sampled.copy_from_slice(&saved.sampled);
+        self.loads.clone_from(&saved.loads);
         Ok(())
     }
 }

@@ -1,10 +1,13 @@
 //! Peaks that the ends of a step do not show: its inside is sampled, as an output row would.
 
 use super::Simulation;
+use crate::simulate::LoadPeaks;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// A step whose forces stay below this fraction of their peaks so far is not searched.
 pub(super) const NEAR_PEAK: f64 = 0.5;
+/// Loads other than those of contacts are taken this often, s, where steps are shorter and no contact is near its peak.
+const LOADS_EVERY: f64 = 1e-4;
 /// Where a fixed step is sampled.
 const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
@@ -53,8 +56,34 @@ impl Simulation {
 
     /// Searches the step just accepted for peaks.
     pub(super) fn search_peaks(&mut self) {
+        let near = self.attempt.near_peak;
         self.search_contacts();
         self.search_reactions();
+        let smooth = !(0..self.state.now.gaps.len()).any(|j| self.mechanism.contacts.has_clearance(j));
+        let time = self.state.now.t;
+        if self.loads.as_ref().is_some_and(|loads| near || smooth || loads.age(time) >= LOADS_EVERY) {
+            self.look_at_loads();
+        }
+    }
+
+    /// Keeps the peaks of loads from now on. It does not affect the steps.
+    pub fn keep_load_peaks(&mut self) {
+        self.loads = Some(LoadPeaks::new(&self.running, &self.mechanism));
+        self.look_at_loads();
+    }
+
+    /// The peaks of loads at the ends of steps and in samples, if kept.
+    pub fn load_peaks(&self) -> Option<&LoadPeaks> {
+        self.loads.as_ref()
+    }
+
+    /// Takes the loads at the latest state.
+    fn look_at_loads(&mut self) {
+        let time = self.state.now.t;
+        self.look(time);
+        if let Some(loads) = &mut self.loads {
+            loads.evaluate(&mut self.mechanism, time);
+        }
     }
 
     /// Where a fixed step is long compared with an impact, an output row inside it sees other rates than the cubic through

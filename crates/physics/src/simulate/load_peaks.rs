@@ -1,0 +1,66 @@
+//! The largest loads of force elements and of all joints but ball joints.
+
+use serde::{Deserialize, Serialize};
+
+use crate::mechanism::Mechanism;
+use crate::scene::{JointKind, Scene, Vec3};
+
+/// The largest size of a force, N, or of a torque, N m, and when, s; `None` where there is no such load.
+pub type LoadPeak = Option<(f64, f64)>;
+
+/// Largest force and torque of each force element, each joint on which a body hangs, but free ones, and each joint that closes a
+/// loop, in the order of the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadPeaks {
+    parts: Vec<[LoadPeak; 2]>,
+    /// When the loads were last taken at the end of a step, s.
+    seen: f64,
+    actuators: Vec<f64>,
+}
+
+impl LoadPeaks {
+    pub(super) fn new(scene: &Scene, mechanism: &Mechanism) -> Self {
+        let holding = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+        let parts = scene.elements.len() + holding.count() + scene.closing_joints.len();
+        Self { parts: vec![[None; 2]; parts], seen: 0.0, actuators: vec![0.0; mechanism.drives()] }
+    }
+
+    /// Force and torque of each part.
+    pub fn parts(&self) -> &[[LoadPeak; 2]] {
+        &self.parts
+    }
+
+    /// How long ago at `time` the loads were last taken at the end of a step, s.
+    pub(super) fn age(&self, time: f64) -> f64 {
+        time - self.seen
+    }
+
+    /// Whether these are of a scene for which `own` are.
+    pub(super) fn fits(&self, own: &Self) -> bool {
+        self.parts.len() == own.parts.len() && self.actuators.len() == own.actuators.len()
+    }
+
+    /// Takes the loads at the end `time` of a step, at which everything has just been evaluated.
+    pub(super) fn evaluate(&mut self, mechanism: &mut Mechanism, time: f64) {
+        self.seen = time;
+        mechanism.actuators(&mut self.actuators);
+        self.take(mechanism, time);
+    }
+
+    /// Takes the loads at `time` after [`Mechanism::actuators`], which adds to the joints' loads each time.
+    pub(super) fn take(&mut self, mechanism: &mut Mechanism, time: f64) {
+        let mut parts = self.parts.iter_mut();
+        let mut rise = |loads: [Option<Vec3>; 2]| {
+            let part = parts.next().expect("a peak for each part");
+            for (peak, load) in part.iter_mut().zip(loads) {
+                let size = load.map(|load| load.norm());
+                if let Some(size) = size.filter(|size| peak.is_none_or(|(largest, _)| *size > largest)) {
+                    *peak = Some((size, time));
+                }
+            }
+        };
+        mechanism.element_reports(time).for_each(|element| rise([element.own_force(), element.torque]));
+        mechanism.joint_reactions().for_each(|load| rise(load.map(Some)));
+        mechanism.closing_loads().for_each(|load| rise(load.map(Some)));
+    }
+}

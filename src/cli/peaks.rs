@@ -1,0 +1,63 @@
+//! The peaks of force elements and of all joints but ball joints, in words and as JSON.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::output::significant;
+use crate::scene::JointKind;
+use crate::simulate::{LoadPeak, Simulation};
+
+/// Units of force and torque, and their members of a summary: value and time.
+const LOADS: [(&str, &str, &str); 2] =
+    [("N", "peak_force_N", "peak_force_time_s"), ("N m", "peak_torque_Nm", "peak_torque_time_s")];
+
+/// An element or a joint with the peaks of its force and its torque.
+pub struct Part<'a> {
+    /// What it is and its name.
+    pub label: String,
+    name: &'a str,
+    kind: &'static str,
+    peaks: [LoadPeak; 2],
+    /// Peaks up to these are rounding.
+    rounding: [f64; 2],
+}
+
+/// A peak below this part of the largest of all parts is rounding.
+const ROUNDING: f64 = 1e-12;
+
+impl Part<'_> {
+    /// Its kind and peaks.
+    pub fn words(&self) -> String {
+        let known = self.peaks.iter().zip(self.rounding).zip(LOADS);
+        let known =
+            known.filter_map(|((peak, least), (unit, ..))| Some((peak.filter(|(size, _)| *size > least)?, unit)));
+        let words: Vec<String> = known
+            .map(|((size, time), unit)| format!("{} {unit} at {} s", significant(size, 6), significant(time, 6)))
+            .collect();
+        let peaks = if words.is_empty() { "no force".to_owned() } else { format!("peak {}", words.join(", ")) };
+        format!("{}, {peaks}", self.kind)
+    }
+}
+
+/// All parts whose peaks `simulation` keeps.
+pub fn parts(simulation: &Simulation) -> Vec<Part<'_>> {
+    let scene = simulation.scene();
+    let elements = scene.elements.iter().map(|element| ("Element", &element.name, element.kind.section));
+    let holding = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+    let joints = holding.chain(&scene.closing_joints).map(|joint| ("Joint", &joint.name, joint.kind.word()));
+    let peaks = simulation.load_peaks().map_or(&[][..], |peaks| peaks.parts());
+    let largest = |i: usize| peaks.iter().filter_map(|part| part[i]).fold(0.0, |most, (size, _)| size.max(most));
+    let rounding = [0, 1].map(|i| ROUNDING * largest(i));
+    let all = elements.chain(joints).zip(peaks);
+    all.map(|((title, name, kind), &peaks)| Part { label: format!("{title} {name}"), name, kind, peaks, rounding })
+        .collect()
+}
+
+/// Adds them to a summary, by name.
+pub fn describe(simulation: &Simulation, facts: &mut Map<String, Json>) {
+    let parts = parts(simulation);
+    for (i, (_, value, time)) in LOADS.into_iter().enumerate() {
+        let known = || parts.iter().filter_map(|part| Some((part.name.to_owned(), part.peaks[i]?)));
+        facts.insert(value.into(), known().map(|(name, (size, _))| (name, json!(size))).collect());
+        facts.insert(time.into(), known().map(|(name, (_, when))| (name, json!(when))).collect());
+    }
+}
