@@ -21,6 +21,7 @@ mod independent;
 mod joint_elements;
 mod known_systems;
 mod ledger;
+mod limits;
 mod live_changes;
 mod loop_joints;
 mod machines;

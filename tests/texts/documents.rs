@@ -167,6 +167,7 @@ fn documents_name_files_that_exist() {
         "ARCHITECTURE.md",
         "CHANGELOG.md",
         "docs/numerics.md",
+        "docs/limits.md",
         "docs/scene-format.md",
         "docs/tradeoff.md",
         "docs/sweeps.md",
