@@ -8,15 +8,19 @@ use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 /// Why a scene has no sections at a fixed drive phase.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPeriod {
-    /// No drive repeats.
-    #[error("the scene `{scene}` has no drive that repeats, so there is no drive phase to take sections at")]
+    /// Nothing that drives it repeats.
+    #[error(
+        "the scene `{scene}` has no drive that repeats, nor a tyre's ground, a motor's target or a load, so there is no phase to \
+         take sections at"
+    )]
     None {
         /// Name of the scene.
         scene: String,
     },
     /// Drives with different periods.
     #[error(
-        "the drives of the scene `{scene}` have different periods ({first} s and {second} s): there is no one drive phase"
+        "what drives the scene `{scene}` has different periods ({first} s and {second} s): there is no one phase to take \
+         sections at"
     )]
     Different {
         /// Name of the scene.
@@ -28,14 +32,13 @@ pub enum NoPeriod {
     },
 }
 
-/// Common period of all drives of `scene`, s. Drives at rest do not count.
+/// Common period of all drives, of what force elements follow and of harmonic loads of `scene`, s. Drives at rest do not count.
 ///
 /// # Errors
 /// A scene without a common period.
 pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     let mut period: Option<f64> = None;
-    let joints = scene.joints.iter();
-    for own in joints.flat_map(|joint| periods_of(scene, joint)) {
+    for own in periods_of(scene) {
         if !own.is_finite() {
             continue;
         }
@@ -120,6 +123,63 @@ pub enum MachineError {
     Stopped(#[from] Stopped),
 }
 
+impl Orbit for Simulation {
+    type Stop = Stopped;
+
+    fn time(&self) -> f64 {
+        self.time()
+    }
+
+    fn step_until(&mut self, end: f64) -> Result<(), Stopped> {
+        self.step_until(end)
+    }
+
+    fn step_beside(&mut self, other: &Self) -> Result<(), Stopped> {
+        self.step_beside(other)
+    }
+
+    fn state(&self) -> &[f64] {
+        self.state()
+    }
+
+    fn scales(&self) -> &[f64] {
+        self.scales()
+    }
+
+    fn twin(&self) -> Self {
+        Self::of(&self.snapshot())
+    }
+
+    fn displace(&mut self, offset: &[f64]) {
+        self.displace(offset);
+    }
+
+    fn remember_like(&mut self, other: &Self, part: f64) {
+        self.remember_like(other, part);
+    }
+
+    fn step_like(&mut self, other: &Self) {
+        self.step_like(other);
+    }
+
+    /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
+    fn comparable(&self, twin: &Self) -> bool {
+        (0..self.running_scene().ball_joints.len())
+            .all(|j| self.contact_memory(j).active == twin.contact_memory(j).active)
+    }
+
+    fn observables(&self) -> usize {
+        OBSERVABLES.len()
+    }
+
+    fn observe(&mut self, out: &mut [f64]) {
+        let mut frame = Frame::default();
+        self.sample(self.time(), &mut frame);
+        out.copy_from_slice(&observed(&frame.pose));
+    }
+}
+
+/// As its simulation, with room for what is observed.
 impl Orbit for Machine {
     type Stop = MachineError;
 
@@ -144,7 +204,7 @@ impl Orbit for Machine {
     }
 
     fn twin(&self) -> Self {
-        Self::resume(Simulation::of(&self.simulation.snapshot()))
+        Self::resume(self.simulation.twin())
     }
 
     fn displace(&mut self, offset: &[f64]) {
@@ -159,16 +219,12 @@ impl Orbit for Machine {
         self.simulation.step_like(&other.simulation);
     }
 
-    /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
     fn comparable(&self, twin: &Self) -> bool {
-        (0..self.simulation.running_scene().ball_joints.len()).all(|j| {
-            let touches = |machine: &Self| machine.simulation.contact_memory(j).active;
-            touches(self) == touches(twin)
-        })
+        self.simulation.comparable(&twin.simulation)
     }
 
     fn observables(&self) -> usize {
-        OBSERVABLES.len()
+        self.simulation.observables()
     }
 
     fn observe(&mut self, out: &mut [f64]) {

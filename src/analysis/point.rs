@@ -4,7 +4,7 @@ use super::drive::{Machine, MachineError, OBSERVABLES};
 use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
 use super::section::{Schedule, SectionRun};
-use crate::scene::{Scene, Value};
+use crate::scene::{Scene, Solver, Value};
 use crate::simulate::{Effect, Peak};
 
 /// Largest number of samples per period for the means and the probe error.
@@ -113,11 +113,11 @@ impl PointRun {
 
     fn begin(mut machine: Machine, plan: Plan, period: f64, first: f64) -> Self {
         let solver = machine.simulation().running_scene().solver;
-        let tolerance = if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP };
+        let tolerance = tolerance_of(&solver);
         let schedule = Schedule { first, interval: period, sections: plan.periods, discard: plan.discard };
         // The motion of a purely kinematic scene has no neighbours.
         let twin = plan.exponent && !machine.simulation().mechanism().is_kinematic();
-        let separation = twin.then(|| (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1));
+        let separation = twin.then(|| separation(tolerance));
         let mut peaks = Vec::new();
         let simulation = machine.simulation_mut();
         if simulation.time() > 0.0 {
@@ -250,6 +250,21 @@ impl PointResult {
         let joints = vec![unknown; joints];
         Self { stopped: None, joints, probe: None, regime, evidence, doubts, residual, sections: Vec::new() }
     }
+}
+
+/// Relative tolerance that the errors of a run are like.
+fn tolerance_of(solver: &Solver) -> f64 {
+    if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP }
+}
+
+/// Separation of a twin from a run with this tolerance, in units of the scales.
+fn separation(tolerance: f64) -> f64 {
+    (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1)
+}
+
+/// The same of the twin of a run of `scene`.
+pub fn separation_of(scene: &Scene) -> f64 {
+    separation(tolerance_of(&scene.solver))
 }
 
 /// Smallest differences that distinguish two sections of `scene`, in the order of [`OBSERVABLES`]: the tolerance times

@@ -1,9 +1,10 @@
 //! Classification of a motion from its sections, with the evidence.
 //!
 //! In this order: sections that return to themselves within the resolution are periodic, unless an exponent clearly above 0
-//! contradicts them, which makes them unclear; otherwise an exponent clearly above 0 is chaos, one clearly below 0 a cycle if the
-//! sections stay near one, else an unfinished transient, and one indistinguishable from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still converge to a cycle. Anything
-//! else is unclear.
+//! contradicts them, which makes them unclear; otherwise an exponent clearly above 0 is chaos, unless the 0-1 test clearly says that
+//! the motion is regular; one clearly below 0 a cycle if the sections stay near one, else an unfinished transient, and one
+//! indistinguishable from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still converge to a cycle.
+//! Anything else is unclear.
 
 use super::exponent::Exponent;
 
@@ -178,7 +179,8 @@ fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
     };
     let (bound, doubt) = (evidence.exponent_bound, 2.0 * exponent.standard_error);
     if diverges(exponent) {
-        Regime::Chaotic
+        // Neighbours part, and the sections wander about as those of a regular motion do: one of them is wrong.
+        if evidence.zero_one < REGULAR { Regime::Unclear } else { Regime::Chaotic }
     } else if exponent.value + doubt < -bound {
         Regime::NotSettled
     } else if exponent.value.abs() <= bound + doubt && regular {
@@ -332,6 +334,16 @@ mod tests {
         // Neighbours are within the resolution, the whole set is not.
         assert_eq!(regime, Regime::NotSettled);
         assert!(evidence.return_distance > 10.0);
+    }
+
+    #[test]
+    fn witnesses_that_contradict_each_other_are_unclear() {
+        let turn = 0.618_033_988_749_894_9;
+        let torus: Vec<f64> = (0..400).map(|k| libm::cos(std::f64::consts::TAU * turn * f64::from(k))).collect();
+        assert_eq!(classify(&torus, &[1e-9], 1.0, exponent(0.0)).0, Regime::QuasiPeriodic);
+        assert_eq!(classify(&torus, &[1e-9], 1.0, exponent(5.0)).0, Regime::Unclear);
+        let cycle: Vec<f64> = (0..60).map(|k| [0.1, 0.7, 0.4][k % 3]).collect();
+        assert_eq!(classify(&cycle, &[1e-9], 1.0, exponent(5.0)).0, Regime::Unclear);
     }
 
     #[test]

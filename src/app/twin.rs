@@ -1,29 +1,60 @@
-//! A second run beside the first, minimally displaced: how fast neighbouring motions diverge, without ever renormalising their
-//! distance. The twin does not affect the run.
+//! A second run beside the first, minimally displaced, whose distance is never renormalised; and a third, which is, and so tells the
+//! largest Lyapunov exponent as a sweep does. Neither affects the run.
 
-use crate::analysis::exponent::{offset, scaled_distance};
+use crate::analysis::drive::drive_period;
+use crate::analysis::exponent::{ALIGNMENT, Benettin, Exponent, offset, scaled_distance};
+use crate::analysis::orbit::Orbit as _;
+use crate::analysis::point::separation_of;
 use crate::simulate::{Frame, Simulation, Snapshot};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
 /// Distances kept; at this number every second one is dropped.
 const KEPT: usize = 4096;
-/// The growing part ends where the distance first reaches this fraction of its largest value.
-const GROWN: f64 = 0.1;
-/// Fewer distances than this give no slope.
-const FEWEST: usize = 8;
+/// Interval at which the growth of a machine that nothing drives is taken, s.
+const UNDRIVEN: f64 = 0.1;
+/// Intervals of which growth must be known for an exponent: two in each block of its error.
+const FEWEST: usize = 20;
+/// A step that ends this much of an interval before its end, by rounding, ends it.
+const NEARLY: f64 = 1e-9;
+/// Intervals for which there is room from the start.
+const ROOM: usize = 1024;
 
-/// A straight line through logarithms of distances.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
-    /// Slope of the natural logarithm, 1/s.
-    pub slope: f64,
-    /// Natural logarithm of the line's distance at `from`.
-    pub start: f64,
-    /// Times between which it was fitted, s.
-    pub from: f64,
-    /// See `from`.
-    pub to: f64,
+/// The renormalised run beside the run, and what its separation has grown by.
+struct Growth {
+    twin: Simulation,
+    benettin: Benettin,
+    /// Time from one interval to the next, s, when the one under way ends, and how many have ended.
+    interval: f64,
+    next: f64,
+    ended: usize,
+    /// It could not go on.
+    lost: bool,
+}
+
+impl Growth {
+    /// Of neighbours of `run` from now on.
+    fn new(run: &Simulation) -> Self {
+        let scene = run.running_scene();
+        let interval = drive_period(scene).unwrap_or(UNDRIVEN);
+        let mut benettin = Benettin::new(separation_of(scene), interval, ROOM);
+        let mut twin = run.twin();
+        benettin.start(run, &mut twin);
+        Self { twin, benettin, interval, next: run.time() + interval, ended: 0, lost: false }
+    }
+
+    /// To be called after a step of `run`.
+    fn follow(&mut self, run: &Simulation) {
+        let at_end = run.time() >= self.next - NEARLY * self.interval;
+        self.lost |= self.benettin.follow(run, &mut self.twin, at_end).is_err();
+        if at_end {
+            self.ended += 1;
+            self.next += self.interval;
+            if self.ended == ALIGNMENT {
+                self.benettin.begin_counting();
+            }
+        }
+    }
 }
 
 /// Where a twin was, to take it back there.
@@ -56,6 +87,8 @@ pub struct Twin {
     /// Time that the run has reached, s, and its state there: the twin catches up when that is displayed.
     goal: f64,
     goal_state: Vec<f64>,
+    /// `None` until the run comes to where the twin began.
+    growth: Option<Growth>,
     ended: Option<String>,
 }
 
@@ -75,6 +108,7 @@ impl Twin {
             steps: 0,
             goal: run.time(),
             goal_state: run.state().to_vec(),
+            growth: Some(Growth::new(run)),
             ended: None,
         };
         twin.measure();
@@ -112,6 +146,7 @@ impl Twin {
         (self.steps, self.ended) = (steps, None);
         self.goal = self.begins.max(run.time());
         self.goal_state.copy_from_slice(run.state());
+        self.growth = None;
     }
 
     /// Forgets the distances after `time`, s: another future begins.
@@ -133,6 +168,10 @@ impl Twin {
         self.come_to(self.goal);
         self.goal = run.time();
         self.goal_state.copy_from_slice(run.state());
+        match &mut self.growth {
+            Some(growth) => growth.follow(run),
+            None => self.growth = Some(Growth::new(run)),
+        }
     }
 
     /// Steps until `time`, s, lies within the latest step.
@@ -193,53 +232,30 @@ impl Twin {
         self.ended.as_deref()
     }
 
-    /// Slope of the logarithm over the growing part, by least squares: from the displacement to where the distance first
-    /// reaches a tenth of its largest value; over everything where it does not grow.
-    pub fn fit(&self) -> Option<Fit> {
-        let largest = self.distances.iter().map(|d| d[1]).fold(0.0, f64::max);
-        let end = self.distances.iter().position(|d| d[1] >= GROWN * largest);
-        let growing = &self.distances[..end.map_or(0, |end| end + 1)];
-        fit(if growing.len() < FEWEST { &self.distances } else { growing })
+    /// Largest Lyapunov exponent of the run since this twin began, or since the run was last taken back, once enough of it is known;
+    /// before, how many more intervals that takes, and their length, s.
+    ///
+    /// # Errors
+    /// Not yet.
+    pub fn exponent(&self) -> Result<Exponent, (usize, f64)> {
+        let growth = self.growth.as_ref().filter(|growth| !growth.lost);
+        let Some(growth) = growth else {
+            return Err((ALIGNMENT + FEWEST, UNDRIVEN));
+        };
+        let known = growth.benettin.result().filter(|exponent| exponent.running.len() >= FEWEST);
+        known.ok_or_else(|| {
+            let counted = growth.benettin.result().map_or(0, |exponent| exponent.running.len());
+            let waits = ALIGNMENT.saturating_sub(growth.ended) + FEWEST - counted;
+            (waits, growth.interval)
+        })
     }
-}
-
-/// The line through ln(distance) over time.
-fn fit(distances: &[[f64; 2]]) -> Option<Fit> {
-    let (first, last) = (distances.first()?, distances.last()?);
-    if distances.len() < FEWEST {
-        return None;
-    }
-    let n = distances.len() as f64;
-    let mean_time = distances.iter().map(|d| d[0]).sum::<f64>() / n;
-    let mean = distances.iter().map(|d| libm::log(d[1])).sum::<f64>() / n;
-    let (mut across, mut along) = (0.0, 0.0);
-    for [time, distance] in distances {
-        across += (time - mean_time) * (libm::log(*distance) - mean);
-        along += (time - mean_time) * (time - mean_time);
-    }
-    let slope = across / along;
-    slope.is_finite().then_some(Fit {
-        slope,
-        start: mean + slope * (first[0] - mean_time),
-        from: first[0],
-        to: last[0],
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::point::{Plan, PointRun};
     use crate::scene::Scene;
-
-    #[test]
-    fn the_slope_of_an_exponential_is_its_rate() {
-        let grows = |t: f64| [t, 1e-9 * libm::exp(3.5 * t)];
-        let line: Vec<[f64; 2]> = (0..50).map(|i| grows(f64::from(i) * 0.1)).collect();
-        let found = fit(&line).expect("points");
-        assert!((found.slope - 3.5).abs() < 1e-12 && (found.from, found.to) == (0.0, 4.9));
-        assert!((found.start - libm::log(1e-9)).abs() < 1e-9);
-        assert_eq!(fit(&line[..7]), None);
-    }
 
     #[test]
     fn a_twin_starts_a_billionth_away_and_thins_its_record() {
@@ -262,8 +278,31 @@ mod tests {
         }
         assert!(twin.distances().len() <= KEPT && twin.stride > 1);
         assert!(twin.distances().is_sorted_by(|a, b| a[0] < b[0]));
-        let fit = twin.fit().expect("grows");
-        println!("{fit:?}, {:?}", twin.distances().last());
-        assert!(fit.slope > 0.0, "{fit:?}");
+    }
+
+    #[test]
+    fn its_exponent_is_that_of_a_sweep() {
+        let scene = Scene::load("slider-crank-driven", &[]).expect("built in");
+        let period = drive_period(&scene).expect("driven");
+        let (discard, kept) = (ALIGNMENT, FEWEST);
+        let plan = Plan { periods: discard + kept, discard, phase: 0.0, exponent: true };
+        let mut point = PointRun::cold(&scene, plan, period).expect("starts");
+        while !point.is_done() {
+            point.step().expect("runs");
+        }
+        let swept = point.finish().0.evidence.exponent.expect("a twin");
+        let mut run = Simulation::new(&scene).expect("starts");
+        let mut twin = Twin::new(&run);
+        assert_eq!(twin.exponent(), Err((discard + kept, period)));
+        for k in 1..=discard + kept {
+            let end = period + (k - 1) as f64 * period;
+            while run.time() < end {
+                run.step_until(end).expect("runs");
+                twin.follow(&run);
+            }
+        }
+        let shown = twin.exponent().expect("enough is known");
+        assert!((shown.value - swept.value).abs() <= 1e-9 * swept.value.abs(), "{} {}", shown.value, swept.value);
+        assert_eq!(shown.running.len(), kept);
     }
 }

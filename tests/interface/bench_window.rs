@@ -390,12 +390,11 @@ fn a_twin_parts_from_the_run_and_leaves_it_alone() {
     player.run_to(0.1);
     let hash = player.simulation().state_hash();
     let twin = player.twin().expect("on");
-    let slope = twin.fit().expect("grows").slope;
-    assert!(slope > 0.0, "{slope}");
+    assert_eq!(twin.exponent(), Err((25, 0.2)), "too early to tell");
     let (first, last) = (twin.distances()[0], twin.distances().last().expect("many"));
     assert!(last[1] > 1e3 * first[1], "{first:?} {last:?}");
     harness.run();
-    harness.get_by_label_contains("Slope ");
+    harness.get_by_label_contains("Exponent — 1/s, known in 5");
 
     click(&mut harness, Role::CheckBox, "Twin run");
     let player = harness.state_mut().player_mut();

@@ -1,7 +1,7 @@
-//! The twin run: its distance from the run on a logarithmic plot, and the slope.
+//! The twin run: its distance from the run on a logarithmic plot, and the largest Lyapunov exponent.
 
 use eframe::egui::{Checkbox, Ui};
-use egui_plot::{GridMark, Line, LineStyle, PlotPoint, PlotPoints};
+use egui_plot::{GridMark, PlotPoint};
 
 use super::plane::{AxisLabel, plane};
 use super::portrait::title;
@@ -12,7 +12,7 @@ use crate::app::{plots, theme, value};
 
 const HEIGHT: f32 = 170.0;
 
-/// Switch, plot and slope.
+/// Switch, plot and exponent.
 pub fn ui(ui: &mut Ui, player: &mut Player) {
     let moves = !player.simulation().mechanism().is_kinematic();
     let mut on = player.twin().is_some();
@@ -21,7 +21,8 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
             .add_enabled(moves, Checkbox::new(&mut on, "Twin run"))
             .on_hover_text(
                 "A second run from the present state, displaced by a billionth of the scales of its coordinates and \
-                 velocities, drawn as a violet ghost in the 3D view. The run itself does not change by a bit. Halves the speed.",
+                 velocities, drawn as a violet ghost in the 3D view, and a third one, whose growing distance gives the exponent. The run \
+                 itself does not change by a bit; all three take three times as long.",
             )
             .on_disabled_hover_text(
                 "The motion of this scene is a function of time alone: it has no neighbouring motions",
@@ -53,11 +54,10 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         ui,
         "Distance of the twin, in scales of the state (logarithmic)",
         "Euclidean distance of all coordinates and velocities, each over its scale of the tolerance (1 ball radius, 0.1 rad \
-         and so on); the line is fitted over the growing part",
+         and so on)",
     );
     let points: Vec<PlotPoint> =
         distances.iter().map(|[time, distance]| PlotPoint::new(time / size, distance.log10())).collect();
-    let fit = twin.fit();
     let ink = ui.visuals().weak_text_color();
     plane(ui, "divergence", &across, &up, HEIGHT)
         .y_grid_spacer(|input| decades(input.bounds))
@@ -70,28 +70,20 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         ])
         .show(ui, |plot| {
             plot.add(Path::line("Distance", &points, theme::series(5, dark), 1.4));
-            if let Some(fit) = fit {
-                let at = |time: f64| {
-                    let ln = fit.start + fit.slope * (time - fit.from);
-                    [time / size, ln / std::f64::consts::LN_10]
-                };
-                let line = Line::new("Fit", PlotPoints::from(vec![at(fit.from), at(fit.to)]));
-                let style = LineStyle::dashed_loose();
-                plot.line(line.color(theme::series(1, dark)).style(style).width(2.0));
-            }
         });
-    let (slope, over) = fit.map_or_else(
-        || ("—".to_owned(), String::new()),
-        |fit| {
-            let [from, to] = [fit.from, fit.to].map(value::time);
-            (value::number(fit.slope, 4), format!(", here from {from} to {to}"))
-        },
+    let exponent = match twin.exponent() {
+        Ok(exponent) => {
+            let [value, error] = [exponent.value, 2.0 * exponent.standard_error].map(|x| value::number(x, 3));
+            format!("Exponent {value} ± {error} 1/s")
+        }
+        Err((more, interval)) => format!("Exponent — 1/s, known in {}", value::time(more as f64 * interval)),
+    };
+    ui.label(exponent).on_hover_text(
+        "Largest Lyapunov exponent of the run since the twin began, ± two standard errors: the mean rate at which the distance of \
+         a neighbouring motion grows, which is brought back again and again, as in a sweep. Above 0 the motion is chaotic, below \
+         0 neighbours approach. The first impacts alone tell nothing of it, so it takes 25 periods of what drives the machine, of \
+         0.1 s where nothing does",
     );
-    ui.label(format!("Slope {slope} 1/s")).on_hover_text(format!(
-        "Slope of the natural logarithm of the distance by least squares, from the displacement to where the distance first \
-         reaches a tenth of its largest value{over}. The largest Lyapunov exponent of a sweep brings its twin back again \
-         and again, and so tells of the whole motion.",
-    ));
     reserved(ui, "twin says", 2, |ui| {
         if let Some(why) = twin.ended() {
             theme::warning(ui, format!("The twin run {why}"));

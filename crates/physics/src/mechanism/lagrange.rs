@@ -74,8 +74,9 @@ pub struct Lagrange {
     drift: f64,
     /// Smallest pivot ratio of the latest factorisation.
     least_pivot: f64,
-    /// The latest step was taken back onto the constraints.
+    /// The latest step was taken back onto the constraints; the state before the latest correction.
     projected: bool,
+    kept: Vec<f64>,
 }
 
 /// The constraint rows of a scene.
@@ -179,6 +180,7 @@ impl Lagrange {
             drift: 0.0,
             least_pivot: f64::INFINITY,
             projected: false,
+            kept: vec![0.0; 13 * n],
         }
     }
 
@@ -227,11 +229,16 @@ impl Lagrange {
         let mut before = f64::INFINITY;
         for _ in 0..CORRECTIONS {
             self.violate(model, t, y, |[phi, _, _]| -phi);
-            // Rows that are dependent keep what the parts' dimensions contradict.
+            // In the pose itself no correction closes them; elsewhere rows that are dependent keep what the parts' dimensions
+            // contradict.
+            if self.drift > before {
+                y.copy_from_slice(&self.kept);
+            }
             if self.drift <= CLOSED || self.drift >= 0.5 * before {
                 break;
             }
             before = self.drift;
+            self.kept.copy_from_slice(y);
             self.matrix.solve(&mut self.residual);
             self.visit_corrections(model, |b, moved, turned| {
                 for i in 0..3 {

@@ -613,32 +613,31 @@ impl Mechanism {
         of_scene.map(move |e| e.report(t, motion))
     }
 
-    /// How far inside the range in which they exert a force the elements are that have one, at `t`, the time of the motion last
-    /// measured: not above 0 outside.
-    pub fn insides(&self, t: f64) -> impl Iterator<Item = f64> {
+    /// As [`SceneElement::pressed`], of every element that has edges, at `t`, the time of the motion last measured: two numbers each.
+    pub fn pressed(&self, t: f64) -> impl Iterator<Item = f64> {
         let motion = self.equations.motion();
-        self.elements.iter().filter_map(move |e| e.inside(t, motion))
+        self.elements.iter().filter_map(move |e| e.pressed(t, motion)).flatten()
     }
 
-    /// Whether any element for which `inside`, as by [`Self::insides`], is above 0 has a force whose slope begins vertically.
-    pub fn presses_vertically(&self, inside: &[f64]) -> bool {
-        let motion = self.equations.motion();
-        let with_edges = self.elements.iter().filter(|e| e.inside(0.0, motion).is_some());
-        inside.iter().zip(with_edges).any(|(inside, element)| *inside > 0.0 && element.begins_vertically())
-    }
-
-    /// Whether any element exerts a force in a part of its range only.
+    /// Whether any element has edges.
     pub fn has_edges(&self) -> bool {
-        self.insides(0.0).next().is_some()
+        self.pressed(0.0).next().is_some()
     }
 
-    /// Lets the elements of [`Self::insides`] follow the law inside their range, or outside, wherever they are, as `inside` says;
-    /// with `None` as the motion has it.
-    pub fn hold_elements(&mut self, inside: Option<&[f64]>) {
+    /// Whether any element that presses, by `pressed` as of [`Self::pressed`], has a force whose slope begins vertically.
+    pub fn presses_vertically(&self, pressed: &[f64]) -> bool {
         let motion = self.equations.motion();
-        let have_edges = self.elements.iter_mut().filter(|e| e.inside(0.0, motion).is_some());
-        for (i, element) in have_edges.enumerate() {
-            element.hold(inside.map(|inside| inside[i] > 0.0));
+        let with_edges = self.elements.iter().filter(|e| e.pressed(0.0, motion).is_some());
+        pressed.chunks_exact(2).zip(with_edges).any(|(own, element)| own[1] > 0.0 && element.begins_vertically())
+    }
+
+    /// Lets the elements that have edges follow their laws as if they pressed, or not, wherever they are, as `pressed` says, as of
+    /// [`Self::pressed`]; with `None` as the motion has it.
+    pub fn hold_elements(&mut self, pressed: Option<&[f64]>) {
+        let motion = self.equations.motion();
+        let with_edges = self.elements.iter_mut().filter(|e| e.pressed(0.0, motion).is_some());
+        for (i, element) in with_edges.enumerate() {
+            element.hold(pressed.map(|pressed| pressed[2 * i + 1] > 0.0));
         }
     }
 

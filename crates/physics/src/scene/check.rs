@@ -35,8 +35,8 @@ impl Scene {
     pub fn length_scale(&self) -> f64 {
         let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
-        let stops = self.elements.iter().filter(|element| element.kind.section == "stop" && !element.on_hinge);
-        let depths = stops.map(|stop| OF_A_DEPTH * stop.number("depth"));
+        let along = self.elements.iter().filter(|element| !element.on_hinge);
+        let depths = along.filter_map(|element| Some(OF_A_DEPTH * element.number(element.kind.depth?)));
         radii.chain(closing).chain(depths).fold(1.0, f64::min)
     }
 

@@ -28,6 +28,8 @@ const PLAIN: ElementKind = ElementKind {
     law: None,
     acts_by: &[],
     choices: &[],
+    frequency: None,
+    depth: None,
     force: |_| 0.0,
     fault: |_| None,
     look: ElementLook::Hidden,
@@ -123,6 +125,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
     },
     ElementKind {
         section: "load",
+        frequency: Some("frequency"),
         help: "force and torque from outside on a body, constant or times sin(2π frequency t + phase)",
         points: &["on"],
         numbers: &[
@@ -234,6 +237,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
     },
     ElementKind {
         section: "stop",
+        depth: Some("depth"),
         help: "stops at the ends of a coordinate of a joint, which only push",
         joint: Some(ElementJoint::Any),
         numbers: &[

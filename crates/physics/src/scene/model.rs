@@ -828,6 +828,10 @@ pub struct ElementKind {
     pub acts_by: &'static [&'static str],
     /// Its choices: key, words with the default first, help.
     pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
+    /// The number that is the frequency of its force, if it has one.
+    pub frequency: Option<&'static str>,
+    /// The number that tells over what length it acts, if it resists with a stiff law: see [`Scene::length_scale`].
+    pub depth: Option<&'static str>,
     /// Largest force at its points that its own values give, N: without what the motion adds.
     pub force: fn(&Element) -> f64,
     /// What else its values must satisfy: the key at fault and why.

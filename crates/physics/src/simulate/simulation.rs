@@ -124,12 +124,12 @@ struct Attempt {
     located: Option<usize>,
     /// Joint that moves to another piece of a law there.
     corner: Option<(usize, Piece)>,
-    /// If it ends at edges, of the elements that have some: how far they are inside at its start, not above 0 outside.
+    /// If steps end at edges of elements, how the elements are pressed over it, as by [`Mechanism::pressed`].
     sides: Vec<f64>,
     /// It ends at an edge.
     edge: bool,
-    /// The same at both ends of a part of it.
-    insides: [Vec<f64>; 2],
+    /// How they are pressed at both ends of a part of it.
+    pressed: [Vec<f64>; 2],
     /// Restarted on another piece.
     turned: bool,
     /// The step that it was before an event cut it, if one did; and that which the next one is to be, beside another run.
@@ -309,8 +309,8 @@ impl Simulation {
                 located: None,
                 corner: None,
                 edge: false,
-                sides: Vec::with_capacity(scene.elements.len()),
-                insides: std::array::from_fn(|_| Vec::with_capacity(scene.elements.len())),
+                sides: Vec::with_capacity(2 * scene.elements.len()),
+                pressed: std::array::from_fn(|_| Vec::with_capacity(2 * scene.elements.len())),
                 turned: false,
                 whole: None,
                 beside: None,

@@ -79,12 +79,19 @@ pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
     Course::Own(make(drive, turns))
 }
 
-/// Periods of the motions that drives of `joint` prescribe, s; infinite where one does not repeat or nothing moves.
-pub fn periods_of(scene: &Scene, joint: &Joint) -> impl Iterator<Item = f64> {
-    joint.drives().map(|(freedom, drive)| {
+/// Periods of the motions that drives of joints prescribe, of what force elements follow and of loads, s; infinite where one does
+/// not repeat or nothing moves.
+pub fn periods_of(scene: &Scene) -> impl Iterator<Item = f64> {
+    let drives = scene.joints.iter().flat_map(Joint::drives);
+    let of_drives = drives.map(|(freedom, drive)| {
         let course = course_of(drive, freedom.turns());
         course.law().map_or_else(|| closed_period(scene), |law| law.period())
-    })
+    });
+    let of_elements = scene.elements.iter().map(|element| match &element.law {
+        Some(law) => course_of(law, element.on_hinge).law().map_or(f64::INFINITY, |law| law.period()),
+        None => element.kind.frequency.map_or(f64::INFINITY, |key| 1.0 / element.number(key)),
+    });
+    of_drives.chain(of_elements)
 }
 
 impl Course {

@@ -176,7 +176,7 @@ fn the_period_of_a_law_is_the_time_after_which_it_repeats() {
         ("law = \"formula\", formula = \"sin(t)\"".into(), f64::INFINITY),
     ] {
         let scene = scene(&text);
-        let found = periods_of(&scene, &scene.joints[0]).next().expect("driven");
+        let found = periods_of(&scene).next().expect("driven");
         assert!(found == period || (found - period).abs() < 1e-9, "{text}: {found}");
         if period.is_finite() {
             let law = law(&text);

@@ -246,9 +246,9 @@ pub(super) trait SceneElement: ForceElement {
         f64::INFINITY
     }
 
-    /// How far inside the range of motion in which it exerts a force it is, of any scale, not above 0 outside: adaptive steps end
-    /// where its sign changes. `None` if it exerts one everywhere.
-    fn inside(&self, _t: f64, _motion: &[Kinematics]) -> Option<f64> {
+    /// How deep it is pressed in, and that or, where it has let go though it is still pressed in, not above 0; in any unit. Explicit
+    /// steps end where a sign changes. `None` if it exerts a force wherever it is.
+    fn pressed(&self, _t: f64, _motion: &[Kinematics]) -> Option<[f64; 2]> {
         None
     }
 
@@ -257,8 +257,8 @@ pub(super) trait SceneElement: ForceElement {
         false
     }
 
-    /// Follows from here on the law inside that range, or none outside, wherever it is; `None`: as the motion has it.
-    fn hold(&mut self, _inside: Option<bool>) {}
+    /// Follows from here on its law as if it pressed, or as if it did not, wherever it is; `None`: as the motion has it.
+    fn hold(&mut self, _presses: Option<bool>) {}
 
     /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;

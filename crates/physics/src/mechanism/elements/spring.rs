@@ -15,6 +15,8 @@ struct Spring {
     elastic: Elastic,
     damping: f64,
     side: SpringSide,
+    /// Over a step, of one that only pushes or only pulls: whether it does, whatever its length.
+    held: Option<bool>,
 }
 
 /// State at one instant.
@@ -44,6 +46,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         elastic: Elastic::of(element, side),
         damping: element.number("damping"),
         side,
+        held: None,
     })
 }
 
@@ -58,10 +61,11 @@ impl Spring {
         let rate = along.dot(&velocity);
         let elastic = self.elastic.tension(length - self.length);
         let both = elastic + self.damping * rate;
-        // Where the spring has let go, its damper has, too.
-        let tension = match self.side.of(elastic) == elastic {
-            true => self.side.of(both),
-            false => 0.0,
+        let tension = match self.held {
+            Some(true) => both,
+            // Where the spring has let go, its damper has, too.
+            None if self.side.of(elastic) == elastic => self.side.of(both),
+            _ => 0.0,
         };
         State {
             arms: [start_arm, end_arm],
@@ -124,6 +128,22 @@ impl ForceElement for Spring {
 }
 
 impl SceneElement for Spring {
+    /// Of one that only pushes or only pulls: its elastic force, and that with the damper's.
+    fn pressed(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
+        let sign = match self.side {
+            SpringSide::Both => return None,
+            SpringSide::Pull => 1.0,
+            SpringSide::Push => -1.0,
+        };
+        let s = self.state(motion);
+        let [elastic, both] = [s.elastic, s.elastic + self.damping * s.rate].map(|tension| sign * tension);
+        Some([elastic, elastic.min(both)])
+    }
+
+    fn hold(&mut self, presses: Option<bool>) {
+        self.held = presses;
+    }
+
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.state(motion);
         ElementReport { points: s.points, force: s.along * -s.tension, ..ElementReport::default() }

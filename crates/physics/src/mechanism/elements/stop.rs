@@ -113,25 +113,27 @@ impl ForceElement for Stop {
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        if let Some(press) = self.at(motion).1 {
-            powers.damping += (press.force - press.elastic) * press.rate;
-        }
+        let (place, press) = self.at(motion);
+        let nearest = self.nearest(&place);
+        // Where it has let go, what it still stores is lost as it comes out.
+        let elastic = if nearest.depth > 0.0 || press.is_some() { nearest.elastic } else { 0.0 };
+        powers.damping += (press.map_or(0.0, |press| press.force) - elastic) * nearest.rate;
     }
 }
 
 impl SceneElement for Stop {
-    /// d (1 + a dd/dt): a stop lets go while it is still pressed in where it is left faster than it can follow.
-    fn inside(&self, _: f64, motion: &[Kinematics]) -> Option<f64> {
+    /// Where it is left faster than it can follow it lets go: d (1 + a dd/dt).
+    fn pressed(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let Press { depth, rate, .. } = self.nearest(&self.on.place(self.middle, motion));
-        Some(depth.min(depth * (1.0 + self.damping * rate)))
+        Some([depth, depth.min(depth * (1.0 + self.damping * rate))])
     }
 
     fn begins_vertically(&self) -> bool {
         true
     }
 
-    fn hold(&mut self, inside: Option<bool>) {
-        self.held = inside;
+    fn hold(&mut self, presses: Option<bool>) {
+        self.held = presses;
     }
 
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {

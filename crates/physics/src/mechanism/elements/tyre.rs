@@ -117,14 +117,14 @@ impl SceneElement for Tyre {
         self.ground.as_ref().map_or(f64::INFINITY, end)
     }
 
-    /// d, or k d + c dd/dt where that is less: it lets go while it is still pressed in.
-    fn inside(&self, t: f64, motion: &[Kinematics]) -> Option<f64> {
+    /// It lets go where k d + c dd/dt falls to 0.
+    fn pressed(&self, t: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let s = self.at(t, motion);
-        Some(s.depth.min(self.stiffness * s.depth + self.damping * s.rate))
+        Some([s.depth, s.depth.min(self.stiffness * s.depth + self.damping * s.rate)])
     }
 
-    fn hold(&mut self, inside: Option<bool>) {
-        self.held = inside;
+    fn hold(&mut self, presses: Option<bool>) {
+        self.held = presses;
     }
 
     /// From the ground below the centre to that.

@@ -17,7 +17,7 @@ impl Simulation {
         if self.stepper.ends_on_interpolant() && self.mechanism.has_edges() {
             let Self { mechanism, state, attempt, .. } = self;
             mechanism.measure(state.now.t, &state.now.y);
-            attempt.sides.extend(mechanism.insides(state.now.t));
+            attempt.sides.extend(mechanism.pressed(state.now.t));
         }
     }
 
@@ -27,26 +27,26 @@ impl Simulation {
         if self.attempt.sides.is_empty() {
             return None;
         }
-        let [mut left, mut right] = std::mem::take(&mut self.attempt.insides);
+        let [mut left, mut right] = std::mem::take(&mut self.attempt.pressed);
         let mut from = AT_START;
-        self.look_inside(from, h, &mut left);
+        self.look_at_elements(from, h, &mut left);
         let turns = self.attempt.sides.iter().zip(&left).any(|(side, now)| (*side > 0.0) != (*now > 0.0));
         // Once: if that leads back here, either side is as good.
         if turns && !self.attempt.turned {
             self.attempt.turned = true;
             self.attempt.sides.copy_from_slice(&left);
-            self.attempt.insides = [left, right];
+            self.attempt.pressed = [left, right];
             return Some(0.0);
         }
         let mut first: Option<f64> = None;
         for n in 1..=PARTS {
             let to = f64::from(n) / f64::from(PARTS);
-            self.look_inside(to, h, &mut right);
-            for (element, (&left, &right)) in left.iter().zip(&right).enumerate() {
+            self.look_at_elements(to, h, &mut right);
+            for (number, (&left, &right)) in left.iter().zip(&right).enumerate() {
                 if (left > 0.0) != (right > 0.0) {
                     let width = (1e-15 / h).max(1e-12);
                     // It returns an instant beyond the edge: before it the next step would start with the wrong force.
-                    let at = find_root(from, left, to, right, width, 0.0, |theta| self.inside(element, theta, h));
+                    let at = find_root(from, left, to, right, width, 0.0, |theta| self.pressed_at(number, theta, h));
                     first = Some(first.map_or(at, |first| first.min(at)));
                 }
             }
@@ -56,21 +56,21 @@ impl Simulation {
             std::mem::swap(&mut left, &mut right);
             from = to;
         }
-        self.attempt.insides = [left, right];
+        self.attempt.pressed = [left, right];
         first
     }
 
-    /// How far every element that has edges is inside, on the interpolant of the attempted step.
-    fn look_inside(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
+    /// How every element that has edges is pressed, on the interpolant of the attempted step.
+    fn look_at_elements(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
         let time = self.measure_all_at(theta, h);
         out.clear();
-        out.extend(self.mechanism.insides(time));
+        out.extend(self.mechanism.pressed(time));
     }
 
-    /// The same of one of them.
-    fn inside(&mut self, element: usize, theta: f64, h: f64) -> f64 {
+    /// One of these numbers.
+    fn pressed_at(&mut self, number: usize, theta: f64, h: f64) -> f64 {
         let time = self.measure_all_at(theta, h);
-        self.mechanism.insides(time).nth(element).unwrap_or_default()
+        self.mechanism.pressed(time).nth(number).unwrap_or_default()
     }
 
     /// Measures all bodies on the interpolant of the attempted step; returns the time there, s.

@@ -56,6 +56,7 @@ impl Simulation {
             // Powers may jump at an edge at the step's end: those of the step count.
             if !self.attempt.sides.is_empty() {
                 mechanism.hold_elements(Some(&self.attempt.sides));
+                mechanism.forget_evaluation();
             }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
