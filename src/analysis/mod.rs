@@ -2,6 +2,7 @@
 //! ideal motion, Poincaré sections, Lyapunov exponents, regimes, sweeps, the paper's section 4, cases with known answers. Starts no threads, and
 //! its clock comes from outside ([`RunContext`]).
 
+pub mod beginning;
 mod cost;
 pub mod drive;
 pub mod exponent;

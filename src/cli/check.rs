@@ -7,12 +7,13 @@ use super::assembly::Start;
 use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, start};
+use crate::analysis::beginning::Beginning;
 use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::{ElementReport, Summary};
-use crate::scene::{BallJoint, Body, Element, Formulation, Joint, JointKind, Scene, format_quantity, to_display};
-use crate::simulate::{Frame, Listed, Simulation, channels_of};
+use crate::scene::{BallJoint, Body, Element, Formulation, Joint, JointKind, Scene, format_quantity, format_quantity_digits, to_display};
+use crate::simulate::{Frame, Listed, Peak, Simulation, channels_of};
 
 /// Runs `check`.
 ///
@@ -29,7 +30,8 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
         return print(&channels(&channels_of(&scene, &frame)));
     }
     let contents = simulation.mechanism().summary();
-    print(&report(&scene, &contents, &begun, &frame)?)
+    let beginning = (contents.contacts > 0).then(|| Beginning::of(&mut simulation));
+    print(&report(&scene, &contents, &begun, &frame, beginning.as_ref())?)
 }
 
 /// The channels of a scene, a line each: name, unit, column, what it is.
@@ -53,7 +55,13 @@ fn is_ideal(joint: &BallJoint) -> bool {
     joint.contact.clearance == 0.0
 }
 
-fn report(scene: &Scene, contents: &Summary, begun: &Start, start: &Frame) -> Result<String, Failure> {
+fn report(
+    scene: &Scene,
+    contents: &Summary,
+    begun: &Start,
+    start: &Frame,
+    beginning: Option<&Beginning>,
+) -> Result<String, Failure> {
     let mut out = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{}: {}", scene.name, scene.title);
@@ -95,6 +103,17 @@ fn report(scene: &Scene, contents: &Summary, begun: &Start, start: &Frame) -> Re
         line(&format!("  {}", element.name), &force_element(element, report));
     }
     begun.lines.iter().for_each(|(label, words)| line(label, words));
+    if let Some(beginning) = beginning {
+        let until = format_quantity_digits(beginning.until, "ms", 4);
+        line("Beginning", &format!("largest contact forces of the first {until}"));
+        let loose = scene.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
+        for (joint, peak) in loose.take(MOST_JOINTS) {
+            line(&format!("  {}", joint.name), &first_contact(peak));
+        }
+        if contents.contacts > MOST_JOINTS {
+            line("  …", &format!("and {} more ball joints", contents.contacts - MOST_JOINTS));
+        }
+    }
     line("Degrees of freedom", &freedoms(contents));
     line("Constraint rows", &rows(contents));
     begun.not_unique().iter().for_each(|words| line("Not unique", words));
@@ -193,6 +212,22 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
     let torque = report.torque.map(|torque| format!("{} N m", significant(torque.norm(), 6)));
     let exerts: Vec<String> = force.into_iter().chain(torque).collect();
     format!("{}: {}", element.kind.section, exerts.join(" and "))
+}
+
+/// Ball joints whose beginning is listed at most.
+const MOST_JOINTS: usize = 12;
+
+/// The largest contact force of a beginning.
+fn first_contact(peak: &Peak) -> String {
+    if peak.normal == 0.0 {
+        return "no contact".to_owned();
+    }
+    let speed = match peak.impacts {
+        0 => String::new(),
+        _ => format!(", fastest approach {}", format_quantity_digits(peak.approach_speed, "m/s", 3)),
+    };
+    let [force, time] = [(peak.normal, "N"), (peak.time, "ms")].map(|(x, unit)| format_quantity_digits(x, unit, 4));
+    format!("{force} at t = {time}{speed}")
 }
 
 fn freedoms(contents: &Summary) -> String {

@@ -531,6 +531,16 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
         let line = report.lines().find(|line| line.starts_with(label)).unwrap_or_else(|| panic!("{report}"));
         line[label.len()..].trim().to_owned()
     };
+    // Balls that begin in the middle of their play fall onto their walls: how hard is said before any run.
+    let falls = jointplay(folder.path(), "check suspension").expect(0).stdout;
+    let summary = "run suspension --duration 50ms --every 1ms --out fall.csv --summary json";
+    let summary = jointplay(folder.path(), summary).expect(0).stdout;
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    for (joint, peak) in summary["peak_normal_N"].as_object().unwrap() {
+        let own = falls.lines().filter(|line| line.trim_start().starts_with(&format!("{joint} "))).next_back().unwrap();
+        let said: f64 = own.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!((said / peak.as_f64().unwrap() - 1.0).abs() < 1e-3, "{own}: {peak}");
+    }
     let free = jointplay(folder.path(), "check spcmm").expect(0).stdout;
     assert_eq!(line_of(&free, "Degrees of freedom"), "9");
     assert_eq!(line_of(&free, "Constraint rows"), "0");
