@@ -12,7 +12,9 @@ use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::{ElementReport, Summary};
-use crate::scene::{BallJoint, Body, Element, Formulation, Joint, JointKind, Scene, format_quantity, format_quantity_digits, to_display};
+use crate::scene::{
+    BallJoint, Body, Element, Formulation, Joint, JointKind, Scene, format_quantity, format_quantity_digits, to_display,
+};
 use crate::simulate::{Frame, Listed, Peak, Simulation, channels_of};
 
 /// Runs `check`.

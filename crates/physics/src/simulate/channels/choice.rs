@@ -60,18 +60,23 @@ pub struct NoChannel {
 /// Every channel of `scene` in order: the columns that `run` writes unasked, then the others. `first` as in
 /// [`run_columns`](super::run_columns).
 pub fn channels_of(scene: &Scene, first: &Frame) -> Vec<Listed> {
-    let (mut list, mut columns) = (Vec::new(), BTreeSet::new());
+    let (mut list, mut names, mut columns) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
     let place = |signal: &super::Signal| {
         let known = !signal.name.is_empty();
         known.then(|| signal.run.unwrap_or(ASKED))
     };
     lay_out(scene, Some(first), usize::MAX, place, |found| {
         // A term that plots always show and rows only of some scenes has two signals.
-        if columns.insert(found.column.clone()) {
+        if names.insert(found.name.clone()) {
+            let mut column = found.column;
+            // A part may have a name that makes of its column one of the output body's, such as a joint `alpha`.
+            while !columns.insert(column.clone()) {
+                column.insert_str(0, "part_");
+            }
             list.push(Listed {
                 name: found.name,
                 unit: unit_of(found.signal.column),
-                column: found.column,
+                column,
                 help: found.signal.help,
                 unasked: found.signal.run.is_some(),
                 reading: found.reading,
@@ -170,6 +175,17 @@ mod tests {
         let mut simulation = Simulation::new(scene).expect("starts");
         simulation.sample(0.0, &mut frame);
         frame
+    }
+
+    #[test]
+    fn a_part_named_like_an_angle_of_the_output_body_keeps_its_channels() {
+        let text = "[[body]]\nname = \"arm\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+                    [[joint]]\nname = \"alpha\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n";
+        let scene = Scene::parse(text, None, &[]).expect("reads");
+        let mut first = Frame::default();
+        crate::simulate::Simulation::new(&scene).expect("starts").sample(0.0, &mut first);
+        let (columns, _) = chosen_columns(&scene, &first, &["alpha.rate".to_owned()]).expect("has one");
+        assert_eq!(columns, ["t_s", "part_alpha_rate_rad_s"]);
     }
 
     #[test]
