@@ -212,6 +212,23 @@ fn the_other_form_stops_before_a_singular_pose_too() {
     assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
 }
 
+/// Two four-bars whose links all lie in line ten times in as many seconds: neither form leaves its branch there, which would cost
+/// it up to half its energy.
+#[test]
+fn flat_poses_are_passed_on_the_branch_in_both_forms() {
+    for (formulation, tolerance) in [("tree", "1e-6"), ("lagrange", "1e-4"), ("lagrange", "1e-6")] {
+        let changes = [("formulation", formulation), ("solver.tolerance", tolerance)];
+        let mut simulation = simulation("n-four-bar", &changes);
+        run_until(&mut simulation, 10.0);
+        let ledger = simulation.ledger().unwrap();
+        assert!(ledger.relative_residual().abs() < 1e-6, "{formulation} {tolerance}: {ledger:?}");
+        let angle = frame_now(&mut simulation).coordinates[0][0];
+        // The lagrange form knows it within half a turn.
+        let off = (angle - 31.750597187).rem_euclid(std::f64::consts::TAU);
+        assert!(off.min(std::f64::consts::TAU - off) < 1e-3, "{formulation} {tolerance}: {angle}");
+    }
+}
+
 /// A crank that drives a four-bar linkage through a dead centre: no step passes it, whatever the tolerance, and no softer machine.
 #[test]
 fn a_dead_centre_is_named_where_it_stops_the_run() {

@@ -150,6 +150,18 @@ fn drives_tell_their_common_period() {
     assert_eq!(drive_period(&scene("spcmm", &[])), Ok(2.0));
     let crank = drive_period(&scene("slider-crank-driven", &[])).unwrap();
     assert!((crank - std::f64::consts::TAU / 6.0).abs() < 1e-15);
+    // What force elements follow repeats as well as a drive.
+    let tyre = "ground = { law = \"harmonic\", amplitude = \"1 mm\", frequency = \"4 Hz\" }";
+    let load = "[[load]]\nname = \"wind\"\non = { body = \"wheel\" }\nforce = \"1 0 0 N\"\nfrequency = \"4 Hz\"";
+    for element in [tyre, load, ""] {
+        let text = format!(
+            "[[body]]\nname = \"wheel\"\nmass = \"20 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+             [[joint]]\nname = \"wheel\"\nkind = \"free\"\nchild = \"wheel\"\nstart = {{ position = \"0 0 0.3 m\" }}\n\
+             [[tyre]]\nname = \"t\"\non = {{ body = \"wheel\" }}\nup = [0, 0, 1]\nradius = \"0.3 m\"\nstiffness = \"50 N/mm\"\n{element}\n"
+        );
+        let period = drive_period(&parse(&text, &[]));
+        assert_eq!(period.ok(), (!element.is_empty()).then_some(0.25), "{element}");
+    }
     for without in ["pendulum", "chain", "slider-crank"] {
         assert!(drive_period(&scene(without, &[])).is_err(), "{without}");
     }

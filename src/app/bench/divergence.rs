@@ -76,7 +76,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
             let [value, error] = [exponent.value, 2.0 * exponent.standard_error].map(|x| value::number(x, 3));
             format!("Exponent {value} ± {error} 1/s")
         }
-        Err((more, interval)) => format!("Exponent — 1/s, known in {}", value::time(more as f64 * interval)),
+        Err((more, interval)) => format!("Exponent — 1/s, known in {} s", value::number(more as f64 * interval, 3)),
     };
     ui.label(exponent).on_hover_text(
         "Largest Lyapunov exponent of the run since the twin began, ± two standard errors: the mean rate at which the distance of \
