@@ -166,20 +166,21 @@ fn scales(ui: &mut Ui, player: &mut Player) {
         .response
         .on_hover_text("Simulated against real time: choose one, or drag to the right for faster")
         .accessible_name("Time scale preset");
-    let drag = ui.interact(list.rect, list.id.with("drag"), Sense::DRAG);
+    // The list itself is dragged: a widget of its own would lie over it and take its clicks.
+    let drag = list.interact(Sense::DRAG);
     if !drag.dragged() {
         return;
     }
-    // What is left of the drag since the last scale.
-    let left: Option<f32> = ui.data(|data| data.get_temp(drag.id));
-    let left = left.filter(|_| !drag.drag_started());
-    let mut way = left.unwrap_or(0.0) + drag.drag_delta().x;
-    while way.abs() >= SCALE_APART {
-        let faster = way > 0.0;
+    // How much of the drag the scales already passed have used up.
+    let used: Option<f32> = ui.data(|data| data.get_temp(drag.id));
+    let mut used = used.filter(|_| !drag.drag_started()).unwrap_or(0.0);
+    let way = drag.total_drag_delta().unwrap_or_default().x;
+    while (way - used).abs() >= SCALE_APART {
+        let faster = way > used;
         player.pacer.set_scale(next_scale(player.pacer.scale(), faster));
-        way -= SCALE_APART.copysign(way);
+        used += SCALE_APART.copysign(way - used);
     }
-    ui.data_mut(|data| data.insert_temp(drag.id, way));
+    ui.data_mut(|data| data.insert_temp(drag.id, used));
 }
 
 /// The time scale that is reached, in what is left of the row below a narrow [`row`], which has no room for it.

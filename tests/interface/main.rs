@@ -5,6 +5,7 @@
 mod common;
 
 mod bench_window;
+mod clicks;
 mod embed;
 mod film;
 mod frames;

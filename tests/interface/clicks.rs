@@ -1,0 +1,162 @@
+//! Whatever can be clicked is clicked where it lies, by a pointer: an action of a screen reader reaches what something else covers.
+
+use eframe::egui::{self, Key, Popup, Pos2, Rect, accesskit::Role, vec2};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::app::App;
+
+use crate::window::sized;
+
+const WIDE: [f32; 2] = [1280.0, 800.0];
+const UPRIGHT: [f32; 2] = [390.0, 844.0];
+const LYING: [f32; 2] = [844.0, 390.0];
+
+/// What is clicked.
+const CLICKED: [Role; 5] = [Role::Button, Role::ComboBox, Role::CheckBox, Role::RadioButton, Role::Switch];
+
+/// A widget that takes clicks.
+struct Target {
+    id: egui::accesskit::NodeId,
+    role: Role,
+    name: String,
+    rect: Rect,
+}
+
+/// Those that are enabled and have their centre in the window.
+fn targets(harness: &Harness<'_, App>) -> Vec<Target> {
+    let window = harness.ctx.content_rect();
+    let all = CLICKED.into_iter().flat_map(|role| harness.query_all_by_role(role));
+    all.filter(|node| !node.accesskit_node().is_disabled() && window.contains(node.rect().center()))
+        .map(|node| {
+            let own = node.accesskit_node();
+            let name = own.label().or_else(|| own.value()).unwrap_or_default();
+            Target { id: own.locate().0, role: own.role(), name, rect: node.rect() }
+        })
+        .collect()
+}
+
+/// Moves the pointer to the centre of each, and asserts that it would be clicked there.
+#[track_caller]
+fn assert_in_reach(harness: &mut Harness<'_, App>, what: &str) -> usize {
+    let targets = targets(harness);
+    for target in &targets {
+        harness.hover_at(target.rect.center());
+        harness.run_steps(2);
+        let hit = harness.ctx.viewport(|viewport| viewport.hits.click);
+        let hit = hit.map(|widget| widget.id.accesskit_id());
+        assert_eq!(hit, Some(target.id), "{what}: {:?} {} at {:?} is covered", target.role, target.name, target.rect);
+    }
+    harness.remove_cursor();
+    harness.run_steps(2);
+    targets.len()
+}
+
+fn press(harness: &mut Harness<'_, App>, at: Pos2) {
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.step();
+    harness.drop_at(at);
+    harness.run_steps(3);
+}
+
+fn place(harness: &Harness<'_, App>, role: Role, name: &str) -> Pos2 {
+    harness.get_by_role_and_label(role, name).rect().center()
+}
+
+fn press_on(harness: &mut Harness<'_, App>, role: Role, name: &str) {
+    let at = place(harness, role, name);
+    press(harness, at);
+}
+
+/// Presses the list or menu of this name, and asserts that it opens.
+#[track_caller]
+fn assert_opens(harness: &mut Harness<'_, App>, what: &str, role: Role, name: &str) {
+    press_on(harness, role, name);
+    assert!(Popup::is_any_open(&harness.ctx), "{what}: {name} does not open");
+    harness.key_press(Key::Escape);
+    harness.run_steps(3);
+    assert!(!Popup::is_any_open(&harness.ctx), "{what}: {name} stays open");
+}
+
+/// Presses every list in sight.
+fn open_lists(harness: &mut Harness<'_, App>, what: &str) -> usize {
+    let lists: Vec<Target> = targets(harness).into_iter().filter(|target| target.role == Role::ComboBox).collect();
+    for list in &lists {
+        assert_opens(harness, what, list.role, &list.name);
+    }
+    lists.len()
+}
+
+fn presenting(size: [f32; 2]) -> Harness<'static, App> {
+    let mut harness = sized("spcmm", size, egui::Theme::Light);
+    harness.key_press(Key::F5);
+    harness.step();
+    harness.set_size(egui::Vec2::from(size) / harness.ctx.zoom_factor());
+    harness.run();
+    assert!(harness.state().is_presenting());
+    harness
+}
+
+#[test]
+fn every_button_list_and_switch_is_clicked_where_it_lies() {
+    for (size, least) in [(WIDE, 30), (UPRIGHT, 10), (LYING, 10)] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        let what = format!("{size:?}");
+        let found = assert_in_reach(&mut harness, &what);
+        assert!(found >= least, "{what}: {found}");
+        for key in [Key::C, Key::G] {
+            harness.key_press(key);
+            harness.run();
+            assert_in_reach(&mut harness, &format!("{what} after {key:?}"));
+        }
+        let mut harness = presenting(size);
+        assert!(assert_in_reach(&mut harness, &format!("presentation {size:?}")) >= 4);
+    }
+}
+
+#[test]
+fn every_list_and_menu_opens_by_a_press_where_it_lies() {
+    let mut harness = sized("spcmm", WIDE, egui::Theme::Light);
+    assert!(open_lists(&mut harness, "window") >= 3);
+    for menu in ["Save", "Lessons", "View options", "Choose plots"] {
+        assert_opens(&mut harness, "window", Role::Button, menu);
+    }
+    let mut harness = presenting(WIDE);
+    assert!(open_lists(&mut harness, "presentation") >= 1);
+    for size in [UPRIGHT, LYING] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        assert!(open_lists(&mut harness, "small window") >= 2);
+        for menu in ["Menu", "View options"] {
+            assert_opens(&mut harness, "small window", Role::Button, menu);
+        }
+    }
+}
+
+#[test]
+fn a_time_scale_is_chosen_from_the_list_by_a_mouse_and_by_a_drag_across_it() {
+    for mut harness in [sized("spcmm", WIDE, egui::Theme::Light), presenting(WIDE)] {
+        let scale = |harness: &Harness<'_, App>| harness.state().player().pacer.scale();
+        for (entry, expected) in [("1:10", 0.1), ("1:100", 0.01), ("1:20", 0.05)] {
+            press_on(&mut harness, Role::ComboBox, "Time scale preset");
+            press_on(&mut harness, Role::Button, entry);
+            assert_eq!(scale(&harness), expected, "{entry}");
+            assert!(!Popup::is_any_open(&harness.ctx));
+        }
+        let at = place(&harness, Role::ComboBox, "Time scale preset");
+        harness.hover_at(at);
+        harness.step();
+        harness.drag_at(at);
+        harness.step();
+        for way in [10.0, 20.0, 30.0, 40.0] {
+            harness.hover_at(at + vec2(way, 0.0));
+            harness.step();
+        }
+        harness.drop_at(at + vec2(40.0, 0.0));
+        harness.run_steps(3);
+        assert_eq!(scale(&harness), 0.5, "two further than 1:20");
+        assert!(!Popup::is_any_open(&harness.ctx), "a drag opens nothing");
+    }
+}
