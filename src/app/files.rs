@@ -35,7 +35,7 @@ impl App {
             return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
-        let (plots, window) = shown::changed(&self.plots);
+        let (plots, window) = shown::changed(&self.plots, player.wanted());
         let followed = self.viewport.followed();
         let joints = &player.scene().ball_joints;
         let under_microscope = joints.get(self.microscope.joint());

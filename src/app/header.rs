@@ -5,9 +5,9 @@ use eframe::egui::{self, ComboBox, Frame, RichText, ThemePreference, Ui};
 use super::App;
 use super::dialogs::Dialog;
 use super::files::verdict_words;
-use super::layout;
 use super::replay::Verdict;
-use crate::scene::BUILT_IN;
+use super::{layout, opening};
+use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 
 impl App {
     pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
@@ -157,11 +157,46 @@ impl App {
 
     /// Whether [`Self::strips`] has anything to say.
     pub(super) fn has_messages(&self) -> bool {
-        self.problem.is_some() || self.verdict.is_some() || self.is_under_way()
+        self.problem.is_some() || self.verdict.is_some() || self.is_under_way() || self.tells_changes()
+    }
+
+    /// Whether the scene is the one that a visitor meets, and nobody has said that this is understood.
+    fn tells_changes(&self) -> bool {
+        let here = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
+        here && !self.changes_seen && opening::is_rattling(self.player.wanted())
+    }
+
+    /// Says with which changes the window began; one click takes them back.
+    fn changes_strip(&mut self, ui: &mut Ui) {
+        let words = "Driven at 6 Hz, twelve times as fast as in the paper, so that the joints rattle at every turn.";
+        let row = plate(ui, ui.visuals().weak_text_color()).show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(words);
+                let help = "The scene as its file gives it: 0.5 Hz; the joints rattle for 70 ms and come to rest";
+                let paper = ui.button("The paper's settings").on_hover_text(help).clicked();
+                (paper, ui.button("Dismiss").clicked())
+            })
+            .inner
+        });
+        let (paper, dismissed) = row.inner;
+        self.changes_seen |= dismissed;
+        if paper {
+            let opened = Scene::load(DEFAULT_SCENE, &[]).map_err(|error| error.to_string());
+            self.problem = opened
+                .and_then(|scene| {
+                    self.show_scene(&scene)?;
+                    self.player.pacer.set_scale(opening::time_scale(&scene));
+                    Ok(())
+                })
+                .err();
+        }
     }
 
     /// Errors, the progress of a replay, and the verdict on a link.
     pub(super) fn strips(&mut self, ui: &mut Ui) {
+        if self.tells_changes() {
+            self.changes_strip(ui);
+        }
         if let Some(problem) = self.problem.clone() {
             let colour = ui.visuals().error_fg_color;
             if strip(ui, &problem, colour) {

@@ -30,6 +30,7 @@ mod lesson;
 mod load;
 mod log;
 mod microscope;
+mod opening;
 mod overlay;
 mod pace;
 mod paths;
@@ -140,13 +141,13 @@ pub struct AppOptions {
 }
 
 impl AppOptions {
-    /// Plays `scene` fifty times slower than real time, with its play magnified enough to be visible.
+    /// Plays `scene` at its own pace, with its play magnified enough to be visible.
     pub fn new(scene: Scene) -> Self {
         Self {
+            time_scale: opening::time_scale(&scene),
             scene,
             theme: ThemePreference::System,
             playing: true,
-            time_scale: 0.02,
             view: ViewOptions { magnification: 20.0, ..ViewOptions::default() },
             link: None,
             lesson: None,
@@ -156,12 +157,19 @@ impl AppOptions {
         }
     }
 
+    /// What a visitor meets: the default scene, driven so fast that its joints rattle at every turn. The window says so, and how to get
+    /// back to what the scene's file gives.
+    pub fn first() -> Self {
+        Self { time_scale: opening::RATTLING_SCALE, ..Self::new(opening::rattling()) }
+    }
+
     /// Begins `lesson` at step `step`, counted from 0.
     pub fn of_lesson(lesson: Arc<Lesson>, step: usize) -> Self {
         Self { playing: false, lesson: Some((lesson.clone(), step)), ..Self::new(lesson.runs[0].scene.clone()) }
     }
 
-    /// Reads a link: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. An empty one gives the default scene.
+    /// Reads a link: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. One that asks for nothing of a run gives
+    /// what [`Self::first`] does.
     ///
     /// # Errors
     /// A link that cannot be read, or whose scene is invalid or cannot start; in words.
@@ -179,6 +187,10 @@ impl AppOptions {
                 embedded: link.embedded.clone(),
                 ..Self::of_lesson(lesson.clone(), *step)
             });
+        }
+        if link.is_of_nothing(text) {
+            let theme = link.theme.unwrap_or(ThemePreference::System);
+            return Ok(Self { theme, embedded: link.embedded, ..Self::first() });
         }
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
@@ -260,6 +272,8 @@ pub struct App {
     load: Option<(Load, bool)>,
     verdict: Option<Verdict>,
     notice: Option<Notice>,
+    /// Whether the user has put away what is said about the changes that the window began with.
+    changes_seen: bool,
     announcer: Announcer,
     microscope: Microscope,
     picture: Picture,
@@ -306,7 +320,7 @@ impl App {
             viewport: Viewport::new(&player, options.view),
             controls: Controls::default(),
             accuracy: Accuracy::default(),
-            plots: Plots::default(),
+            plots: Plots::of(&options.scene),
             timeline: Timeline::default(),
             bench: Bench::default(),
             dialog: None,
@@ -324,6 +338,7 @@ impl App {
             load: None,
             verdict: None,
             notice: None,
+            changes_seen: false,
             announcer: Announcer::default(),
             microscope: Microscope::default(),
             picture: Picture::default(),
@@ -652,7 +667,9 @@ impl App {
         // Its time scale is not that of the run.
         self.cancel_film();
         player.clock = self.player.clock;
-        player.pacer.set_scale(self.player.pacer.scale());
+        let another = scene.source.text != self.player.wanted().source.text;
+        let scale = if another { opening::time_scale(scene) } else { self.player.pacer.scale() };
+        player.pacer.set_scale(scale);
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         player.set_ideal(self.player.ideal().is_some());
         self.player = player;
@@ -660,6 +677,9 @@ impl App {
         self.viewport.show_scene(&self.player);
         self.timeline.reset();
         self.plots.reset();
+        if another {
+            self.plots.begin(scene);
+        }
         self.controls.clear();
         self.problem = None;
         self.replay = None;

@@ -5,11 +5,12 @@ use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Role, ScrollArea, Tex
 use egui_plot::{AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform};
 
 use super::curve::{Curves, Path, Trace};
-use super::layout;
 use super::player::Player;
 use super::stack::stack;
 use super::zoom::{self, Zoom};
+use super::{layout, opening};
 use super::{theme, value};
+use crate::scene::Scene;
 use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
 /// Windows to choose from, s.
@@ -179,10 +180,11 @@ struct Place {
     units: [f64; 2],
 }
 
-impl Default for Plots {
-    fn default() -> Self {
+impl Plots {
+    /// Those that a window on `scene` begins with.
+    pub fn of(scene: &Scene) -> Self {
         Self {
-            chosen: vec![Quantity::NormalForce, Quantity::Eccentricity],
+            chosen: opening::plots(scene),
             picked: Vec::new(),
             search: String::new(),
             found: None,
@@ -195,9 +197,13 @@ impl Default for Plots {
             zoomed: None,
         }
     }
-}
 
-impl Plots {
+    /// Shows what a window on `scene` begins with; channels picked by name stay.
+    pub fn begin(&mut self, scene: &Scene) {
+        let picked = std::mem::take(&mut self.picked);
+        *self = Self { picked, ..Self::of(scene) };
+    }
+
     /// Where the plot of `quantity` last drew a value (SI) at `time`, s; points of the screen. `None` if it is not shown.
     pub fn place(&self, quantity: Quantity, time: f64, value: f64) -> Option<Pos2> {
         let (_, place) = self.places.iter().find(|(shown, _)| *shown == quantity)?;

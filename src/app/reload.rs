@@ -147,7 +147,10 @@ impl App {
         let (playing, twin) = (self.player.is_playing(), self.player.twin().is_some());
         let (phase, time) = (self.player.watch().phase(), self.player.pacer.shown());
         let told = self.scene_file.told.clone();
+        let (scale, chosen, window) = (self.player.pacer.scale(), self.plots.chosen.clone(), self.plots.window);
         self.show_scene(&scene)?;
+        self.player.pacer.set_scale(scale);
+        (self.plots.chosen, self.plots.window) = (chosen, window);
         self.scene_file = SceneFile { told, ..SceneFile::opened(name, given) };
         self.player.set_phase(phase);
         let reached = self.reach(time);

@@ -454,6 +454,13 @@ impl Link {
         }
     }
 
+    /// Whether the link, read from `text`, asks for nothing of a run: no scene, change, instant, lesson or look.
+    pub fn is_of_nothing(&self, text: &str) -> bool {
+        // The default scene by its name is asked for.
+        let bare = Self { theme: self.theme, embedded: self.embedded.clone(), ..Self::default() };
+        !text.contains("scene=") && *self == bare
+    }
+
     /// Whether the link names an instant to go to.
     pub fn has_instant(&self) -> bool {
         self.steps.is_some() || self.time.is_some() || self.hash.is_some() || !self.log.entries.is_empty()

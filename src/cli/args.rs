@@ -85,9 +85,9 @@ pub struct CheckArguments {
 /// `view`.
 #[derive(Debug, Args)]
 pub struct ViewArguments {
-    /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved.
-    #[arg(default_value = super::DEFAULT_SCENE)]
-    pub scene: OsString,
+    /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved
+    /// [default: spcmm, driven so fast that its joints rattle at every turn].
+    pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
@@ -483,7 +483,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 impl Default for ViewArguments {
     /// As if no command were given.
     fn default() -> Self {
-        Self { scene: super::DEFAULT_SCENE.into(), changes: Vec::new(), link: None, lesson: None, page: None }
+        Self { scene: None, changes: Vec::new(), link: None, lesson: None, page: None }
     }
 }
 

@@ -108,7 +108,11 @@ fn view(arguments: &ViewArguments) -> Result<(), Failure> {
     let options = match (&arguments.link, &arguments.lesson) {
         (Some(link), _) => AppOptions::from_link(link).map_err(Failure::usage)?,
         (_, Some(lesson)) => AppOptions::of_lesson(Lesson::load(lesson)?, 0),
-        (None, None) => AppOptions::new(Scene::load(&arguments.scene, &arguments.changes)?),
+        (None, None) if arguments.scene.is_none() && arguments.changes.is_empty() => AppOptions::first(),
+        (None, None) => {
+            let scene = arguments.scene.as_deref().unwrap_or(DEFAULT_SCENE.as_ref());
+            AppOptions::new(Scene::load(scene, &arguments.changes)?)
+        }
     };
     run_native(options, page).map_err(|error| {
         let code = match error {

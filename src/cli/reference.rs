@@ -163,6 +163,7 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         Takes::Joint => "name of a joint".to_owned(),
         Takes::File => "name of a file".to_owned(),
         Takes::Word(of) => words(of),
+        Takes::Words(of, many) => format!("list of at most {} of {}", many.most, words(of)),
         Takes::Parameter(name) => find(name).map_or_else(String::new, |parameter| match parameter.kind {
             Kind::Number { dimension: of, .. } => {
                 format!("{}, {}", dimension(of), parameter.range())

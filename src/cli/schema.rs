@@ -160,6 +160,7 @@ fn of_value(key: &FileKey) -> Json {
         Takes::Name => json!({ "type": "string", "pattern": "^[A-Za-z0-9_-]{1,40}$" }),
         Takes::Text | Takes::Body | Takes::Joint | Takes::File => text(),
         Takes::Word(words) => json!({ "enum": words }),
+        Takes::Words(words, _) => list(json!({ "enum": words })),
         Takes::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
             Some(Kind::Number { dimension, min, max, .. }) => number(dimension, (min, max)),
             Some(Kind::Count { min, max }) => whole(min, max),

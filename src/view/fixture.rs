@@ -2,7 +2,8 @@
 
 use crate::contact;
 use crate::scene::{
-    Attachment, BallJoint, Body, Geometry, Mat3, Output, Quat, Role, Scene, Shape, SignedAxis, Vec3, ViewSettings,
+    Attachment, BallJoint, Body, Geometry, MOST_PLOTS, Mat3, Output, Quat, Role, Scene, Shape, SignedAxis, Vec3,
+    ViewSettings,
 };
 use crate::simulate::{BodyMotion, ContactState, Frame, JointReport, Peak};
 
@@ -38,7 +39,7 @@ fn scene(
     Scene {
         name: name.to_owned(),
         gravity: down.unit() * 9.81,
-        view: ViewSettings { down, floor: None, isometric: None },
+        view: ViewSettings { down, floor: None, isometric: None, time_scale: None, plots: [None; MOST_PLOTS] },
         output: Output { body: 0, probe: None },
         bodies,
         joints: Vec::new(),

@@ -227,6 +227,7 @@ fn the_frames_of_a_film_are_those_of_render_to_the_byte() {
 fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     let (mut harness, calls) = window("pendulum", [900.0, 640.0]);
     give_graphics(&mut harness);
+    harness.state_mut().player_mut().pacer.set_scale(0.02);
     harness.state_mut().player_mut().run_to(30e-3);
     harness.run();
     let state = |harness: &egui_kittest::Harness<'_, jointplay::app::App>| {

@@ -846,6 +846,7 @@ fn keys_and_tab_work_before_anything_was_clicked() {
 #[test]
 fn what_goes_on_is_told_to_who_does_not_see_it() {
     let (mut harness, calls) = window("pendulum", LARGE);
+    harness.state_mut().player_mut().pacer.set_scale(0.02);
     assert_eq!(harness.state().announcement(), "Pendulum on a ball joint. Paused at the start. S1 free.");
     harness.key_press(Key::Space);
     harness.run_steps(2);
@@ -1039,4 +1040,55 @@ fn copied_from(harness: &mut Harness<'_, App>, page: &str) -> String {
     let host = DesktopHost::new(page.to_owned());
     harness.state_mut().set_host(Box::new(host));
     copied(harness)
+}
+
+#[test]
+fn a_visitor_meets_a_machine_that_goes_on_and_is_one_click_from_the_papers() {
+    for link in ["", "?", "?theme=light", "?renderer=webgl"] {
+        let options = AppOptions::from_link(link).expect("a link");
+        assert_eq!(options.scene.changes.len(), 2, "{link}");
+        assert!(options.playing);
+    }
+    for link in ["?scene=spcmm", "?play=0", "?c=0.5mm&play=0", "?t=20ms"] {
+        let options = AppOptions::from_link(link).expect("a link");
+        assert!(options.scene.changes.len() <= 1 && options.time_scale == 0.02, "{link}");
+    }
+    let (mut harness, _) = open(AppOptions::from_link("").expect("a link"), LARGE);
+    assert!(label(&harness, "twelve times as fast as in the paper"));
+    // The change is one like any other: shown as such, and taken back.
+    assert_eq!(harness.state().player().wanted().changes[0].0, "spcmm.frequency");
+    harness.run_steps(120);
+    let turns = harness.state().player().pacer.shown() * 6.0;
+    assert!((0.4..1.2).contains(&turns), "{turns}");
+    harness.get_by_label("The paper's settings").click();
+    harness.run_steps(3);
+    let player = harness.state().player();
+    assert!(player.wanted().changes.is_empty() && player.is_playing());
+    assert_eq!(player.pacer.scale(), 0.02);
+    assert!(!label(&harness, "twelve times as fast as in the paper"));
+    // Dismissed, it is silent.
+    let (mut harness, _) = open(AppOptions::first(), LARGE);
+    harness.get_by_label("Dismiss").click();
+    harness.run_steps(3);
+    assert!(!label(&harness, "twelve times as fast as in the paper"));
+    assert!(harness.query_by_label("The paper's settings").is_none());
+}
+
+#[test]
+fn another_scene_brings_its_own_pace_and_plots_and_the_same_one_keeps_them() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    let app = harness.state_mut();
+    app.player_mut().pacer.set_scale(1e-3);
+    app.plots_mut().window = Window::Last(1e-3);
+    app.plots_mut().chosen = vec![Quantity::Energy];
+    app.open("press").expect("built in");
+    assert_eq!(app.player().pacer.scale(), 0.125);
+    assert_eq!(app.plots_mut().window, Window::Automatic);
+    assert_eq!(app.plots_mut().chosen, [Quantity::NormalForce, Quantity::Acceleration]);
+    // A link without plots brings these, too.
+    assert_eq!(app.link().plots, None);
+    app.plots_mut().window = Window::Everything;
+    app.player_mut().pacer.set_scale(0.5);
+    app.open("press").expect("built in");
+    assert_eq!((app.player().pacer.scale(), app.plots_mut().window), (0.5, Window::Everything));
 }

@@ -151,7 +151,7 @@ test('loading shows its progress, and then time passes by the clock on the wall'
 });
 
 test('a hidden tab stands still, and does not catch up', async () => {
-    const lab = await open('', { backend: 'webgl' });
+    const lab = await open('scene=spcmm', { backend: 'webgl' });
     await lab.until(async () => (await lab.state()).time_s > 0, 'time does not pass');
     const hide = (hidden) =>
         lab.page.evaluate((hidden) => {

@@ -65,20 +65,15 @@ impl Instruments {
     }
 }
 
-/// A quantity's word: `normal-force`.
-fn word(quantity: Quantity) -> String {
-    quantity.label().to_lowercase().replace(' ', "-")
-}
-
 /// Reads quantities separated by commas or spaces, in the order of [`Quantity::ALL`]; `none` stands for none.
 pub fn read_plots(text: &str) -> Result<Vec<Quantity>, String> {
     let mut chosen = Vec::new();
     for part in text.split([',', ' ']).filter(|part| !part.is_empty()) {
-        match Quantity::ALL.iter().find(|q| word(**q) == part) {
+        match Quantity::ALL.iter().find(|q| q.word() == part) {
             Some(quantity) => chosen.push(*quantity),
             None if part == "none" => {}
             None => {
-                let known: Vec<String> = Quantity::ALL.map(word).to_vec();
+                let known = Quantity::ALL.map(Quantity::word);
                 return Err(format!("no plot `{part}`; allowed, separated by commas: {}, none", known.join(", ")));
             }
         }
@@ -92,7 +87,7 @@ pub fn write_plots(chosen: &[Quantity]) -> String {
     if chosen.is_empty() {
         return "none".to_owned();
     }
-    let words: Vec<String> = chosen.iter().map(|quantity| word(*quantity)).collect();
+    let words: Vec<&str> = chosen.iter().map(|quantity| quantity.word()).collect();
     words.join(" ")
 }
 
@@ -183,8 +178,8 @@ pub fn name_followed(scene: &Scene, picked: Picked) -> Option<String> {
 }
 
 /// The chosen quantities and the window of `plots`, where they differ from the defaults.
-pub fn changed(plots: &Plots) -> (Option<Vec<Quantity>>, Option<Window>) {
-    let first = Plots::default();
+pub fn changed(plots: &Plots, scene: &Scene) -> (Option<Vec<Quantity>>, Option<Window>) {
+    let first = Plots::of(scene);
     let chosen = (plots.chosen != first.chosen).then(|| plots.chosen.clone());
     (chosen, (plots.window != first.window).then_some(plots.window))
 }

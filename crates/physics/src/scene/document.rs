@@ -398,7 +398,7 @@ impl<'d> Node<'d> {
     /// One of the words of its row.
     pub fn choice(&self) -> Result<&'static str, SceneError> {
         let words = match self.row.takes {
-            Takes::Word(words) => words,
+            Takes::Word(words) | Takes::Words(words, _) => words,
             _ => &[],
         };
         let text = self.text()?;

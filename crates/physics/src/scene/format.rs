@@ -16,6 +16,8 @@ use crate::words::Words;
 
 /// Most parameters that a file may define.
 const MOST_OWN: usize = 1000;
+/// Time scales that a window may begin with.
+const SLOWEST_TO_REAL: (f64, f64) = (1e-4, 1.0);
 /// Most files that a scene may include.
 const MOST_FILES: usize = 100;
 /// Largest length of a shape, and of the paper's machine, m.
@@ -174,6 +176,22 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
             .absent("the usual one"),
         key("pitch", number(D::Angle), "\"12 deg\"", "elevation of the isometric view, with `yaw`")
             .absent("the usual one"),
+        key(
+            "time_scale",
+            Takes::Number(D::None, SLOWEST_TO_REAL),
+            "0.05",
+            "simulated seconds per second that a window begins with",
+        )
+        .absent("a period of the drives takes about 4 s; without drives 0.1")
+        .fixed(),
+        key(
+            "plots",
+            Takes::Words(&PLOT_WORDS, many(MOST_PLOTS, "plots")),
+            "[\"normal-force\", \"acceleration\"]",
+            "plots that a window begins with",
+        )
+        .absent("normal force and eccentricity")
+        .fixed(),
     ];
     let keys = joined(&[&parameters("view"), &own]);
     FileTable::new("view", "[view]", "how the machine is looked at", keys)

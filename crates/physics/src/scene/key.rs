@@ -93,6 +93,8 @@ pub enum Takes {
     File,
     /// One of some words.
     Word(&'static [&'static str]),
+    /// A list of them.
+    Words(&'static [&'static str], Many),
     /// The value of a row of the table of parameters, by its key there.
     Parameter(&'static str),
     /// A table.
@@ -279,7 +281,11 @@ impl FileKey {
     /// Most entries of its list.
     pub fn many(&self) -> Option<Many> {
         match self.takes {
-            Takes::List(_, many) | Takes::Vectors(_, many) | Takes::Pairs(_, many) | Takes::Files(many) => Some(many),
+            Takes::List(_, many)
+            | Takes::Vectors(_, many)
+            | Takes::Pairs(_, many)
+            | Takes::Words(_, many)
+            | Takes::Files(many) => Some(many),
             _ => None,
         }
     }

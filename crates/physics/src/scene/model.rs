@@ -266,7 +266,34 @@ pub struct ViewSettings {
     pub floor: Option<f64>,
     /// Azimuth about the vertical and elevation of the isometric view, rad, where the usual one would hide something.
     pub isometric: Option<(f64, f64)>,
+    /// Simulated seconds per second that a window begins with; `None` lets it choose.
+    pub time_scale: Option<f64>,
+    /// Plots that a window begins with, each one of [`PLOT_WORDS`]; `None` at first lets it choose.
+    pub plots: [Option<&'static str>; MOST_PLOTS],
 }
+
+/// Most plots that a window may begin with.
+pub const MOST_PLOTS: usize = 4;
+
+/// Words for the plots of a window, in the order in which it lists them.
+pub const PLOT_WORDS: [&str; 16] = [
+    "normal-force",
+    "friction-force",
+    "eccentricity",
+    "penetration",
+    "position",
+    "angles",
+    "velocity",
+    "angle-rates",
+    "acceleration",
+    "angle-accelerations",
+    "actuator-force",
+    "actuator-torque",
+    "energy",
+    "energy-balance",
+    "probe-error",
+    "tip-error",
+];
 
 /// What the pose columns report.
 #[derive(Clone, Debug, PartialEq)]

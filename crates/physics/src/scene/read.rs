@@ -183,12 +183,24 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             })
         }
     };
-    let (mut floor, mut isometric) = (None, None);
-    if let Some(view) = top.get("view") {
-        let section = view.section()?;
+    let mut view = ViewSettings {
+        down: SignedAxis::MinusZ,
+        floor: None,
+        isometric: None,
+        time_scale: None,
+        plots: [None; MOST_PLOTS],
+    };
+    if let Some(node) = top.get("view") {
+        let section = node.section()?;
         let get = |name: &str| section.get(name).map(|node| node.number()).transpose();
-        floor = get("floor")?;
-        isometric = match (get("yaw")?, get("pitch")?) {
+        view.floor = get("floor")?;
+        view.time_scale = get("time_scale")?;
+        if let Some(plots) = section.get("plots") {
+            for (place, plot) in view.plots.iter_mut().zip(plots.entries()?) {
+                *place = Some(plot.choice()?);
+            }
+        }
+        view.isometric = match (get("yaw")?, get("pitch")?) {
             (Some(yaw), Some(pitch)) => Some((yaw, pitch)),
             (None, None) => None,
             _ => return Err(section.error("", "yaw and pitch belong together: give both or none")),
@@ -210,7 +222,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         },
         spcmm,
         chain: top.get("chain").map(|_| Chain { links: 0 }),
-        view: ViewSettings { down: SignedAxis::MinusZ, floor, isometric },
+        view,
         output: Output { body: 0, probe: None },
         start: StartRule::default(),
         bodies: Vec::new(),

@@ -193,6 +193,11 @@ impl Quantity {
         &PLOTS[self as usize]
     }
 
+    /// Its word in scene files and links.
+    pub fn word(self) -> &'static str {
+        crate::scene::PLOT_WORDS[self as usize]
+    }
+
     /// Sentence-case name.
     pub fn label(self) -> &'static str {
         self.plot().label
