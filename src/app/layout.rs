@@ -250,7 +250,7 @@ impl App {
                 plots.header(ui, player);
                 if let Some(time) = plots.ui(ui, player).filter(|_| free) {
                     player.go_to(time);
-                    viewport.arrive(player);
+                    viewport.revisit(player);
                 }
             });
         let asked = Panel::bottom("transport")
@@ -259,7 +259,7 @@ impl App {
                 present = present::double_tapped(ui);
                 let contents = ui.add_enabled_ui(free, |ui| {
                     if timeline.ui(ui, player, viewport.focus()) {
-                        viewport.arrive(player);
+                        viewport.revisit(player);
                     }
                     transport::ui(ui, player)
                 });
@@ -355,7 +355,7 @@ impl App {
     pub(super) fn timeline_ui(&mut self, ui: &mut Ui) {
         let focus = self.viewport.focus();
         if self.timeline.ui(ui, &mut self.player, focus) {
-            self.viewport.arrive(&self.player);
+            self.viewport.revisit(&self.player);
         }
     }
 
@@ -405,7 +405,7 @@ impl App {
                     let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
                     if let Some(time) = asked.filter(|_| free) {
                         player.go_to(time);
-                        viewport.arrive(player);
+                        viewport.revisit(player);
                     }
                 }
                 Some(Sheet::Bench) => {

@@ -626,6 +626,17 @@ impl App {
         opened
     }
 
+    /// Pauses and shows `time`, s: any instant shown before.
+    pub fn look_back(&mut self, time: f64) {
+        self.player.go_to(time);
+        self.viewport.revisit(&self.player);
+    }
+
+    /// Ball joint, force in N and age in s of every peak that is marked.
+    pub fn peak_marks(&self) -> Vec<(usize, f32, f64)> {
+        self.viewport.peak_marks(&self.player)
+    }
+
     /// Pauses and runs on until `time`, s, however long that takes. Impacts on the way are recorded but no longer glow.
     pub fn run_to(&mut self, time: f64) {
         self.player.run_to(time);
@@ -655,7 +666,7 @@ impl App {
         let sought = self.player.is_seeking();
         self.advance_heard(dt);
         if sought && !self.player.is_seeking() {
-            self.viewport.arrive(&self.player);
+            self.viewport.revisit(&self.player);
         }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
@@ -714,18 +725,18 @@ impl App {
             Action::Step => player.single_step(),
             Action::StepBack => {
                 player.step_back();
-                self.viewport.arrive(&self.player);
+                self.viewport.revisit(&self.player);
             }
             Action::Backwards if player.is_playing_backwards() => player.set_playing(false),
             Action::Backwards => player.play_backwards(),
             Action::Impact { forward } => {
                 player.go_to_contact(self.viewport.focus(), forward);
-                self.viewport.arrive(&self.player);
+                self.viewport.revisit(&self.player);
             }
             Action::Home | Action::End => {
                 let end = player.reached();
                 player.go_to(if action == Action::End { end } else { 0.0 });
-                self.viewport.arrive(&self.player);
+                self.viewport.revisit(&self.player);
             }
             Action::Reset => self.reset(),
             Action::Slower | Action::Faster => {

@@ -1,5 +1,6 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
+pub mod blows;
 pub mod contact_history;
 mod keyframes;
 #[cfg(test)]
@@ -20,6 +21,7 @@ use crate::simulate::{
     ChangeError, Channels, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
     StartError, Stopped, Wear,
 };
+use blows::Blows;
 use contact_history::ContactHistory;
 use keyframes::Keyframes;
 use travel::ContactSearch;
@@ -63,6 +65,7 @@ pub struct Player {
     /// Record, in full detail, of the past stretch that was last retraced.
     near: Option<Box<History>>,
     contact_history: ContactHistory,
+    blows: Blows,
     recorded: Frame,
     /// Time up to which the latest steps were recorded, s.
     recorded_to: f64,
@@ -137,6 +140,7 @@ impl Player {
             history: record_of(scene, &channels),
             near: None,
             contact_history: ContactHistory::default(),
+            blows: Blows::default(),
             channels,
             picks: Vec::new(),
             recorded: Frame::default(),
@@ -188,6 +192,11 @@ impl Player {
     /// Largest forces since the previous frame, per ball joint.
     pub fn peaks(&self) -> &[Peak] {
         &self.peaks
+    }
+
+    /// The hardest force of every contact of the run.
+    pub fn blows(&self) -> &Blows {
+        &self.blows
     }
 
     /// Which channels are recorded.
@@ -775,6 +784,7 @@ impl Player {
                 continue;
             }
             self.coming[joint] = Peak::default();
+            self.blows.record(joint, &peak, self.simulation.time());
             if peak.normal > 0.0
                 && let Some(channel) = self.channels.normal_force(joint)
             {

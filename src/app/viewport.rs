@@ -145,6 +145,21 @@ impl Viewport {
         self.trail.clear();
     }
 
+    /// Ball joint, force in N and age in s of every mark.
+    pub fn peak_marks(&self, player: &Player) -> Vec<(usize, f32, f64)> {
+        let marks = self.marks.marks(player.frame());
+        marks.map(|mark| (mark.joint, mark.force.length(), mark.age)).collect()
+    }
+
+    /// As [`Self::arrive`] where the run was before: the blows shortly before that instant are shown as when it was reached by playing.
+    pub fn revisit(&mut self, player: &Player) {
+        self.arrive(player);
+        let fade = SEEN * player.pacer.scale();
+        let blows = player.blows().between(self.time - fade, self.time);
+        let blows = blows.map(|blow| (blow.joint, crate::view::to_f32(&blow.force), blow.time));
+        self.marks.recall(player.frame(), blows, fade);
+    }
+
     /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
     pub fn show_scene(&mut self, player: &Player) {
         *self = Self { pace: self.pace.take().map(|_| Pace::default()), ..Self::new(player, self.options.clone()) };

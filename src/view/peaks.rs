@@ -78,6 +78,21 @@ impl PeakMarks {
         *self = Self { now: time, seen: time, ..Self::default() };
     }
 
+    /// Takes blows before the displayed instant `frame`, each with its joint, force and time, as if they had been seen: after
+    /// [`Self::clear`], when a past instant is shown again.
+    pub fn recall(&mut self, frame: &Frame, blows: impl Iterator<Item = (usize, Vec3, f64)>, fade: f64) {
+        self.fade = fade.max(f64::MIN_POSITIVE);
+        self.joints.resize(frame.joints.len(), Joint::default());
+        for (joint, force, time) in blows.filter(|(_, force, _)| force.is_finite()) {
+            let size = force.length();
+            self.largest = self.largest.max(size);
+            let flash = (size / self.largest.max(f32::MIN_POSITIVE)).sqrt().clamp(FAINTEST, 1.0);
+            if let Some(joint) = self.joints.get_mut(joint) {
+                joint.take(Blow { force, time, flash }, self.fade);
+            }
+        }
+    }
+
     /// Takes the displayed instant and the peaks since the previous one, `peaks` (one per ball joint, or empty). A blow is
     /// forgotten `fade` seconds of simulated time after its peak. If time has run back, everything is forgotten.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {

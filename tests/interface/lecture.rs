@@ -747,3 +747,24 @@ fn a_finger_that_stays_on_a_body_pulls_on_it() {
         assert_eq!(self::camera(&harness), camera, "{size:?}: the view stays");
     }
 }
+
+#[test]
+fn going_back_to_just_after_an_impact_shows_its_peak_again() {
+    let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    let marks = |harness: &Harness<'_, App>| harness.state().peak_marks();
+    run_to(&mut harness, 40e-3);
+    harness.run();
+    // The peak of the first impacts, 60 to 80 us after the touch.
+    harness.state_mut().player_mut().pacer.set_scale(1e-3);
+    harness.state_mut().look_back(8.2e-3);
+    harness.run_steps(3);
+    let there = marks(&harness);
+    assert_eq!(there.len(), 3, "{there:?}");
+    assert!(there.iter().all(|(_, force, age)| *force > 100.0 && (0.1e-3..0.5e-3).contains(age)), "{there:?}");
+    // A step back keeps them; before the impact there are none.
+    key(&mut harness, Key::ArrowLeft);
+    assert_eq!(marks(&harness).len(), 3);
+    harness.state_mut().look_back(7.5e-3);
+    harness.run_steps(3);
+    assert!(marks(&harness).is_empty());
+}

@@ -357,6 +357,7 @@ impl Player {
             self.history.rewind(mark);
         }
         self.contact_history.cut(start);
+        self.blows.cut(start);
         self.watch.cut(start);
         self.keyframes.cut(start_steps);
         self.near = None;
@@ -402,6 +403,7 @@ impl Player {
         self.left = None;
         self.sought = None;
         self.contact_history.begin(0.0);
+        self.blows.clear();
         self.event_times.clear();
         (self.applied, self.most_steps) = (0, 0);
         (self.reached, self.recorded_to) = (0.0, 0.0);
