@@ -16,6 +16,8 @@ const CAPTION: f32 = 24.0;
 const PAD: Vec2 = vec2(12.0, 4.0);
 /// Width that the time takes in the corner of the picture, points.
 const TIME: f32 = 170.0;
+/// Least height of the plots of a lesson, points.
+const LEAST_PLOTS: f32 = 130.0;
 /// How much thicker arrows are.
 const THICKNESS: f32 = 2.0;
 /// Change of the screen's height that the type follows, as a share of it.
@@ -109,11 +111,29 @@ impl App {
             })
             .inner;
         self.lesson_beside(ui, bar);
+        self.lesson_plots(ui, bar);
         self.central(ui, asked);
         self.caption(ui);
         if leave {
             self.present(ui.ctx(), false);
         }
+    }
+
+    /// The plots of a lesson that speaks of them.
+    fn lesson_plots(&mut self, ui: &mut Ui, bar: egui::Frame) {
+        if self.course().is_none() || !self.show_plots {
+            return;
+        }
+        let free = !self.is_under_way();
+        let height = (0.36 * ui.available_height()).max(LEAST_PLOTS);
+        let Self { player, plots, viewport, .. } = self;
+        Panel::bottom("plots of the lesson").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
+            ui.take_available_space();
+            if let Some(time) = plots.ui(ui, player).filter(|_| free) {
+                player.go_to(time);
+                viewport.revisit(player);
+            }
+        });
     }
 
     /// The last finished impact: ball joint, largest normal force, how long it lasted.
