@@ -168,11 +168,11 @@ impl App {
 
     /// Says with which changes the window began; one click takes them back.
     fn changes_strip(&mut self, ui: &mut Ui) {
-        let words = "Driven at 6 Hz, twelve times as fast as in the paper, so that the joints rattle at every turn.";
+        let words = "Driven at 6 Hz; in the paper at 0.5 Hz.";
         let row = plate(ui, ui.visuals().weak_text_color()).show(ui, |ui| {
             ui.horizontal_wrapped(|ui| {
                 ui.label(words);
-                let help = "The scene as its file gives it: 0.5 Hz; the joints rattle for 70 ms and come to rest";
+                let help = "The scene as its file gives it. Its joints rattle for 70 ms and come to rest; at 6 Hz they rattle at every turn";
                 let paper = ui.button("The paper's settings").on_hover_text(help).clicked();
                 (paper, ui.button("Dismiss").clicked())
             })

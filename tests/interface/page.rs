@@ -1054,7 +1054,7 @@ fn a_visitor_meets_a_machine_that_goes_on_and_is_one_click_from_the_papers() {
         assert!(options.scene.changes.len() <= 1 && options.time_scale == 0.02, "{link}");
     }
     let (mut harness, _) = open(AppOptions::from_link("").expect("a link"), LARGE);
-    assert!(label(&harness, "twelve times as fast as in the paper"));
+    assert!(label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
     // The change is one like any other: shown as such, and taken back.
     assert_eq!(harness.state().player().wanted().changes[0].0, "spcmm.frequency");
     harness.run_steps(120);
@@ -1065,12 +1065,12 @@ fn a_visitor_meets_a_machine_that_goes_on_and_is_one_click_from_the_papers() {
     let player = harness.state().player();
     assert!(player.wanted().changes.is_empty() && player.is_playing());
     assert_eq!(player.pacer.scale(), 0.02);
-    assert!(!label(&harness, "twelve times as fast as in the paper"));
+    assert!(!label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
     // Dismissed, it is silent.
     let (mut harness, _) = open(AppOptions::first(), LARGE);
     harness.get_by_label("Dismiss").click();
     harness.run_steps(3);
-    assert!(!label(&harness, "twelve times as fast as in the paper"));
+    assert!(!label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
     assert!(harness.query_by_label("The paper's settings").is_none());
 }
 
