@@ -280,7 +280,7 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
         }
     }
     harness.run_steps(2);
-    assert!(says(&harness, "It is: S1"));
+    assert!(says(&harness, "It is: At nearly the same time"));
     tap(&mut harness, Role::Button, "Back");
     assert_eq!(step(&harness), 0);
     // The sheet folds away, and comes back.
