@@ -12,7 +12,8 @@ use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 impl App {
     pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
         ui.horizontal(|ui| {
-            if !compact {
+            // In a narrow window its buttons need the room.
+            if !compact && ui.available_width() > NAMED {
                 ui.label(RichText::new("Jointplay").heading().strong());
                 ui.add_space(8.0);
             }
@@ -32,10 +33,19 @@ impl App {
             self.link_button(ui);
             layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
                 .on_hover_text("Ten lessons on play in joints, step by step");
-            let bench = egui::Button::selectable(self.show_bench, "Bench");
-            let help = "Chaos bench shown or hidden (key B): phase portrait, Poincaré section, sweeps, twin run";
-            if ui.add(bench).on_hover_text(help).clicked() {
-                self.show_bench = !self.show_bench;
+            let panels = [
+                (&mut self.show_controls, "Controls", "Parameters shown or hidden (key C)"),
+                (&mut self.show_plots, "Plots", "Plots shown or hidden (key P)"),
+                (
+                    &mut self.show_bench,
+                    "Bench",
+                    "Chaos bench shown or hidden (key B): phase portrait, Poincaré section, sweeps, twin run",
+                ),
+            ];
+            for (on, name, help) in panels {
+                if ui.add(egui::Button::selectable(*on, name)).on_hover_text(help).clicked() {
+                    *on = !*on;
+                }
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button("?").on_hover_text("Keys (?)").accessible_name("Keys").clicked() {

@@ -196,6 +196,7 @@ impl App {
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
         self.lesson_beside(ui, bar);
         let free = !self.is_under_way();
+        let teaching = self.course().is_some();
         let Self {
             player,
             controls,
@@ -229,7 +230,8 @@ impl App {
             .size_range(300.0..=640.0)
             .show_collapsible(ui, show_bench, |ui| {
                 ScrollArea::vertical()
-                    .id_salt("bench")
+                    // A lesson scrolls its own.
+                    .id_salt(("bench", teaching))
                     .auto_shrink(false)
                     .show(ui, |ui| {
                         ui.set_max_width(ui.available_width() - 10.0);

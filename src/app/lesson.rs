@@ -1,5 +1,6 @@
 //! Lessons: steps with a text and a state of the machine, questions that the run answers, and what was to be seen.
 
+mod before;
 mod built_in;
 mod format;
 mod measure;
@@ -19,6 +20,7 @@ use super::log::Event;
 use super::player::Player;
 use super::replay::Verdict;
 use super::{App, replay_budget};
+pub(super) use before::WindowBefore;
 pub use built_in::{BUILT_IN_LESSONS, lesson_titles};
 pub use format::Lesson;
 use format::{Look, PanelName, Step};
@@ -230,6 +232,7 @@ impl App {
 
     /// Goes on with `lesson` at step `step`, counted from 0; if it `begins` there, the machine is set for it.
     pub(super) fn join_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
+        self.remember_window();
         self.course = Some(Box::new(Course::new(lesson, step)));
         self.sheet = Some(Sheet::Lesson);
         if begins {
@@ -245,9 +248,11 @@ impl App {
         }
     }
 
-    /// Ends the lesson; the machine stays as it is.
+    /// Ends the lesson; the window is as it was before.
     pub(super) fn leave_lesson(&mut self) {
-        self.course = None;
+        if let Some(course) = self.course.take() {
+            self.give_back_window(&course.lesson);
+        }
         if self.sheet == Some(Sheet::Lesson) {
             self.sheet = None;
         }

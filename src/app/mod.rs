@@ -286,6 +286,8 @@ pub struct App {
     sound: Sound,
     /// The lesson under way.
     course: Option<Box<Course>>,
+    /// The window as it was before that.
+    before_lesson: Option<Box<lesson::WindowBefore>>,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
     /// The graphics adapter and its interface; "" without a window.
@@ -348,6 +350,7 @@ impl App {
             embedded: options.embedded,
             sound: Sound::default(),
             course: None,
+            before_lesson: None,
             picture_rect: egui::Rect::ZERO,
             renderer: String::new(),
             graphics: None,
@@ -602,6 +605,9 @@ impl App {
     /// As [`AppOptions::from_link`].
     pub fn open_link(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
         let opened = AppOptions::from_link(text).and_then(|options| {
+            if options.lesson.is_some() {
+                self.remember_window();
+            }
             self.show_scene(&options.scene)?;
             let begins = options.link.is_none();
             self.player.pacer.set_scale(options.time_scale);
@@ -683,8 +689,9 @@ impl App {
         player.pacer.set_scale(scale);
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         player.set_ideal(self.player.ideal().is_some());
-        self.player = player;
-        self.scene_file = SceneFile::default();
+        let before = std::mem::replace(&mut self.player, player);
+        let file = std::mem::take(&mut self.scene_file);
+        self.remember_run(before, file);
         self.viewport.show_scene(&self.player);
         self.timeline.reset();
         self.plots.reset();

@@ -62,6 +62,14 @@ pub struct Plots {
     zoomed: Option<(f64, f64)>,
 }
 
+/// What of the plots is chosen: quantities, channels, time window, hidden lines.
+pub struct PlotChoice {
+    chosen: Vec<Quantity>,
+    picked: Vec<String>,
+    window: Window,
+    hidden: Vec<usize>,
+}
+
 /// A name by which channels may be picked.
 struct Entry {
     name: String,
@@ -317,6 +325,18 @@ impl Plots {
                 self.picked.push(name);
             }
         }
+    }
+
+    /// What is chosen.
+    pub fn choice(&self) -> PlotChoice {
+        let Self { chosen, picked, window, hidden, .. } = self;
+        PlotChoice { chosen: chosen.clone(), picked: picked.clone(), window: *window, hidden: hidden.clone() }
+    }
+
+    /// Chooses what was chosen before.
+    pub fn choose(&mut self, choice: PlotChoice) {
+        PlotChoice { chosen: self.chosen, picked: self.picked, window: self.window, hidden: self.hidden } = choice;
+        self.reset();
     }
 
     /// Back to the chosen window.

@@ -291,6 +291,56 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
     assert!(harness.state().course().is_none());
 }
 
+#[test]
+fn the_window_comes_back_as_it_was_when_a_lesson_ends() {
+    for (name, _) in BUILT_IN_LESSONS {
+        let mut harness = sized("pendulum", WIDE, eframe::egui::Theme::Light);
+        // Without plots, with the bench, in the middle of a run that was changed.
+        press(&mut harness, Key::P);
+        press(&mut harness, Key::B);
+        press(&mut harness, Key::Num5);
+        let player = harness.state_mut().player_mut();
+        player.set("contact.clearance", "0.5 mm").expect("in range");
+        player.run_to(12e-3);
+        harness.run();
+        let panels = |harness: &Harness<'_, App>| {
+            ["Accuracy", "Normal force, N", "Chaos bench"].map(|panel| harness.query_by_label(panel).is_some())
+        };
+        assert_eq!(panels(&harness), [true, false, true]);
+        let before = harness.state().share_state();
+        let title = &Lesson::built_in(name).expect("a lesson").title;
+        harness.get_by_label("Lessons").click();
+        harness.run_steps(3);
+        harness.get_by_role_and_label(Role::Button, title).click();
+        settle(&mut harness);
+        let steps = harness.state().course().expect("a lesson").lesson().steps.len();
+        for _ in 1..steps {
+            press(&mut harness, Key::PageDown);
+        }
+        assert_ne!(harness.state().share_state(), before, "{name}");
+        harness.get_by_label("Leave the lesson").click();
+        harness.run_steps(60);
+        assert_eq!(harness.state().share_state(), before, "{name}");
+        assert_eq!(panels(&harness), [true, false, true], "{name}");
+    }
+}
+
+#[test]
+fn a_scene_that_was_opened_during_a_lesson_stays_when_that_ends() {
+    let mut harness = sized("pendulum", WIDE, eframe::egui::Theme::Light);
+    harness.get_by_label("Lessons").click();
+    harness.run_steps(3);
+    let title = &Lesson::built_in("first-impact").expect("a lesson").title;
+    harness.get_by_role_and_label(Role::Button, title).click();
+    settle(&mut harness);
+    harness.state_mut().open("delta").expect("built in");
+    harness.run_steps(2);
+    harness.get_by_label("Leave the lesson").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().player().scene().name, "delta");
+    harness.get_by_label("Accuracy");
+}
+
 /// Presses F5, and gives the window the points that are left at its new zoom.
 fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
     harness.key_press(Key::F5);

@@ -225,6 +225,54 @@ fn the_question_mark_lists_the_keys_and_escape_closes() {
 }
 
 #[test]
+fn the_whole_list_of_keys_is_in_sight() {
+    for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
+        let mut harness = sized("pendulum", size, egui::Theme::Light);
+        harness.key_press(Key::Questionmark);
+        harness.run();
+        let dialog = egui::Rect::from_min_size(egui::Pos2::ZERO, size.into());
+        let end = harness.get_by_role_and_label(Role::Button, "Close").rect().top();
+        for words in ["Play or pause", "Faster", "Force arrows on or off", "This list", "Open a link", "Move that slider"] {
+            let row = harness.get_by_label(words).rect();
+            assert!(dialog.contains_rect(row) && row.bottom() <= end, "{size:?}: {words} at {row}");
+        }
+    }
+}
+
+#[test]
+fn switches_in_the_header_show_and_hide_the_panels() {
+    for size in [[780.0, 700.0], [1280.0, 800.0]] {
+        let mut harness = sized("pendulum", size, egui::Theme::Light);
+        for (switch, inside) in [("Controls", "Accuracy"), ("Plots", "Normal force, N"), ("Bench", "Chaos bench")] {
+            let shown = |harness: &Harness<'_, App>| harness.query_by_label(inside).is_some();
+            let before = shown(&harness);
+            for on in [!before, before] {
+                let place = harness.get_by_role_and_label(Role::Button, switch).rect();
+                assert!(place.right() < size[0], "{switch} at {place}");
+                click(&mut harness, switch);
+                harness.run();
+                assert_eq!(shown(&harness), on, "{switch}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_list_of_scenes_says_what_each_is() {
+    let mut harness = window("pendulum");
+    harness.get_by_role_and_label(Role::ComboBox, "Scene").click();
+    harness.run();
+    for name in BUILT_IN {
+        let title = Scene::load(name, &[]).expect("built in").title;
+        let entry = harness.get_by_role_and_label(Role::Button, name);
+        assert_eq!(entry.accesskit_node().description().as_deref(), Some(&*title));
+    }
+    harness.get_by_role_and_label(Role::Button, "chain").click();
+    harness.run();
+    assert_eq!(harness.state().player().scene().name, "chain");
+}
+
+#[test]
 fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
     let mut harness = window("spcmm");
     harness.get_by_role_and_label(Role::ComboBox, "Scene").click();

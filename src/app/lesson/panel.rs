@@ -86,7 +86,7 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
         }
         ui.label(format!("Step {} of {}", course.step + 1, last + 1));
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
-            let help = "Ends the lesson; the machine stays as it is";
+            let help = "Ends the lesson; the window is as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
                 asked = Asked::Leave;

@@ -1,0 +1,96 @@
+//! The window as it was before a lesson: it comes back when the lesson ends.
+
+use super::Lesson;
+use crate::app::bench::Bench;
+use crate::app::layout::Sheet;
+use crate::app::player::Player;
+use crate::app::plots::PlotChoice;
+use crate::app::reload::SceneFile;
+use crate::app::{App, CameraPose};
+use crate::view::{Picked, ViewOptions};
+
+/// Everything that a lesson changes.
+pub struct WindowBefore {
+    /// Whether controls, plots and bench were shown.
+    panels: [bool; 3],
+    sheet: Option<Sheet>,
+    plots: PlotChoice,
+    bench: Bench,
+    options: ViewOptions,
+    pose: Option<CameraPose>,
+    followed: Option<Picked>,
+    /// Whether the microscope was open, and its ball joint.
+    microscope: (bool, usize),
+    ideal: bool,
+    scale: f64,
+    /// The run and its file, once a scene of the lesson has replaced them.
+    run: Option<(Player, SceneFile)>,
+}
+
+impl App {
+    /// Remembers the window, unless a lesson under way has done so.
+    pub(in crate::app) fn remember_window(&mut self) {
+        if self.before_lesson.is_some() {
+            return;
+        }
+        self.before_lesson = Some(Box::new(WindowBefore {
+            panels: [self.show_controls, self.show_plots, self.show_bench],
+            sheet: self.sheet,
+            plots: self.plots.choice(),
+            // A lesson begins with an empty one.
+            bench: std::mem::take(&mut self.bench),
+            options: self.viewport.options.clone(),
+            pose: self.viewport.pose(),
+            followed: self.viewport.followed(),
+            microscope: (self.microscope.is_open(), self.microscope.joint()),
+            ideal: self.player.ideal().is_some(),
+            scale: self.player.pacer.scale(),
+            run: None,
+        }));
+    }
+
+    /// Takes the run that a scene of the lesson has just replaced: the first one is that of the window before.
+    pub(in crate::app) fn remember_run(&mut self, player: Player, file: SceneFile) {
+        if let Some(before) = &mut self.before_lesson
+            && before.run.is_none()
+        {
+            before.run = Some((player, file));
+        }
+    }
+
+    /// Gives back the window before `lesson`. A machine that was opened meanwhile, and is none of the lesson's, stays.
+    pub(super) fn give_back_window(&mut self, lesson: &Lesson) {
+        let Some(before) = self.before_lesson.take() else {
+            return;
+        };
+        self.cancel_film();
+        [self.show_controls, self.show_plots, self.show_bench] = before.panels;
+        self.sheet = before.sheet;
+        self.plots.choose(before.plots);
+        self.bench = before.bench;
+        self.microscope.set_open(before.microscope.0);
+        let text = &self.player.wanted().source.text;
+        if !lesson.runs.iter().any(|run| run.scene.source.text == *text) {
+            return;
+        }
+        (self.replay, self.load, self.verdict, self.problem, self.film_wanted) = (None, None, None, None, None);
+        let thickness = self.viewport.options.arrows.thickness;
+        self.viewport.options = before.options;
+        // A presentation may go on.
+        self.viewport.options.arrows.thickness = thickness;
+        if let Some((player, file)) = before.run {
+            (self.player, self.scene_file) = (player, file);
+            self.controls.clear();
+            self.timeline.reset();
+            self.viewport.show_scene(&self.player);
+        } else {
+            self.player.pacer.set_scale(before.scale);
+            self.show_ideal(before.ideal);
+        }
+        if let Some(pose) = before.pose {
+            self.viewport.set_pose(pose);
+        }
+        self.viewport.follow(before.followed);
+        self.microscope.focus(before.microscope.1);
+    }
+}
