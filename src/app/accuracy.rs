@@ -292,7 +292,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let ratio = |impact: &Impact| {
         let [given, asked] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
         // Only an undisturbed impact can be compared with what was asked for.
-        if impact.disturbed || impact.floored { given } else { format!("{given}, asked {asked}") }
+        if impact.has_own_restitution() { format!("{given}, asked {asked}") } else { given }
     };
     let law = impact.map_or_else(String::new, |impact| {
         format!(" An undisturbed impact under its normal-force law gives {}.", value::number(impact.law, 3))
@@ -304,8 +304,8 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             false,
             "Ball joint of the latest impact that is over. Disturbed: another joint was in contact meanwhile, or the parameters of the \
              contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
-             floor, so it rebounds higher than asked. Undisturbed: none of these; weight and drives act in every impact, and \
-             take much from a soft one."
+             floor, so it rebounds higher than asked. Soft: weight and drives did more than a hundredth of its energy as work \
+             while it lasted. Undisturbed: none of these."
                 .to_owned(),
         ),
         row(
@@ -320,13 +320,11 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         row(
             "Restitution in it",
             impact.map(ratio),
-            // It yields the restitution of its law, unless the steps were too long or weight outlasts it.
-            impact.is_some_and(|impact| {
-                !impact.disturbed && !impact.floored && (impact.achieved() - impact.law).abs() > 0.02
-            }),
+            // It yields the restitution of its law, unless the steps were too long.
+            impact.is_some_and(|impact| impact.has_own_restitution() && (impact.achieved() - impact.law).abs() > 0.02),
             format!(
-                "Separation speed over approach speed of the latest impact, and what was asked for if nothing disturbed it.{law} Amber: it is \
-                 further than 0.02 from that, by too few steps, or by weight and drives where the impact is soft."
+                "Separation speed over approach speed of the latest impact, and what was asked for if it was undisturbed.{law} \
+                 Amber: it is further than 0.02 from that, by too few steps or by friction."
             ),
         ),
     ]
@@ -334,10 +332,11 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
 
 /// Kind of an impact: only an undisturbed one has the restitution of its law.
 fn kind(impact: &Impact) -> &'static str {
-    match (impact.disturbed, impact.floored) {
-        (true, _) => "disturbed",
-        (false, true) => "slow",
-        (false, false) => "undisturbed",
+    match (impact.disturbed, impact.floored, impact.is_soft()) {
+        (true, ..) => "disturbed",
+        (_, true, _) => "slow",
+        (_, _, true) => "soft",
+        _ => "undisturbed",
     }
 }
 

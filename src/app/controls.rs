@@ -112,7 +112,7 @@ impl Controls {
     /// The preset, and the accuracy of the running scene.
     fn accuracy_ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy, table: &[&'static Parameter]) {
         let header =
-            egui::CollapsingHeader::new(RichText::new("Accuracy").strong()).default_open(true).show(ui, |ui| {
+            egui::CollapsingHeader::new(RichText::new("Accuracy").strong()).show(ui, |ui| {
                 if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
                     self.control(ui, player, parameter, PRESET);
                 }

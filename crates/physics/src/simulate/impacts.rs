@@ -55,9 +55,18 @@ impl Impact {
     /// By how much its restitution exceeds that of its law, which friction and what it drives only lower; 0 where that says
     /// nothing: it was disturbed, slow, or so soft that what pushes besides the contact changes it.
     pub fn astray(&self) -> f64 {
+        if self.has_own_restitution() { (self.achieved() - self.law).max(0.0) } else { 0.0 }
+    }
+
+    /// Whether weight and drives do so much work during it that they change its restitution.
+    pub fn is_soft(&self) -> bool {
         let kinetic = self.approach_speed * self.approach_speed;
-        let soft = !(2.0 * self.push.abs() * self.deepest <= SOFT * kinetic);
-        if self.disturbed || self.floored || soft { 0.0 } else { (self.achieved() - self.law).max(0.0) }
+        !(2.0 * self.push.abs() * self.deepest <= SOFT * kinetic)
+    }
+
+    /// Whether its restitution can be compared with that of its law: it was neither disturbed nor slow nor soft.
+    pub fn has_own_restitution(&self) -> bool {
+        !(self.disturbed || self.floored || self.is_soft())
     }
 }
 
