@@ -6,7 +6,7 @@ use super::sweep_task::SweepTask;
 use crate::scene::{Scene, SceneError};
 
 /// A sweep over a built-in scene.
-#[derive(Debug)]
+#[derive(Debug, PartialEq, Eq)]
 pub struct ReadySweep {
     /// What the button says.
     pub name: &'static str,
@@ -34,8 +34,8 @@ pub struct ReadySweep {
 pub const READY: [ReadySweep; 3] = [
     ReadySweep {
         name: "Road to chaos",
-        shows: "The four-bar, its crank at 21 to 45 rad/s: every turn alike until the balls knock, from about 24; at 29 every second \
-                turn is alike; chaos from about 31.",
+        shows: "The four-bar, its crank at 21 to 45 rad/s: every turn is alike until the balls knock, at 24. From there on chaos, but \
+                for two regular windows: at 27 every turn is alike again, at 29 every second one.",
         scene: "four-bar",
         // The members of `automatic` err by different parts of the tolerance: with it the exponent of a regular motion is known
         // to a third of 1/s only.
@@ -43,7 +43,7 @@ pub const READY: [ReadySweep; 3] = [
         key: "parameter.speed",
         from: "21 rad/s",
         to: "45 rad/s",
-        values: 13,
+        values: 25,
         periods: 80,
         discard: 40,
     },

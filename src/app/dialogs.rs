@@ -7,6 +7,7 @@ use super::host::SaveFile;
 use super::keys::{BINDINGS, POINTER};
 use super::load::Load;
 use super::player::Player;
+use crate::analysis::ready::ReadySweep;
 use code::Code;
 
 mod code;
@@ -56,6 +57,13 @@ pub enum Dialog {
         /// What it would change, one phrase each.
         changes: Vec<String>,
     },
+    /// Starts a ready sweep, whose scene replaces one that was changed.
+    Ready {
+        /// The sweep.
+        sweep: &'static ReadySweep,
+        /// The changes that would be lost, one phrase each.
+        lost: Vec<String>,
+    },
 }
 
 impl Dialog {
@@ -68,6 +76,7 @@ impl Dialog {
             Self::Code { .. } => "QR code of the link",
             Self::Film { .. } => "Film",
             Self::Load { .. } => "Change what is on show?",
+            Self::Ready { .. } => "Replace the running scene?",
         }
     }
 
@@ -83,6 +92,7 @@ impl Dialog {
                 Some(("Make film", possible.then_some(Answer::Film)))
             }
             Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
+            Self::Ready { .. } => Some(("Replace and sweep", Some(Answer::Sweep))),
         }
     }
 }
@@ -100,6 +110,8 @@ pub enum Answer {
     Film,
     /// Run to the section.
     Load,
+    /// Replace the scene and start the sweep.
+    Sweep,
 }
 
 /// Shows `dialog`.
@@ -126,7 +138,13 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
                 Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
                 Dialog::Code { link, code } => code::ui(ui, link, code, most),
                 Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
-                Dialog::Load { changes, .. } => load(ui, changes),
+                Dialog::Load { changes, .. } => {
+                    list(ui, "The sweep was made from a different scene. Running to this section changes:", changes)
+                }
+                Dialog::Ready { sweep, lost } => {
+                    let words = format!("The sweep runs over the scene {}. These changes would be lost:", sweep.scene);
+                    list(ui, &words, lost)
+                }
             })
             .inner;
         ui.add_space(8.0);
@@ -214,8 +232,8 @@ fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>)
     path_field(ui, path, "name", error)
 }
 
-fn load(ui: &mut Ui, changes: &[String]) -> bool {
-    ui.label("The sweep was made from a different scene. Running to this section changes:");
+fn list(ui: &mut Ui, words: &str, changes: &[String]) -> bool {
+    ui.label(words);
     for change in changes {
         ui.label(RichText::new(change).strong());
     }

@@ -65,6 +65,7 @@ use std::sync::Arc;
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
 
+use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene, Vec3};
@@ -474,13 +475,30 @@ impl App {
     fn bench_asks(&mut self, asked: bench::Asked) {
         match asked {
             bench::Asked::Section(load) => self.start_load(load),
-            bench::Asked::Ready(sweep) => {
-                let scene = sweep.scene().map_err(|error| error.to_string());
-                self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
-                if self.problem.is_none() {
-                    self.bench.start(sweep, self.player.wanted());
+            bench::Asked::Ready(sweep) => match sweep.scene() {
+                Err(error) => self.problem = Some(error.to_string()),
+                Ok(scene) => {
+                    let lost = value::changes(self.player.wanted());
+                    // What another ready sweep has changed is no loss.
+                    let opened = READY.iter().filter_map(|ready| ready.scene().ok());
+                    let mut known = opened.chain([scene]);
+                    let same = known.any(|scene| value::differences(&scene, self.player.wanted(), &[]).is_empty());
+                    if same || lost.is_empty() {
+                        self.start_ready(sweep);
+                    } else {
+                        self.dialog = Some(Dialog::Ready { sweep, lost });
+                    }
                 }
-            }
+            },
+        }
+    }
+
+    /// Opens the scene of a ready sweep, and starts it.
+    fn start_ready(&mut self, sweep: &'static ReadySweep) {
+        let scene = sweep.scene().map_err(|error| error.to_string());
+        self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
+        if self.problem.is_none() {
+            self.bench.start(sweep, self.player.wanted());
         }
     }
 
@@ -844,6 +862,11 @@ impl App {
             Some(Answer::Film) => {
                 if let Dialog::Film { wanted } = dialog {
                     self.problem = self.make_film(wanted).err();
+                }
+            }
+            Some(Answer::Sweep) => {
+                if let Dialog::Ready { sweep, .. } = dialog {
+                    self.start_ready(sweep);
                 }
             }
             Some(Answer::Load) => {

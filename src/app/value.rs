@@ -97,6 +97,12 @@ pub fn solver(scene: &Scene) -> String {
     }
 }
 
+/// What was changed in a scene, one phrase each.
+pub fn changes(scene: &Scene) -> Vec<String> {
+    let changed = scene.changes.iter().filter_map(|(key, _)| named(scene, key));
+    changed.map(|(name, value)| format!("{name} {value}")).collect()
+}
+
 /// What would change with `there` in place of `here`, one phrase each, except for the keys `except`; empty if the motion is the
 /// same.
 pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {

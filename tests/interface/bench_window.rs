@@ -87,7 +87,7 @@ fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::The
 
 /// Large enough that all of the bench is on it.
 fn window(scene: &str, changes: &[(&str, &str)]) -> Harness<'static, App> {
-    sized(scene, changes, [1400.0, 1500.0], egui::Theme::Light)
+    sized(scene, changes, [1400.0, 1600.0], egui::Theme::Light)
 }
 
 const FAST: (&str, &str) = ("spcmm.frequency", "5 Hz");
@@ -515,6 +515,26 @@ fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it(
         let range = |vary: &[String]| vary[0].replace(' ', "");
         assert_eq!(range(&again.vary), range(&task.vary));
         click(&mut harness, Role::Button, "Cancel sweep");
+    }
+}
+
+#[test]
+fn a_ready_sweep_asks_before_a_changed_scene_is_replaced() {
+    let mut harness = window("pendulum", &[]);
+    let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
+    harness.state_mut().set_host(Box::new(Asking(asked.clone())));
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.5 mm").expect("in range");
+    harness.run_steps(2);
+    for (answer, scene, sweeps) in [("Close", "pendulum", 0), ("Replace and sweep", READY[0].scene, 1)] {
+        click(&mut harness, Role::Button, READY[0].name);
+        harness.run_steps(2);
+        harness.get_by_label("Clearance 0.5 mm");
+        assert_eq!(harness.state().player().scene().name, "pendulum");
+        click(&mut harness, Role::Button, answer);
+        harness.run_steps(2);
+        assert_eq!(harness.state().player().scene().name, scene);
+        assert_eq!(asked.borrow().len(), sweeps);
     }
 }
 

@@ -10,7 +10,7 @@ use super::swept::Swept;
 use crate::analysis::regime::Regime;
 use crate::analysis::sweep_task::SweptPoint;
 use crate::app::{theme, value};
-use crate::scene::{table, to_display};
+use crate::scene::to_display;
 use crate::simulate::Doubt;
 
 const HEIGHT: f32 = 230.0;
@@ -110,7 +110,7 @@ impl Diagram {
 
     /// The diagram of `swept`; returns the point and its kept section that were clicked.
     pub fn ui(&mut self, ui: &mut Ui, swept: &Swept, coordinate: Coordinate) -> Option<(usize, usize)> {
-        let parameter = table().iter().find(|p| p.key == swept.range.key);
+        let parameter = swept.parameter();
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let label = parameter.map_or(swept.range.key.as_str(), |parameter| parameter.label);
         let shown = |si: f64| to_display(si, unit);

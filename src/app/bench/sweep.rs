@@ -26,6 +26,9 @@ const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 /// Width of the button that starts and ends a sweep, points; fixed, so that it does not move.
 const GO: f32 = 120.0;
 
+/// No estimate is made of what a sweep does in less time, s.
+const SOON: f64 = 1.0;
+
 /// Settings of the next sweep.
 struct Settings {
     /// Scene that they were made for.
@@ -47,6 +50,9 @@ struct Sweeping {
     /// Its ranges are known.
     begun: bool,
     throttle: Throttle,
+    /// When it was first seen, s, and the latest instant.
+    since: Option<f64>,
+    now: f64,
 }
 
 /// One of them, and what fraction of the whole it has done.
@@ -123,9 +129,12 @@ impl SweepPanel {
 
     /// Takes a frame at `now`, s, so that a running sweep leaves the picture its time; `moves`: whether it moves by itself.
     pub fn seen(&mut self, now: f64, moves: bool) {
-        if let Some(sweeping) = &mut self.running
-            && let Some(rest) = sweeping.throttle.frame(now, moves)
-        {
+        let Some(sweeping) = &mut self.running else {
+            return;
+        };
+        sweeping.since.get_or_insert(now);
+        sweeping.now = now;
+        if let Some(rest) = sweeping.throttle.frame(now, moves) {
             for sharing in &mut sweeping.shares {
                 sharing.running.rest(rest);
             }
@@ -342,8 +351,13 @@ impl SweepPanel {
             let button = Button::new(name).min_size(vec2(GO, 0.0));
             let clicked = ui.add(button).on_hover_text(help).clicked();
             if running {
-                let done = self.running.as_ref().map_or(0.0, Sweeping::done);
-                let bar = ProgressBar::new(done as f32).show_percentage();
+                let running = self.running.as_ref();
+                let done = running.map_or(0.0, Sweeping::done);
+                let mut words = format!("{} %", (100.0 * done).floor());
+                if let Some(left) = running.and_then(Sweeping::time_left) {
+                    words += &format!(", {left}");
+                }
+                let bar = ProgressBar::new(done as f32).text(words);
                 ui.add(bar.desired_width(ui.available_width()))
                     .on_hover_text(
                         "Fraction of the points that are there. While the picture moves, a sweep leaves it time for 20 \
@@ -385,12 +399,18 @@ impl Sweeping {
             Some(Sharing { running, done: 0.0, finished: false })
         };
         let shares: Option<Vec<_>> = (0..of).map(share).collect();
-        Some(Self { shares: shares?, task, begun: false, throttle: Throttle::default() })
+        Some(Self { shares: shares?, task, begun: false, throttle: Throttle::default(), since: None, now: 0.0 })
     }
 
     /// Fraction of the points that are done, 0 to 1.
     fn done(&self) -> f64 {
         self.shares.iter().map(|sharing| sharing.done).sum()
+    }
+
+    /// How long the rest takes if it goes on as it has gone so far; `None` while too little is known.
+    fn time_left(&self) -> Option<String> {
+        let (spent, done) = (self.now - self.since?, self.done());
+        (spent >= SOON && done > 0.0).then(|| in_time(spent * (1.0 - done).max(0.0) / done))
     }
 }
 
@@ -442,12 +462,23 @@ impl Settings {
     }
 }
 
+/// A time to go, s, in words.
+fn in_time(left: f64) -> String {
+    match left {
+        _ if left < 10.0 => "a few seconds left".to_owned(),
+        _ if left < 90.0 => format!("about {} s left", 10.0 * (left / 10.0).round()),
+        _ if left < 5400.0 => format!("about {} min left", (left / 60.0).round()),
+        _ => format!("about {} h left", (left / 3600.0).round()),
+    }
+}
+
 /// The ready sweeps, each with what it will show; returns the one that was clicked.
 fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
     let mut chosen = None;
     for ready in &READY {
         ui.horizontal_wrapped(|ui| {
-            let help = "Opens its scene in place of the running one, and starts the sweep";
+            let help =
+                "Opens its scene in place of the running one, and starts the sweep; asks first if that loses changes";
             if ui.small_button(ready.name).on_hover_text(help).clicked() {
                 chosen = Some(ready);
             }
@@ -479,4 +510,21 @@ fn in_words(why: &str, task: &SweepTask) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
     first.unwrap_or_default() + letters.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_told_no_finer_than_it_is_known() {
+        for (left, words) in [
+            (3.0, "a few seconds left"),
+            (42.0, "about 40 s left"),
+            (130.0, "about 2 min left"),
+            (7500.0, "about 2 h left"),
+        ] {
+            assert_eq!(in_time(left), words);
+        }
+    }
 }

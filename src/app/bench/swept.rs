@@ -4,7 +4,7 @@ use crate::analysis::grid::Start;
 use crate::analysis::sweep_task::{Range, SweepTask, SweptPoint};
 use crate::app::player::Player;
 use crate::app::value;
-use crate::scene::{Kind, Scene, Value, table};
+use crate::scene::{Kind, Parameter, Scene, Value};
 
 /// A sweep that was started, and its results so far.
 pub struct Swept {
@@ -19,13 +19,18 @@ pub struct Swept {
 }
 
 impl Swept {
+    /// The varied parameter, as the swept scene has it.
+    pub(super) fn parameter(&self) -> Option<&'static Parameter> {
+        self.scene.as_ref()?.parameter(&self.range.key).ok()
+    }
+
     /// What was swept: scene, changed parameters, range, periods.
     pub(super) fn caption(&self) -> String {
         let Self { task, range, .. } = self;
         let varied = [range.key.clone()];
         let scene = self.scene.as_ref();
         let scene = scene.map_or_else(String::new, |scene| value::scene_line(scene, &varied));
-        let parameter = table().iter().find(|parameter| parameter.key == range.key);
+        let parameter = self.parameter();
         let label = parameter.map_or_else(|| range.key.clone(), |p| p.label.to_lowercase());
         let end = |si| match parameter.map(|p| (p, &p.kind)) {
             Some((_, Kind::Count { .. })) | None => value::number(si, 6),
@@ -56,5 +61,22 @@ pub(super) fn start_word(start: Start) -> &'static str {
         Start::Cold => "cold",
         Start::FollowUp => "follow upwards",
         Start::FollowDown => "follow downwards",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::ready::READY;
+
+    #[test]
+    fn the_axis_of_a_swept_parameter_of_the_file_has_its_title_and_unit() {
+        let ready = &READY[0];
+        let scene = ready.scene().expect("a built-in scene");
+        let range = Range { key: ready.key.to_owned(), from: 21.0, to: 45.0, count: ready.values };
+        let swept = Swept { task: ready.task(&scene), range, points: Vec::new(), scene: Some(scene) };
+        let parameter = swept.parameter().expect("a parameter of the file");
+        assert_eq!((parameter.label, parameter.display_unit()), ("Crank speed", "rad/s"));
+        assert!(swept.caption().contains("crank speed 21 rad/s to 45 rad/s, 25 values"), "{}", swept.caption());
     }
 }
