@@ -1,10 +1,10 @@
 //! The list of keys, the about box, the field that opens a file, the QR code.
 
-use eframe::egui::{self, Grid, Id, Modal, RichText, ScrollArea, TextEdit, Ui};
+use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
 use super::film::{self, Wanted};
 use super::host::SaveFile;
-use super::keys::{BINDINGS, POINTER};
+use super::keys::Group;
 use super::load::Load;
 use super::player::Player;
 use crate::analysis::ready::ReadySweep;
@@ -12,8 +12,11 @@ use code::Code;
 
 mod code;
 
-/// Below this width, points, keys and their descriptions are stacked.
-const NARROW: f32 = 480.0;
+/// Least width of a column of the list of keys, and that of the keys in it, points.
+const COLUMN: f32 = 340.0;
+const KEYS: f32 = 126.0;
+/// Below this width of a column, points, keys and their descriptions are stacked.
+const NARROW: f32 = 300.0;
 
 /// Which dialog is open.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,6 +124,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
     let most = (ctx.content_rect().height() - 140.0).max(80.0);
     let width = match dialog {
         Dialog::Code { code: Ok(_), .. } => most.max(200.0),
+        Dialog::Help => 1120.0,
         _ => 520.0,
     };
     let widest = (ctx.content_rect().width() - 48.0).min(width);
@@ -166,25 +170,45 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
     answer
 }
 
+/// The list of keys: groups in as many columns as there is room for.
 fn help(ui: &mut Ui) -> bool {
     ui.spacing_mut().interact_size.y = 18.0;
-    let rows = BINDINGS.iter().filter(|b| !b.written.is_empty()).map(|b| (b.written, b.help)).chain(POINTER);
-    if ui.available_width() < NARROW {
-        // Stacked, since otherwise the longer half of each line would be cut off.
-        for (key, help) in rows {
-            ui.label(RichText::new(key).strong());
-            ui.indent(key, |ui| ui.label(help));
-        }
-        return false;
-    }
-    Grid::new("keys").num_columns(2).spacing([18.0, 5.0]).striped(true).show(ui, |ui| {
-        for (key, help) in rows {
-            ui.label(RichText::new(key).strong());
-            ui.label(help);
-            ui.end_row();
+    ui.spacing_mut().item_spacing.y = 4.0;
+    let columns: &[&[Group]] = match ui.available_width() {
+        width if width >= 3.0 * COLUMN => &[&[Group::Run, Group::Window], &[Group::Picture], &[Group::Pointer]],
+        width if width >= 2.0 * COLUMN => &[&[Group::Run, Group::Picture], &[Group::Window, Group::Pointer]],
+        _ => &[&[Group::Run, Group::Picture, Group::Window, Group::Pointer]],
+    };
+    ui.columns(columns.len(), |uis| {
+        for (ui, groups) in uis.iter_mut().zip(columns) {
+            for group in *groups {
+                ui.label(RichText::new(group.title()).small().weak());
+                for (key, help) in group.rows() {
+                    key_row(ui, key, help);
+                }
+                ui.add_space(8.0);
+            }
         }
     });
     false
+}
+
+fn key_row(ui: &mut Ui, key: &str, help: &str) {
+    let key = Label::new(RichText::new(key).strong()).wrap();
+    let help = Label::new(help).wrap();
+    if ui.available_width() < NARROW {
+        // Stacked, since otherwise the longer half of each line would be cut off.
+        ui.add(key);
+        ui.indent("help", |ui| ui.add(help));
+        return;
+    }
+    ui.horizontal_top(|ui| {
+        ui.allocate_ui(egui::vec2(KEYS, 0.0), |ui| {
+            ui.set_width(KEYS);
+            ui.add(key);
+        });
+        ui.add(help);
+    });
 }
 
 fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {

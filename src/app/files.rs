@@ -323,6 +323,11 @@ fn own_name(name: &str) -> &str {
     Path::new(name).file_name().and_then(|own| own.to_str()).unwrap_or(name)
 }
 
+/// Whether a verdict needs no answer: it is shown for some seconds, not until it is dismissed.
+pub fn is_right(verdict: &Verdict) -> bool {
+    matches!(verdict, Verdict::Agrees(_) | Verdict::Reached)
+}
+
 /// A verdict in a sentence.
 pub fn verdict_words(verdict: &Verdict) -> String {
     match verdict {

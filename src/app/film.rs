@@ -59,6 +59,9 @@ impl Wanted {
 
     /// Why it cannot be made, in words.
     pub fn objection(&self) -> Option<String> {
+        if self.span[0] == self.span[1] {
+            return Some("Nothing lies between its ends: play the run first, or choose other ends".to_owned());
+        }
         if self.span[0] > self.span[1] {
             return Some("It ends before it begins".to_owned());
         }
@@ -148,7 +151,8 @@ pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
         Some(objection) => RichText::new(objection).color(ui.visuals().error_fg_color),
         None => {
             let length = frames / wanted.rate;
-            RichText::new(format!("{frames} frames, {length:.1} s of film")).weak()
+            let plural = if frames == 1.0 { "" } else { "s" };
+            RichText::new(format!("{frames} frame{plural}, {length:.1} s of film")).weak()
         }
     };
     ui.label(told);

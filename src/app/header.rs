@@ -6,8 +6,54 @@ use super::App;
 use super::dialogs::Dialog;
 use super::files::verdict_words;
 use super::replay::Verdict;
+<<<<<<< HEAD
 use super::{layout, opening};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
+=======
+use crate::scene::{BUILT_IN, Scene};
+
+/// Width of the window from which the header has room for the program's name, points.
+const NAMED: f32 = 900.0;
+
+/// Width of the list of scenes, points.
+const SCENES: f32 = 400.0;
+
+/// What the list says of a built-in scene.
+struct AboutScene {
+    name: &'static str,
+    title: String,
+    /// The first sentence of its description.
+    sentence: String,
+}
+
+static ABOUT_SCENES: LazyLock<Vec<AboutScene>> = LazyLock::new(|| {
+    let about = |name| {
+        let scene = Scene::load(name, &[]).ok()?;
+        let description = scene.description.trim();
+        let end = description.find(". ").map_or(description.len(), |end| end + 1);
+        Some(AboutScene { name, sentence: description[..end].to_owned(), title: scene.title })
+    };
+    BUILT_IN.into_iter().filter_map(about).collect()
+});
+
+impl AboutScene {
+    /// Its entry in the list: title, and the sentence below it.
+    fn entry(&self, ui: &mut Ui, chosen: bool, width: f32) -> egui::Response {
+        let mut words = LayoutJob::default();
+        words.wrap.max_width = width - 12.0;
+        let format = |style: TextStyle, colour| TextFormat::simple(style.resolve(ui.style()), colour);
+        words.append(&self.title, 0.0, format(TextStyle::Body, ui.visuals().strong_text_color()));
+        words.append("\n", 0.0, format(TextStyle::Small, ui.visuals().text_color()));
+        words.append(&self.sentence, 0.0, format(TextStyle::Small, ui.visuals().text_color()));
+        let entry = egui::Button::selectable(chosen, words).min_size(egui::vec2(width, 0.0));
+        let response = ui.add(entry).on_hover_text(self.name);
+        let id = response.id;
+        let response = response.accessible_name(self.name);
+        ui.ctx().accesskit_node_builder(id, |node| node.set_description(&*self.title));
+        response
+    }
+}
+>>>>>>> 2ab602e (No film of an empty range, few digits at late times, keys in columns, and a right hash leaves by itself)
 
 impl App {
     pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
@@ -167,6 +213,7 @@ impl App {
 
     /// Whether [`Self::strips`] has anything to say.
     pub(super) fn has_messages(&self) -> bool {
+<<<<<<< HEAD
         self.problem.is_some() || self.verdict.is_some() || self.is_under_way() || self.tells_changes()
     }
 
@@ -200,6 +247,14 @@ impl App {
                 })
                 .err();
         }
+=======
+        self.problem.is_some() || self.shows_verdict() || self.is_under_way()
+    }
+
+    /// Whether the verdict on a link is on show.
+    fn shows_verdict(&self) -> bool {
+        self.verdict.is_some() && self.verdict_shown != Some(f64::NEG_INFINITY)
+>>>>>>> 2ab602e (No film of an empty range, few digits at late times, keys in columns, and a right hash leaves by itself)
     }
 
     /// Errors, the progress of a replay, and the verdict on a link.
@@ -229,7 +284,7 @@ impl App {
                 self.cancel_replay();
             }
         }
-        if let Some(verdict) = &self.verdict {
+        if let Some(verdict) = self.verdict.as_ref().filter(|_| self.shows_verdict()) {
             let colour = match verdict {
                 Verdict::Agrees(_) => ui.visuals().selection.stroke.color,
                 Verdict::Reached => ui.visuals().weak_text_color(),

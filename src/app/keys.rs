@@ -133,6 +133,69 @@ pub const POINTER: [(&str, &str); 12] = [
     ("Arrows after a drag on a slider", "Move that slider"),
 ];
 
+/// Under which heading the overlay lists something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// Time and steps.
+    Run,
+    /// What is drawn, and from where.
+    Picture,
+    /// Panels and dialogs.
+    Window,
+    /// Mouse and touch.
+    Pointer,
+}
+
+impl Group {
+    /// Its heading.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Run => "Run",
+            Self::Picture => "Picture",
+            Self::Window => "Window",
+            Self::Pointer => "Mouse and touch",
+        }
+    }
+
+    fn of(action: Action) -> Self {
+        match action {
+            Action::PlayPause
+            | Action::Step
+            | Action::StepBack
+            | Action::Backwards
+            | Action::Impact { .. }
+            | Action::Home
+            | Action::End
+            | Action::Reset
+            | Action::Slower
+            | Action::Faster => Self::Run,
+            Action::Fit
+            | Action::Preset(_)
+            | Action::CloseUp(_)
+            | Action::Magnify
+            | Action::Sound
+            | Action::Microscope
+            | Action::IdealGhost
+            | Action::Arrows => Self::Picture,
+            Action::Panel
+            | Action::Plots
+            | Action::Bench
+            | Action::Present
+            | Action::TurnPage { .. }
+            | Action::Theme
+            | Action::Help
+            | Action::Close => Self::Window,
+        }
+    }
+
+    /// What is listed under it: key or gesture, and what it does.
+    pub fn rows(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let keys = BINDINGS.iter().filter(move |b| !b.written.is_empty() && Self::of(b.action) == self);
+        let pointer = POINTER.into_iter().filter(move |_| self == Self::Pointer);
+        keys.map(|b| (b.written, b.help)).chain(pointer)
+    }
+}
+
 /// Where the focused slider is stored.
 const SLIDER: &str = "slider with the focus";
 

@@ -113,6 +113,9 @@ fn replay_budget(clock: Clock) -> impl Fn() -> bool {
     move || clock() - start < REPLAY_BUDGET
 }
 
+/// How long a verdict is shown that needs no answer, s.
+const VERDICT: f64 = 6.0;
+
 /// How often a background computation is polled for progress.
 const POLL: std::time::Duration = std::time::Duration::from_millis(100);
 
@@ -272,6 +275,8 @@ pub struct App {
     /// A run in progress to a section of a sweep, and whether a twin is to start there.
     load: Option<(Load, bool)>,
     verdict: Option<Verdict>,
+    /// When that was first shown, s of viewing, if it needs no answer; minus infinity once that was long enough.
+    verdict_shown: Option<f64>,
     notice: Option<Notice>,
     /// Whether the user has put away what is said about the changes that the window began with.
     changes_seen: bool,
@@ -340,6 +345,7 @@ impl App {
             replay: None,
             load: None,
             verdict: None,
+            verdict_shown: None,
             notice: None,
             changes_seen: false,
             announcer: Announcer::default(),
@@ -675,6 +681,7 @@ impl App {
             let may_step = replay_budget(self.player.clock);
             self.verdict = replay.advance(&mut self.player, may_step);
             if self.verdict.is_some() {
+                self.verdict_shown = None;
                 self.replay = None;
                 self.viewport.arrive(&self.player);
             }
@@ -721,7 +728,7 @@ impl App {
         self.replay = None;
         self.load = None;
         self.film_wanted = None;
-        self.verdict = None;
+        (self.verdict, self.verdict_shown) = (None, None);
         Ok(())
     }
 
@@ -822,6 +829,20 @@ impl App {
         }
     }
 
+    /// A verdict that needs no answer is shown for some seconds.
+    fn age_verdict(&mut self, ctx: &egui::Context) {
+        if !self.verdict.as_ref().is_some_and(files::is_right) {
+            return;
+        }
+        let now = ctx.input(|input| input.time);
+        let left = *self.verdict_shown.get_or_insert(now) + VERDICT - now;
+        if left <= 0.0 {
+            self.verdict_shown = Some(f64::NEG_INFINITY);
+        } else {
+            ctx.request_repaint_after(std::time::Duration::from_secs_f64(left));
+        }
+    }
+
     /// Announces what is going on, if an announcement is due.
     fn announce(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
@@ -913,6 +934,7 @@ impl eframe::App for App {
         }
         self.bench.seen(now, moves);
         self.advance_lesson(ctx);
+        self.age_verdict(ctx);
         self.announce(ctx);
     }
 

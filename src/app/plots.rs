@@ -414,7 +414,7 @@ impl Plots {
         let (unit, size) = panel.unit;
         let (from, to) = self.range(player);
         let (length, now) = (to - from, player.pacer.shown());
-        let (time_unit, time_size) = time_axis(length);
+        let (time_unit, time_size) = time_axis_until(length, to);
         let units = [time_size, size];
 
         let members = &panel.members;
@@ -771,6 +771,14 @@ pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
     }
 }
 
+/// The same for an axis that ends at `to`, s: late times have a larger unit, with decimals.
+fn time_axis_until(length: f64, to: f64) -> (&'static str, f64) {
+    // As long as five digits stand before the point.
+    let longest = [5e-4, 0.5].into_iter().zip([0.1, 100.0]);
+    let least = longest.filter(|(_, end)| to >= *end).map(|(length, _)| length);
+    time_axis(least.fold(length, f64::max))
+}
+
 /// Label of a mark on an axis that reaches to `most` with marks `step` apart: enough digits to tell it from its neighbours.
 pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
     written(mark, step, (1e-4..1e9).contains(&most))
@@ -869,5 +877,14 @@ mod tests {
     fn windows_are_told_in_the_unit_that_suits() {
         let all = WINDOWS.map(|length| Window::Last(length).label());
         assert_eq!(all, ["1 ms", "10 ms", "50 ms", "100 ms", "1 s", "10 s"]);
+    }
+
+    #[test]
+    fn late_times_have_a_larger_unit() {
+        assert_eq!(time_axis_until(4e-4, 0.01).0, "µs");
+        assert_eq!(time_axis_until(4e-4, 1.0929).0, "ms");
+        assert_eq!(time_axis_until(4e-4, 120.0).0, "s");
+        assert_eq!(time_axis_until(0.04, 2.0).0, "ms");
+        assert_eq!(time_axis_until(2.0, 2.0).0, "s");
     }
 }

@@ -750,7 +750,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     // A tooltip is as wide as its longest line, not as the first.
     ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
-        ui.label(format!("{name}  {}", value::quantity(si, unit, 4)));
+        ui.label(format!("{name}  {}", value::quantity(si, unit, 3)));
     };
     let frame = player.frame();
     let Some(name) = name_of(player, picked) else {
