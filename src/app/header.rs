@@ -1,6 +1,8 @@
 //! The bar at the top, its menus, and the strips below it.
 
-use eframe::egui::{self, ComboBox, Frame, RichText, ThemePreference, Ui};
+use std::sync::LazyLock;
+
+use eframe::egui::{self, ComboBox, Frame, RichText, TextFormat, TextStyle, ThemePreference, Ui, text::LayoutJob};
 
 use super::App;
 use super::dialogs::Dialog;
@@ -123,9 +125,12 @@ impl App {
                 let other = ui.selectable_label(false, "Link…").on_hover_text(help);
                 link = other.clicked();
                 ui.separator();
-                for built_in in BUILT_IN {
-                    if ui.selectable_label(name == built_in, built_in).clicked() {
-                        wanted = Some(built_in);
+                // Beside a narrow window's edges.
+                let width = SCENES.min(ui.ctx().content_rect().width() - 60.0);
+                ui.set_min_width(width);
+                for scene in &*ABOUT_SCENES {
+                    if scene.entry(ui, name == scene.name, width).clicked() {
+                        wanted = Some(scene.name);
                     }
                 }
             })

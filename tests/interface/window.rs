@@ -8,7 +8,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::app::{App, AppOptions};
-use jointplay::scene::Scene;
+use jointplay::scene::{BUILT_IN, Scene};
 use jointplay::simulate::Quantity;
 
 #[path = "../common/pixels.rs"]
