@@ -60,8 +60,8 @@ pub const READY: [ReadySweep; 3] = [
         discard: 20,
     },
     ReadySweep {
-        name: "Play alone is no chaos",
-        shows: "The paper's machine, play 0.01 to 1 mm: with its friction every period is alike, and nothing is chaotic.",
+        name: "Clearance alone does not cause chaos",
+        shows: "The paper's machine, clearance 0.01 to 1 mm: with its friction every period is alike, and nothing is chaotic.",
         scene: "spcmm",
         changes: &[],
         key: "contact.clearance",

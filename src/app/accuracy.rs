@@ -13,7 +13,7 @@ use crate::scene::Preset;
 use crate::simulate::Impact;
 
 /// Width of the names, points.
-const LABELS: f32 = 122.0;
+const LABELS: f32 = 138.0;
 /// Height of a row, points, and of the space for doubts, lines.
 const ROW: f32 = 20.0;
 const DOUBTS: usize = 3;
@@ -80,7 +80,7 @@ impl Accuracy {
             self.problem = None;
             match host.start(job) {
                 Some(running) => self.running = Some((running, scene, preset)),
-                None => self.problem = Some("It cannot be measured here".to_owned()),
+                None => self.problem = Some("Presets cannot be measured here".to_owned()),
             }
         }
         while let Some((running, scene, preset)) = &mut self.running {
@@ -124,11 +124,7 @@ impl Accuracy {
         let said = player.warnings();
         let doubts = player.simulation().doubts().into_iter();
         let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
-        let none = if doubts.is_empty() {
-            "No doubts about this run so far"
-        } else {
-            "No doubts but those beside the controls"
-        };
+        let none = if doubts.is_empty() { "No warnings so far" } else { "No warnings but those beside the controls" };
         doubts.retain(|doubt| !said.contains(doubt));
         reserved(ui, "doubts", DOUBTS, |ui| {
             if let Some(problem) = &self.problem {
@@ -139,7 +135,7 @@ impl Accuracy {
             }
             if doubts.is_empty() && self.problem.is_none() {
                 ui.label(RichText::new(none).small().weak())
-                    .on_hover_text("Reasons not to trust the numbers, if there are any");
+                    .on_hover_text("Reasons to doubt the numbers, if there are any");
             }
         });
     }
@@ -309,7 +305,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
                 .to_owned(),
         ),
         row(
-            "Steps in it",
+            "Steps during impact",
             impact.map(|impact| impact.steps.to_string()),
             impact.is_some_and(|impact| impact.steps < STEPS_OF_AN_IMPACT),
             format!(
@@ -318,7 +314,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             ),
         ),
         row(
-            "Restitution in it",
+            "Measured restitution",
             impact.map(ratio),
             // It yields the restitution of its law, unless the steps were too long.
             impact.is_some_and(|impact| impact.has_own_restitution() && (impact.achieved() - impact.law).abs() > 0.02),

@@ -76,12 +76,12 @@ impl Bench {
             self.coordinate.ui(ui);
         });
         let Self { coordinate, portrait, sweep } = self;
-        let help = "How fast neighbouring motions of the running scene part";
-        part(ui, "Neighbouring motion", help, |ui| {
+        let help = "How fast neighbouring motions of the running scene diverge";
+        part(ui, "Divergence of neighbouring motions", help, |ui| {
             divergence::ui(ui, player);
         });
         let help = "The running scene in its phase space";
-        part(ui, "Portrait and section", help, |ui| {
+        part(ui, "Phase portrait and Poincaré section", help, |ui| {
             portrait.ui(ui, player, *coordinate);
         });
         let help = "The scene at many values of a parameter: the bifurcation diagram";

@@ -111,13 +111,12 @@ impl Controls {
 
     /// The preset, and the accuracy of the running scene.
     fn accuracy_ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy, table: &[&'static Parameter]) {
-        let header =
-            egui::CollapsingHeader::new(RichText::new("Accuracy").strong()).show(ui, |ui| {
-                if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
-                    self.control(ui, player, parameter, PRESET);
-                }
-                accuracy.ui(ui, player);
-            });
+        let header = egui::CollapsingHeader::new(RichText::new("Accuracy").strong()).show(ui, |ui| {
+            if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
+                self.control(ui, player, parameter, PRESET);
+            }
+            accuracy.ui(ui, player);
+        });
         header
             .header_response
             .on_hover_text("How far the numbers can be trusted. Method, step and tolerance are set under Solver.");
@@ -222,7 +221,7 @@ impl Controls {
             // Method and tolerance may match a preset that was not named, or differ from the one that was.
             let (now, text) = match (row.key, accuracy::preset_of(player)) {
                 (PRESET, Some(preset)) => (Value::Choice(preset.word()), preset.word().to_owned()),
-                (PRESET, None) => (Value::Unset, "own choice".to_owned()),
+                (PRESET, None) => (Value::Unset, "custom".to_owned()),
                 _ => (row.now.clone(), row.shown()),
             };
             let response = ComboBox::from_id_salt("choice")

@@ -78,7 +78,7 @@ impl Dialog {
             Self::Save { .. } => "Save as",
             Self::Code { .. } => "QR code of the link",
             Self::Film { .. } => "Film",
-            Self::Load { .. } => "Change what is on show?",
+            Self::Load { .. } => "Change the running scene?",
             Self::Ready { .. } => "Replace the running scene?",
         }
     }

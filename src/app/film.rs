@@ -60,10 +60,10 @@ impl Wanted {
     /// Why it cannot be made, in words.
     pub fn objection(&self) -> Option<String> {
         if self.span[0] == self.span[1] {
-            return Some("Nothing lies between its ends: play the run first, or choose other ends".to_owned());
+            return Some("The time range is empty: play the run first, or choose another range".to_owned());
         }
         if self.span[0] > self.span[1] {
-            return Some("It ends before it begins".to_owned());
+            return Some("The film ends before it begins".to_owned());
         }
         if self.frames() > MOST_FRAMES {
             return Some(format!(
@@ -163,7 +163,7 @@ pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
 fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut T, options: &[(T, String)]) {
     let chosen = options.iter().find(|(option, _)| option == value);
     ComboBox::from_id_salt(name)
-        .selected_text(chosen.map_or("own", |(_, text)| text.as_str()))
+        .selected_text(chosen.map_or("custom", |(_, text)| text.as_str()))
         .show_ui(ui, |ui| {
             for (option, text) in options {
                 ui.selectable_value(value, *option, text);

@@ -8,17 +8,14 @@ use super::App;
 use super::dialogs::Dialog;
 use super::files::verdict_words;
 use super::replay::Verdict;
-<<<<<<< HEAD
 use super::{layout, opening};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
-=======
-use crate::scene::{BUILT_IN, Scene};
 
 /// Width of the window from which the header has room for the program's name, points.
 const NAMED: f32 = 900.0;
 
 /// Width of the list of scenes, points.
-const SCENES: f32 = 400.0;
+const SCENES: f32 = 560.0;
 
 /// What the list says of a built-in scene.
 struct AboutScene {
@@ -42,12 +39,11 @@ impl AboutScene {
     /// Its entry in the list: title, and the sentence below it.
     fn entry(&self, ui: &mut Ui, chosen: bool, width: f32) -> egui::Response {
         let mut words = LayoutJob::default();
-        words.wrap.max_width = width - 12.0;
         let format = |style: TextStyle, colour| TextFormat::simple(style.resolve(ui.style()), colour);
         words.append(&self.title, 0.0, format(TextStyle::Body, ui.visuals().strong_text_color()));
         words.append("\n", 0.0, format(TextStyle::Small, ui.visuals().text_color()));
         words.append(&self.sentence, 0.0, format(TextStyle::Small, ui.visuals().text_color()));
-        let entry = egui::Button::selectable(chosen, words).min_size(egui::vec2(width, 0.0));
+        let entry = egui::Button::selectable(chosen, words).wrap().min_size(egui::vec2(width, 0.0));
         let response = ui.add(entry).on_hover_text(self.name);
         let id = response.id;
         let response = response.accessible_name(self.name);
@@ -55,7 +51,6 @@ impl AboutScene {
         response
     }
 }
->>>>>>> 2ab602e (No film of an empty range, few digits at late times, keys in columns, and a right hash leaves by itself)
 
 impl App {
     pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
@@ -77,7 +72,7 @@ impl App {
                 self.save_menu(ui);
                 self.code_button(ui);
             };
-            layout::menu(ui, "Save", true, save).on_hover_text("Save a picture, the record or the scene");
+            layout::menu(ui, "Save", true, save).on_hover_text("Save a picture, a film, the data or the scene");
             self.link_button(ui);
             layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
                 .on_hover_text("Ten lessons on play in joints, step by step");
@@ -127,7 +122,7 @@ impl App {
                 ui.separator();
                 // Beside a narrow window's edges.
                 let width = SCENES.min(ui.ctx().content_rect().width() - 60.0);
-                ui.set_min_width(width);
+                ui.set_width(width);
                 for scene in &*ABOUT_SCENES {
                     if scene.entry(ui, name == scene.name, width).clicked() {
                         wanted = Some(scene.name);
@@ -174,8 +169,8 @@ impl App {
             self.dialog = Some(Dialog::Film { wanted });
             layout::close_menu(ui);
         }
-        let help = "What the plots recorded since the reset, CSV";
-        if ui.button("Record…").on_hover_text(help).clicked() {
+        let help = "Everything that the plots have recorded since the reset";
+        if ui.button("Data (CSV)…").on_hover_text(help).clicked() {
             self.save_record();
             layout::close_menu(ui);
         }
@@ -218,8 +213,7 @@ impl App {
 
     /// Whether [`Self::strips`] has anything to say.
     pub(super) fn has_messages(&self) -> bool {
-<<<<<<< HEAD
-        self.problem.is_some() || self.verdict.is_some() || self.is_under_way() || self.tells_changes()
+        self.problem.is_some() || self.shows_verdict() || self.is_under_way() || self.tells_changes()
     }
 
     /// Whether the scene is the one that a visitor meets, and nobody has said that this is understood.
@@ -252,14 +246,11 @@ impl App {
                 })
                 .err();
         }
-=======
-        self.problem.is_some() || self.shows_verdict() || self.is_under_way()
     }
 
     /// Whether the verdict on a link is on show.
     fn shows_verdict(&self) -> bool {
         self.verdict.is_some() && self.verdict_shown != Some(f64::NEG_INFINITY)
->>>>>>> 2ab602e (No film of an empty range, few digits at late times, keys in columns, and a right hash leaves by itself)
     }
 
     /// Errors, the progress of a replay, and the verdict on a link.
@@ -281,7 +272,7 @@ impl App {
         ];
         for (words, fraction) in ways {
             let stop = if self.filming().is_some() {
-                ("Give up", "No film; the run goes back to where it was (Esc)")
+                ("Cancel", "Makes no film; the run returns to where it was (Esc)")
             } else {
                 ("Stop here", "Stay at the time that the run has reached (Esc)")
             };

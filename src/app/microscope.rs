@@ -251,7 +251,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             "The part of it that the picture does not show, along the line of sight",
         ),
         ("Gap", beside, "Between ball and wall, where they are nearest"),
-        ("Penetration", pressed, "How deep the ball presses into the wall"),
+        ("Indentation", pressed, "How deep the ball presses into the wall"),
         (
             "Elastic patch",
             patch.map_or(NONE.to_owned(), |patch| format!("radius {}", draw::length(patch.radius(), 3))),
@@ -281,16 +281,16 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     let latest = [
         ("Latest impact", ago, "When its contact ended"),
         (
-            "Struck with",
+            "Approach speed",
             of(|impact| value::quantity(impact.approach_speed, "m/s", 4)),
             "Speed of approach when the latest impact began",
         ),
         (
-            "Left with",
+            "Separation speed",
             of(|impact| value::quantity(impact.separation_speed, "m/s", 4)),
             "Speed of separation when it ended",
         ),
-        ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its deepest penetration"),
+        ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its deepest indentation"),
         (
             "Restitution asked",
             impact.map_or(NONE.to_owned(), |impact| given(impact.asked)),

@@ -79,11 +79,11 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
 
 /// Hint for a settled run, at the right end, where nothing else has to make room for it.
 fn settled(ui: &mut Ui, player: &Player) {
-    if !player.is_playing() || !player.has_settled() || ui.available_width() < 130.0 {
+    if !player.is_playing() || !player.has_settled() || ui.available_width() < 180.0 {
         return;
     }
     ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-        ui.label(RichText::new("Settled: R restarts").weak())
+        ui.label(RichText::new("At rest. Press R to restart").weak())
             .on_hover_text(
                 "The motion relative to the drives has ended: for an eighth of their period no ball with play has left \
                  its socket's wall or moved along it by more than 15 % of the clearance, and no load has changed by more \

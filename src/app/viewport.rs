@@ -609,12 +609,12 @@ impl Viewport {
     /// View options.
     pub fn options_ui(&mut self, ui: &mut Ui) {
         let options = &mut self.options;
-        ui.label("Magnification of the play").on_hover_text(
+        ui.label("Magnification of the clearance").on_hover_text(
             "Draws eccentricity and clearance larger than they are, together, so that the ball never leaves its \
              socket. The motion of the machine stays as it is. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
-        keys::slider(ui, slider).accessible_name("Magnification of the play");
+        keys::slider(ui, slider).accessible_name("Magnification of the clearance");
         ui.add_space(4.0);
         ui.label("Force arrows");
         ui.horizontal(|ui| {
@@ -646,7 +646,7 @@ impl Viewport {
         }
         ui.add_space(4.0);
         ui.label("Show");
-        ui.checkbox(&mut options.flash, "Flash joints that are hit")
+        ui.checkbox(&mut options.flash, "Flash joints on impact")
             .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
         ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the ball joints");
         ui.horizontal(|ui| {
@@ -658,7 +658,7 @@ impl Viewport {
         ui.checkbox(&mut options.floor, "Floor grid").on_hover_text("The floor with its grid and the shadows on it");
         ui.checkbox(&mut options.triad, "Axes and gravity")
             .on_hover_text("World axes X, Y, Z and the direction of gravity g");
-        ui.checkbox(&mut options.trail, "Trail of the probe tip").on_hover_text("Where the tip of the probe was");
+        ui.checkbox(&mut options.trail, "Trail of the tip").on_hover_text("Where the probe tip has been");
         ui.add_space(4.0);
         ui.label("Wear map").on_hover_text(
             "Colours the inner faces of the sockets by what they took since the reset, in cells of equal area; the balls are then \
@@ -677,7 +677,7 @@ impl Viewport {
         });
         let mut follows = self.pace.is_some();
         let quality = ui
-            .checkbox(&mut follows, "Simpler when slow")
+            .checkbox(&mut follows, "Reduce detail to keep up")
             .on_hover_text(
                 "While the picture moves and its frames take longer than 1/24 s: without the shade between balls and sockets, \
                  then with one sample per pixel instead of four, with coarser and hard shadows, and at last with fewer pixels, \
@@ -775,7 +775,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
                 if joint.state != ContactState::Ideal {
                     row(ui, "Eccentricity", joint.eccentricity.norm(), "mm");
                     row(ui, "Clearance", joint.clearance, "mm");
-                    row(ui, "Penetration", joint.penetration.max(0.0), "um");
+                    row(ui, "Indentation", joint.penetration.max(0.0), "um");
                 }
             }
         }

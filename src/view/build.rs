@@ -404,9 +404,9 @@ pub(super) fn times(x: f32) -> String {
 
 fn magnification_text(drawn: f32, asked: f32) -> String {
     if drawn < asked * 0.999 {
-        format!("play ×{} (×{} does not fit)", times(drawn), times(asked))
+        format!("clearance drawn ×{} (×{} does not fit)", times(drawn), times(asked))
     } else {
-        format!("play ×{}", times(drawn))
+        format!("clearance drawn ×{}", times(drawn))
     }
 }
 

@@ -320,7 +320,7 @@ pub struct DrawList {
     pub wear_scale: Option<WearScale>,
     /// Magnification of the play as drawn.
     pub magnification: f32,
-    /// Its label: "play ×50"; says so if less was drawn than requested.
+    /// Its label: "clearance drawn ×50"; says so if less was drawn than requested.
     pub magnification_text: String,
 }
 

@@ -74,7 +74,7 @@ fn a_magnification_that_cannot_be_drawn_is_held_back_and_says_so() {
     assert!((10.0..20.0).contains(&drawn.magnification), "{}", drawn.magnification);
     assert!(drawn.magnification_text.contains("×100 does not fit"), "{}", drawn.magnification_text);
     let options = ViewOptions { magnification: 5.0, ..Default::default() };
-    assert_eq!(list(&scene, &frame, &options).magnification_text, "play ×5");
+    assert_eq!(list(&scene, &frame, &options).magnification_text, "clearance drawn ×5");
 }
 
 #[test]

@@ -255,9 +255,10 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     sweep(&mut harness, "0.2 mm", "0.4", 3.0);
     wait(&mut harness, |app| !app.bench().is_sweeping());
     harness.run_steps(3);
-    harness
-        .get_by_label_contains("clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, cold");
-    harness.get_by_label("For the scene shown, with its values");
+    harness.get_by_label_contains(
+        "clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, start as in file",
+    );
+    harness.get_by_label("This sweep belongs to the scene on show");
     let click_point = |harness: &mut Harness<'_, App>| {
         let at = harness.state().bench().place(1, 1).expect("drawn");
         harness.hover_at(at);
@@ -271,19 +272,19 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
-    harness.get_by_label("For the scene shown, with its values");
+    harness.get_by_label("This sweep belongs to the scene on show");
     let player = harness.state_mut().player_mut();
     player.set("contact.friction", "0.3").expect("in range");
     harness.run_steps(2);
-    harness.get_by_label_contains("Not for what is shown. Friction coefficient: ");
+    harness.get_by_label_contains("This sweep belongs to another scene. Friction coefficient: ");
 
     harness.state_mut().open("pendulum").expect("built in");
     harness.run_steps(3);
-    harness.get_by_label("Not for what is shown. Scene: spcmm instead of pendulum");
+    harness.get_by_label("This sweep belongs to another scene. Scene: spcmm instead of pendulum");
     harness.get_by_label_contains("Running: pendulum, ");
     click_point(&mut harness);
     assert_eq!(harness.state().loading(), None);
-    harness.get_by_label("Change what is on show?");
+    harness.get_by_label("Change the running scene?");
     harness.get_by_label("Scene: spcmm instead of pendulum");
     click(&mut harness, Role::Button, "Close");
     assert_eq!(harness.state().player().scene().name, "pendulum");
@@ -374,7 +375,7 @@ fn a_scene_without_a_drive_says_that_it_has_no_phase() {
     let mut harness = window("pendulum", &[]);
     harness.get_by_label_contains("No Poincaré section");
     harness.get_by_label_contains("No sweep");
-    harness.get_by_label_contains("Phase portrait");
+    harness.get_by_label_contains("Phase portrait: ");
     harness.state_mut().player_mut().run_to(0.1);
     harness.run();
     assert!(harness.state().player().watch().orbit().count() > 20);

@@ -34,7 +34,7 @@ fn embed_leaves_the_picture_and_the_panels_that_it_names_and_links_keep_it() {
         ] {
             assert_eq!(harness.query_by_role_and_label(role, name).is_some(), there, "{words}: {name}");
         }
-        for (name, there) in [("Normal force, N", plots), ("Portrait and section", bench)] {
+        for (name, there) in [("Normal force, N", plots), ("Phase portrait and Poincaré section", bench)] {
             assert_eq!(harness.query_by_label(name).is_some(), there, "{words}: {name}");
         }
         let link = harness.state().share_state();

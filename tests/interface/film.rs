@@ -248,7 +248,7 @@ fn the_window_makes_a_film_of_the_timeline_and_stands_where_it_stood() {
     harness.key_press(eframe::egui::Key::Space);
     harness.step();
     assert!(!harness.state().player().is_playing());
-    click(&mut harness, "Give up");
+    click(&mut harness, "Cancel");
     assert_eq!(harness.state().filming(), None);
     assert!(calls.borrow().saved.is_empty());
     assert_eq!(state(&harness), before);

@@ -106,13 +106,13 @@ fn every_lesson_is_walked_to_its_end_by_page_down_and_play() {
             assert_eq!(step(&harness), k, "{at}");
             assert!(says(&harness, &format!("Step {} of {steps}", k + 1)), "{at}");
             assert!(harness.state().points_out(&harness.ctx), "{at}: something pointed at is not there");
-            assert!(!says(&harness, "It is:"), "{at}: the answer shows too early");
+            assert!(!says(&harness, "The answer is"), "{at}: the answer shows too early");
             assert!(!says(&harness, "The machine was changed"), "{at}");
             let asked = harness.state().course().expect("a lesson").lesson().steps[k].question.clone();
             if play(&mut harness) && asked.is_some() {
                 let course = harness.state().course().expect("a lesson");
                 let answer = course.answer().unwrap_or_else(|| panic!("{at}: no answer"));
-                assert!(says(&harness, &format!("It is: {answer}")), "{at}: {answer}");
+                assert!(says(&harness, &format!("The answer is {answer}")), "{at}: {answer}");
             }
             press(&mut harness, Key::PageDown);
         }
@@ -137,7 +137,7 @@ fn the_answer_is_what_the_run_on_show_gave() {
     let touches: Vec<f64> = (0..3).map(|joint| touch(joint).expect("touched")).collect();
     assert!(touches.iter().all(|time| (time / touches[0] - 1.0).abs() < 0.02), "{touches:?}");
     let name = "At nearly the same time".to_owned();
-    harness.get_by_label(&format!("Not as predicted. It is: {name}"));
+    harness.get_by_label(&format!("Not quite: the answer is {name}"));
     // Back, the class tries again.
     press(&mut harness, Key::PageUp);
     press(&mut harness, Key::PageDown);
@@ -153,7 +153,7 @@ fn the_answer_is_what_the_run_on_show_gave() {
     let of_second = impacts.filter(|impact| impact.joint == 1);
     let peaks: Vec<f64> = of_second.map(|impact| impact.peak).collect();
     assert!(peaks[1] > 1.05 * peaks[0], "{peaks:?}");
-    harness.get_by_label("It is: Harder than the first");
+    harness.get_by_label("The answer is Harder than the first");
     assert!(says(&harness, &format!("{:.0} N", peaks[1])), "{peaks:?}");
 }
 
@@ -280,7 +280,7 @@ fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
         }
     }
     harness.run_steps(2);
-    assert!(says(&harness, "It is: At nearly the same time"));
+    assert!(says(&harness, "The answer is At nearly the same time"));
     tap(&mut harness, Role::Button, "Back");
     assert_eq!(step(&harness), 0);
     // The sheet folds away, and comes back.

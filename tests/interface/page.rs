@@ -442,7 +442,7 @@ fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
         harness.run();
         harness.get_by_label("Choose plots");
         click(&mut harness, "Menu");
-        for name in ["Open…", "Copy link", "Picture…", "Record…", "Scene…", "Keys", "About"] {
+        for name in ["Open…", "Copy link", "Picture…", "Data (CSV)…", "Scene…", "Keys", "About"] {
             harness.get_by_label(name);
         }
     }
@@ -573,7 +573,7 @@ fn scene_record_and_picture_are_saved() {
     assert_eq!(hashes[0], hashes[1], "the same scene");
 
     click(&mut harness, "Save");
-    click(&mut harness, "Record…");
+    click(&mut harness, "Data (CSV)…");
     let record = calls.borrow_mut().saved.remove(0);
     assert_eq!((record.name.as_str(), record.mime), ("spcmm-12.000ms.csv", "text/csv"));
     let text = String::from_utf8(record.bytes).expect("text");
@@ -730,7 +730,7 @@ fn on_the_desktop_a_path_is_asked_for_and_nothing_is_overwritten() {
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
     for again in [false, true] {
         click(&mut harness, "Save");
-        click(&mut harness, "Record…");
+        click(&mut harness, "Data (CSV)…");
         type_over(&mut harness, "Path", &path);
         harness.key_press(Key::Enter);
         harness.run_steps(3);
@@ -924,13 +924,13 @@ fn a_menu_that_the_keyboard_opens_begins_at_its_first_entry_and_closes_behind_it
         harness.run_steps(4);
         let mut seen = vec![focused(&harness).expect("has the focus")];
         assert_eq!(seen[0], first);
-        while harness.query_by_label("Record…").is_some() {
+        while harness.query_by_label("Data (CSV)…").is_some() {
             harness.key_press(Key::Tab);
             harness.run_steps(2);
             seen.push(focused(&harness).unwrap_or_default());
             assert!(seen.len() < 30, "{seen:?}");
         }
-        for entry in ["Picture…", "2×", "Whole window", "Record…", "Scene…"] {
+        for entry in ["Picture…", "2×", "Whole window", "Data (CSV)…", "Scene…"] {
             assert!(seen.iter().any(|label| label == entry), "{entry}: {seen:?}");
         }
     }

@@ -232,7 +232,9 @@ fn the_whole_list_of_keys_is_in_sight() {
         harness.run();
         let dialog = egui::Rect::from_min_size(egui::Pos2::ZERO, size.into());
         let end = harness.get_by_role_and_label(Role::Button, "Close").rect().top();
-        for words in ["Play or pause", "Faster", "Force arrows on or off", "This list", "Open a link", "Move that slider"] {
+        for words in
+            ["Play or pause", "Faster", "Force arrows on or off", "This list", "Open a link", "Move that slider"]
+        {
             let row = harness.get_by_label(words).rect();
             assert!(dialog.contains_rect(row) && row.bottom() <= end, "{size:?}: {words} at {row}");
         }
@@ -541,7 +543,7 @@ fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
     player.run_to(9e-3);
     player.set_playing(true);
     harness.step();
-    assert!(harness.query_by_label("Settled: R restarts").is_none());
+    assert!(harness.query_by_label("At rest. Press R to restart").is_none());
 
     // Stepping must not depend on how fast this machine is.
     harness.state_mut().player_mut().run_to(0.5);
@@ -549,11 +551,11 @@ fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
         ["Step", "3D view", "Time scale preset"].map(|label| harness.get_by_label(label).rect())
     };
     harness.step();
-    assert!(harness.query_by_label("Settled: R restarts").is_none());
+    assert!(harness.query_by_label("At rest. Press R to restart").is_none());
     let paused = places(&harness);
     harness.state_mut().player_mut().set_playing(true);
     harness.step();
-    let words = harness.get_by_label("Settled: R restarts").rect();
+    let words = harness.get_by_label("At rest. Press R to restart").rect();
     assert!(!words.intersects(harness.get_by_label("3D view").rect()));
     assert_eq!(places(&harness), paused, "nothing gives way for it");
 
@@ -563,7 +565,7 @@ fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
             harness.state_mut().player_mut().run_to(time);
             harness.state_mut().player_mut().set_playing(true);
             harness.step();
-            assert!(harness.query_by_label("Settled: R restarts").is_none(), "{scene} swings at {time} s");
+            assert!(harness.query_by_label("At rest. Press R to restart").is_none(), "{scene} swings at {time} s");
         }
     }
 }
@@ -792,7 +794,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     assert_eq!(preset(&harness).as_deref(), Some("real-time"));
     // Nothing has been hit yet, and the rows about impacts say so.
     harness.get_by_label("none yet");
-    harness.get_by_label("No doubts about this run so far");
+    harness.get_by_label("No warnings so far");
     assert_eq!(harness.query_all_by_label("—").count(), 2);
     harness.state_mut().player_mut().run_to(9e-3);
     harness.run();
@@ -822,7 +824,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     assert!(impact.steps < 10, "{impact:?}");
     player.set_playing(true);
     harness.run_steps(20);
-    assert_eq!(preset(&harness).as_deref(), Some("own choice"));
+    assert_eq!(preset(&harness).as_deref(), Some("custom"));
     assert!(harness.query_by_label("not measured yet").is_none());
 }
 
@@ -931,13 +933,13 @@ fn a_doubt_that_stands_beside_a_slider_is_not_denied_below() {
     let mut harness = window("spcmm");
     harness.get_by_label("Accuracy").click();
     harness.run();
-    harness.get_by_label("No doubts about this run so far");
+    harness.get_by_label("No warnings so far");
     let player = harness.state_mut().player_mut();
     player.set("contact.restitution", "0.4").expect("in range");
     harness.run_steps(3);
     harness.get_by_label_contains("restitution 0.4 with lankarani-nikravesh");
-    harness.get_by_label("No doubts but those beside the controls");
-    assert!(harness.query_by_label("No doubts about this run so far").is_none());
+    harness.get_by_label("No warnings but those beside the controls");
+    assert!(harness.query_by_label("No warnings so far").is_none());
 }
 
 #[test]

@@ -45,7 +45,7 @@ fn every_ready_sweep_has_a_sentence_and_a_range_that_its_scene_takes() {
         }
         // Enough sections for the 0-1 test, which decides about chaos here.
         let kept = ready.periods - ready.discard;
-        assert!(kept >= 40 || ready.name == "Play alone is no chaos", "{}", ready.name);
+        assert!(kept >= 40 || ready.name == "Clearance alone does not cause chaos", "{}", ready.name);
     }
 }
 
@@ -105,7 +105,7 @@ fn parts_from(chaotic: &SweptPoint, regular: &SweptPoint) {
 }
 
 fn repeats(vary: Option<&str>, values: usize) {
-    let points = points(named("Play alone is no chaos"), vary, false);
+    let points = points(named("Clearance alone does not cause chaos"), vary, false);
     assert_eq!(points.len(), values);
     for point in points {
         assert_eq!(point.regime, "periodic 1", "{:?}", point.settings);
@@ -120,5 +120,5 @@ fn the_machine_of_the_paper_repeats_with_little_play_and_with_much() {
 #[test]
 #[ignore = "full: three seconds"]
 fn full_the_machine_of_the_paper_repeats_whatever_its_play() {
-    repeats(None, named("Play alone is no chaos").values);
+    repeats(None, named("Clearance alone does not cause chaos").values);
 }

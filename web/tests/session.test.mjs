@@ -214,7 +214,7 @@ test('files open by drop and dialog, a bad one leaves the running scene, and sce
     };
     const scene = (await save('Scene…', 1)).get('spcmm.toml').toString();
     assert.match(scene, /^clearance = .*0\.5 ?mm/m);
-    const record = await save('Record…', 2);
+    const record = await save('Data (CSV)…', 2);
     assert.deepEqual([...record.keys()].sort(), ['spcmm-9.000ms.csv', 'spcmm-9.000ms.csv.meta.json']);
     assert.equal(JSON.parse(record.get('spcmm-9.000ms.csv.meta.json')).state_hash, hash);
     const [header, ...rows] = record.get('spcmm-9.000ms.csv').toString().trimEnd().split('\n');

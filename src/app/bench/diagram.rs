@@ -35,7 +35,7 @@ impl Ordinate {
             Self::Sections => "Sections",
             Self::Exponent => "Exponent",
             Self::Peak => "Peak force",
-            Self::Probe => "Probe error",
+            Self::Probe => "Tip error",
         }
     }
 
@@ -44,7 +44,7 @@ impl Ordinate {
             Self::Sections => coordinate.axis(),
             Self::Exponent => AxisLabel::new("largest Lyapunov exponent", "1/s"),
             Self::Peak => AxisLabel::new("peak normal force", "N"),
-            Self::Probe => AxisLabel::new("largest probe error", "µm"),
+            Self::Probe => AxisLabel::new("largest tip error", "µm"),
         }
     }
 }

@@ -30,7 +30,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         let anew = on
             && moves
             && ui
-                .button("Start anew")
+                .button("Restart twin")
                 .on_hover_text("A new twin from the present state, say once the transient is over")
                 .clicked();
         if switch.changed() || anew {
@@ -52,7 +52,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
     let up = AxisLabel::new("log10 of the distance", "");
     title(
         ui,
-        "Distance of the twin, in scales of the state (logarithmic)",
+        "Distance to twin, in scales of the state (logarithmic)",
         "Euclidean distance of all coordinates and velocities, each over its scale of the tolerance (1 ball radius, 0.1 rad \
          and so on)",
     );

@@ -235,15 +235,15 @@ impl SweepPanel {
         let running = self.running.as_ref().map(|sweeping| &sweeping.task);
         let swept = self.swept.as_ref();
         let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task)) else {
-            let words = if self.is_running() { "Begins…" } else { "Nothing swept yet" };
+            let words = if self.is_running() { "Starting…" } else { "No results yet" };
             ui.label(small(words).weak());
             return;
         };
         let differences = swept.differences(player);
         if differences.is_empty() {
-            ui.label(small("For the scene shown, with its values").weak());
+            ui.label(small("This sweep belongs to the scene on show").weak());
         } else {
-            let words = format!("Not for what is shown. {}", differences.join("; "));
+            let words = format!("This sweep belongs to another scene. {}", differences.join("; "));
             theme::warning(ui, words).on_hover_text("A click on a point asks before it changes this");
         }
     }
@@ -339,7 +339,7 @@ impl SweepPanel {
     fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
         let running = self.is_running();
         let (name, help) = if running {
-            ("Cancel sweep", "End the sweep; the points that are there stay")
+            ("Cancel sweep", "Stops the sweep; points computed so far remain")
         } else {
             (
                 "Start sweep",

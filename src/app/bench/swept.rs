@@ -37,7 +37,7 @@ impl Swept {
             Some((parameter, _)) => parameter.show(&Value::Number(si)),
         };
         format!(
-            "{scene}; {label} {} to {}, {} values; {} periods of which {} discarded, phase {}°, {} start",
+            "{scene}; {label} {} to {}, {} values; {} periods of which {} discarded, phase {}°, start {}",
             end(range.from),
             end(range.to),
             range.count,
@@ -58,7 +58,7 @@ impl Swept {
 
 pub(super) fn start_word(start: Start) -> &'static str {
     match start {
-        Start::Cold => "cold",
+        Start::Cold => "as in file",
         Start::FollowUp => "follow upwards",
         Start::FollowDown => "follow downwards",
     }

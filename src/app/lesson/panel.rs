@@ -76,8 +76,8 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
     let last = course.lesson.steps.len() - 1;
     ui.horizontal(|ui| {
         for (forward, name, help, possible) in [
-            (false, "Back", "The step before (Page Up)", course.step > 0),
-            (true, "Next", "The next step (Page Down)", course.step < last),
+            (false, "Back", "Previous step (Page Up)", course.step > 0),
+            (true, "Next", "Next step (Page Down)", course.step < last),
         ] {
             let button = ui.add_enabled(possible, Button::new(name)).on_hover_text(help);
             if button.clicked() {
@@ -86,7 +86,7 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
         }
         ui.label(format!("Step {} of {}", course.step + 1, last + 1));
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
-            let help = "Ends the lesson; the window is as it was before";
+            let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
                 asked = Asked::Leave;
@@ -126,7 +126,7 @@ impl Course {
                     (false, _) => RichText::new(words),
                 };
                 let chosen = predicted == Some(index);
-                let help = "What you predict; the run shows whether it is so";
+                let help = "Your prediction; the run shows whether it is right";
                 let radio = ui
                     .scope(|ui| {
                         // The right one shall not fade with the others.
@@ -143,28 +143,28 @@ impl Course {
                 let colour = ui.visuals().selection.stroke.color;
                 let verdict = match predicted {
                     Some(choice) if choice == right => format!("As predicted: {words}"),
-                    Some(_) => format!("Not as predicted. It is: {words}"),
-                    None => format!("It is: {words}"),
+                    Some(_) => format!("Not quite: the answer is {words}"),
+                    None => format!("The answer is {words}"),
                 };
                 ui.label(RichText::new(verdict).strong().color(colour));
             } else if !self.reached {
-                ui.label(RichText::new("Predict, then Play (space).").weak());
+                ui.label(RichText::new("Make a prediction, then press Play (space)").weak());
             }
             self.predicted = predicted;
         } else if step.until.is_some() && !self.reached {
-            ui.label(RichText::new("Play (space).").weak());
+            ui.label(RichText::new("Press Play (space)").weak());
         }
         if !own {
             theme::warning(
                 ui,
-                "The machine was changed since this step began: what it says here is of the run as the step sets it.",
+                "The machine was changed since this step began. The text describes the run as the step sets it.",
             );
-            let help = "Puts the machine in the state of this step again";
+            let help = "Returns the machine to the state of this step";
             set = ui.button("Set the step again").on_hover_text(help).clicked();
         }
         if (self.reached || step.until.is_none()) && !step.seen.is_empty() {
             ui.separator();
-            ui.label(RichText::new("What was to be seen").small().weak());
+            ui.label(RichText::new("What you saw").small().weak());
             prose(ui, &step.seen, &self.measured.names());
         }
         if std::mem::take(&mut self.fresh) {

@@ -115,8 +115,8 @@ static TABLE: [Parameter; 29] = [
         "Restitution",
         number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
         Value::Number(DEFAULT.restitution),
-        "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The law of Lankarani \
-         and Nikravesh is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
+        "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The Lankarani–Nikravesh \
+         law is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
          asked for, flores within 0.05; both divide by this number and refuse 0.",
         "Paper eq. (19)",
     ),

@@ -82,7 +82,7 @@ const PLOTS: &[Plot] = &[
     },
     Plot {
         quantity: Q::Penetration,
-        label: "Penetration",
+        label: "Indentation",
         unit: ("µm", 1e-6),
         kind: PlotKind::Curves,
         help: "How deep each ball presses into its socket; below zero there is a gap.",
@@ -161,10 +161,10 @@ const PLOTS: &[Plot] = &[
     },
     Plot {
         quantity: Q::ProbeError,
-        label: "Probe error",
+        label: "Tip error by axis",
         unit: ("mm", 1e-3),
         kind: PlotKind::Curves,
-        help: "Probe tip minus the tip of the ideal mechanism at the same time.",
+        help: "Position of the probe tip less that of the ideal mechanism at the same time, by world axis.",
     },
     Plot {
         quantity: Q::TipError,
