@@ -20,6 +20,7 @@ mod page;
 mod pictures;
 mod present;
 mod reload;
+mod readings;
 mod sound;
 mod touch;
 mod window;

@@ -1,0 +1,86 @@
+//! What the box under a plot's pointer says.
+
+use eframe::egui::{self, Shape};
+use egui_kittest::Harness;
+use jointplay::app::App;
+use jointplay::simulate::{Frame, Quantity, Simulation};
+
+use crate::window::sized;
+
+/// All texts of several lines on the screen.
+fn boxes(shape: &Shape, out: &mut Vec<String>) {
+    match shape {
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| boxes(shape, out)),
+        Shape::Text(text) if text.galley.text().contains('\n') => out.push(text.galley.text().to_owned()),
+        _ => {}
+    }
+}
+
+/// What the box of the plot of `quantity` says where it has `value` at `time`, s: the time, s, and by member the least and the
+/// greatest value, in the unit of the axis.
+fn reading(
+    harness: &mut Harness<'_, App>,
+    quantity: Quantity,
+    time: f64,
+    value: f64,
+) -> (f64, Vec<(String, [f64; 2])>) {
+    let at = harness.state_mut().plots_mut().place(quantity, time, value).expect("on show");
+    harness.hover_at(at);
+    harness.run_steps(4);
+    let mut texts = Vec::new();
+    for part in &harness.output().shapes {
+        boxes(&part.shape, &mut texts);
+    }
+    let text = texts.iter().find(|text| text.contains("\nS1 ")).unwrap_or_else(|| panic!("no box: {texts:?}"));
+    let mut lines = text.lines();
+    let numbers = |line: &str| -> Vec<f64> { line.split_whitespace().filter_map(|word| word.parse().ok()).collect() };
+    let first = lines.next().expect("the time");
+    assert!(first.ends_with(" ms"), "{text}");
+    let members = lines.map(|line| {
+        let (name, rest) = line.split_once(' ').expect("a name");
+        let found = numbers(rest);
+        (name.to_owned(), [found[0], *found.last().expect("a value")])
+    });
+    (numbers(first)[0] * 1e-3, members.collect())
+}
+
+#[test]
+fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
+    let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    harness.state_mut().player_mut().pacer.set_scale(1e-3);
+    harness.state_mut().player_mut().run_to(8.5e-3);
+    harness.run();
+    let mut simulation = Simulation::new(harness.state().player().scene()).expect("starts");
+    let mut sample = |time: f64| {
+        let mut frame = Frame::default();
+        simulation.reset().expect("starts");
+        while simulation.time() < time {
+            simulation.step().expect("runs");
+        }
+        simulation.sample(time, &mut frame);
+        frame
+    };
+    let mut checked = 0;
+    // In free fall; and about the peak of the first impact.
+    for (quantity, time) in
+        [(Quantity::Eccentricity, 5e-3), (Quantity::Eccentricity, 6.5e-3), (Quantity::NormalForce, 7.87e-3)]
+    {
+        let value = |frame: &Frame, joint: usize| match quantity {
+            Quantity::Eccentricity => frame.joints[joint].eccentricity.norm() * 1e3,
+            _ => frame.joints[joint].normal_force.norm(),
+        };
+        let there = value(&sample(time), 0) * if quantity == Quantity::Eccentricity { 1e-3 } else { 1.0 };
+        let (at, members) = reading(&mut harness, quantity, time, there);
+        assert!((at - time).abs() < 0.05e-3, "{at} {time}");
+        let frame = sample(at);
+        assert_eq!(members.len(), 3);
+        for (joint, (name, [least, greatest])) in members.into_iter().enumerate() {
+            assert_eq!(name, format!("S{}", joint + 1));
+            let run = value(&frame, joint);
+            assert!(run > 0.99 * least && run < 1.01 * greatest, "{name} at {at}: {least} to {greatest}, {run}");
+            // A box that gave any range would hold any value.
+            checked += usize::from(greatest < 1.015 * least);
+        }
+    }
+    assert!(checked >= 7, "{checked}");
+}
