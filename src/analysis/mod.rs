@@ -8,6 +8,7 @@ pub mod drive;
 pub mod exponent;
 mod front;
 pub mod grid;
+pub mod impact_row;
 pub mod layout;
 mod many_joints;
 pub mod orbit;

@@ -259,7 +259,7 @@ impl App {
     /// Saves what the plots recorded.
     pub fn save_record(&mut self) {
         let name = format!("{}.csv", self.file_stem());
-        let (rows, meta) = (record_csv(&self.player), meta(&self.player));
+        let (rows, meta) = (record_csv(&self.player), meta(&self.player, []));
         self.save(vec![
             SaveFile { name: name.clone(), mime: "text/csv", bytes: rows.into_bytes() },
             SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
@@ -378,8 +378,8 @@ fn record_csv(player: &Player) -> String {
     text
 }
 
-/// Metadata: what made the record.
-fn meta(player: &Player) -> String {
+/// Metadata: what made the record, and `more` about what is in it.
+pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Value); N]) -> String {
     let scene = player.scene();
     let changed: Map<String, serde_json::Value> =
         scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
@@ -432,6 +432,9 @@ fn describe(player: &Player) -> String {
     }
     words
 }
+    for (key, value) in more {
+        meta[key] = value;
+    }
 
 #[cfg(test)]
 mod tests {
@@ -470,7 +473,7 @@ mod tests {
         let shown = player.frame().pose.position.x;
         let x = last[2 + 2 * x.expect("recorded")];
         assert!((x / shown - 1.0).abs() < 1e-5, "{x} {shown}");
-        let meta: serde_json::Value = serde_json::from_str(&meta(&player)).expect("JSON");
+        let meta: serde_json::Value = serde_json::from_str(&meta(&player, [])).expect("JSON");
         assert_eq!(meta["method"], "automatic");
         let link = Link::parse(meta["link"].as_str().expect("a text")).expect("a link");
         assert_eq!(link.steps, Some(player.steps()));
@@ -485,7 +488,7 @@ mod tests {
         let beside = [("own.toml".to_owned(), own.into())].into();
         let scene = Scene::parse_with(&text, Some("mine.toml"), &beside, &[]).expect("a scene");
         let player = Player::new(&scene).expect("starts");
-        let meta: serde_json::Value = serde_json::from_str(&meta(&player)).expect("JSON");
+        let meta: serde_json::Value = serde_json::from_str(&meta(&player, [])).expect("JSON");
         assert!(meta.get("link").is_none());
         assert_eq!(meta["scene_text"], text);
         assert_eq!(meta["scene_files"], json!({"own.toml": own}));

@@ -180,6 +180,11 @@ impl App {
             layout::close_menu(ui);
         }
         ui.separator();
+        let help = "A row for each impact up to the instant shown, CSV";
+        if ui.button("Impacts…").on_hover_text(help).clicked() {
+            self.save_impacts();
+            layout::close_menu(ui);
+        }
         let help = "Copies the line of HTML that shows this scene in this state and view within another page: course page, slides";
         if ui.button("Embed").on_hover_text(help).clicked() {
             self.copy_embedding(ui.ctx());

@@ -27,6 +27,7 @@ pub enum Action {
     Magnify,
     Sound,
     Microscope,
+    ImpactList,
     IdealGhost,
     Arrows,
     Panel,
@@ -59,7 +60,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 40] = [
+pub const BINDINGS: [Binding; 41] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
     bind(Key::ArrowLeft, Action::StepBack, "Left arrow", "Undo the latest step"),
@@ -97,6 +98,7 @@ pub const BINDINGS: [Binding; 40] = [
     bind(Key::X, Action::Magnify, "X", "Next magnification of the clearance"),
     bind(Key::M, Action::Sound, "M", "Sound on or off: a click for every impact"),
     bind(Key::L, Action::Microscope, "L", "Microscope on the ball joint in focus, shown or hidden"),
+    bind(Key::I, Action::ImpactList, "I", "Impact list shown or hidden"),
     bind(Key::G, Action::IdealGhost, "G", "Ideal ghost: the machine without play, shown or hidden"),
     bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),

@@ -154,14 +154,12 @@ impl App {
         }
         if self.is_presenting() {
             self.presentation_ui(ui);
-            self.point_out(ui);
-            return self.dialog_ui(ui.ctx());
+            return self.over_all(ui);
         }
         if self.embedded().is_some() {
             let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(8, 4));
             self.embedded_ui(ui, bar);
-            self.point_out(ui);
-            return self.dialog_ui(ui.ctx());
+            return self.over_all(ui);
         }
         let margin = if arrangement == Arrangement::Landscape {
             egui::Margin::symmetric(12, 4)
@@ -175,6 +173,12 @@ impl App {
             Arrangement::Portrait => self.portrait(ui, bar),
             Arrangement::Landscape => self.landscape(ui, bar),
         }
+        self.over_all(ui);
+    }
+
+    /// What lies over all panels.
+    fn over_all(&mut self, ui: &Ui) {
+        self.impact_list_ui(ui.ctx());
         self.point_out(ui);
         self.dialog_ui(ui.ctx());
     }
@@ -431,8 +435,8 @@ impl App {
         self.picture_rect = area;
         let presenting = self.is_presenting() || self.embedded().is_some();
         self.player.place_ghost();
-        let caption = self.is_presenting().then(|| self.caption_plate(ui));
-        let above = caption.flatten().map(|(_, plate)| plate);
+        let caption = self.caption_plate(ui);
+        let above = caption.as_ref().map(|(_, plate)| *plate);
         self.viewport.ui(ui, &self.player, plain, above);
         if let Some(joint) = self.viewport.take_clicked() {
             self.focus(joint);
@@ -474,6 +478,7 @@ impl App {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
             }
         });
+        self.caption(ui, caption);
         drop_hint(ui, area);
         let messages = self.messages(ui, inner);
         self.notice_plate(ui, messages);

@@ -361,5 +361,6 @@ impl App {
             self.sound_switch(ui);
         });
         self.ideal_switch(ui);
+        self.impact_switch(ui);
     }
 }

@@ -24,6 +24,7 @@ mod headless;
 mod host;
 mod icons;
 mod ideal;
+mod impact_list;
 mod keys;
 mod layout;
 mod lesson;
@@ -282,6 +283,7 @@ pub struct App {
     changes_seen: bool,
     announcer: Announcer,
     microscope: Microscope,
+    impact_list: impact_list::ImpactList,
     picture: Picture,
     /// A film being made.
     film: Option<film::Making>,
@@ -350,6 +352,7 @@ impl App {
             changes_seen: false,
             announcer: Announcer::default(),
             microscope: Microscope::default(),
+            impact_list: impact_list::ImpactList::default(),
             picture: Picture::default(),
             film: None,
             film_wanted: None,
@@ -792,6 +795,7 @@ impl App {
                 let open = !self.microscope.is_open();
                 self.microscope.set_open(open);
             }
+            Action::ImpactList => self.show_impact_list(!self.has_impact_list()),
             Action::Magnify => self.viewport.next_magnification(),
             Action::Sound => self.set_sound(!self.is_sounding()),
             Action::Arrows => {

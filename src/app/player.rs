@@ -2,6 +2,7 @@
 
 pub mod blows;
 pub mod contact_history;
+pub mod impact_record;
 mod keyframes;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use crate::simulate::{
 };
 use blows::Blows;
 use contact_history::ContactHistory;
+use impact_record::ImpactRecord;
 use keyframes::Keyframes;
 use travel::ContactSearch;
 pub use travel::{AbandonedFuture, Flag};
@@ -66,6 +68,7 @@ pub struct Player {
     near: Option<Box<History>>,
     contact_history: ContactHistory,
     blows: Blows,
+    impact_record: ImpactRecord,
     recorded: Frame,
     /// Time up to which the latest steps were recorded, s.
     recorded_to: f64,
@@ -159,6 +162,7 @@ impl Player {
             stepping: 0.0,
             log: Log::new(&scene.changes),
             sections: None,
+            impact_record: ImpactRecord::default(),
             watch: RunWatch::new(scene),
             twin: None,
             gravity: Gravity::new(scene.gravity),
@@ -710,6 +714,7 @@ impl Player {
                     self.record(peak);
                     self.pass_peaks(peak);
                 }
+                self.impact_record.record(&mut self.simulation);
                 self.record(end);
             }
         }

@@ -12,6 +12,8 @@ const LEAST_TEXT: f32 = 1.0 / 40.0;
 const SMALLEST: f32 = 11.0;
 /// Type of the caption, points.
 const CAPTION: f32 = 24.0;
+/// Type of the badge of an impact in a window, points.
+const BADGE: f32 = 15.0;
 /// Room about its words, points.
 const PAD: Vec2 = vec2(12.0, 4.0);
 /// Width that the time takes in the corner of the picture, points.
@@ -113,7 +115,6 @@ impl App {
         self.lesson_beside(ui, bar);
         self.lesson_plots(ui, bar);
         self.central(ui, asked);
-        self.caption(ui);
         if leave {
             self.present(ui.ctx(), false);
         }
@@ -149,25 +150,35 @@ impl App {
         Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
     }
 
-    /// The words of the caption and the plate they stand on.
+    /// The words of the caption and the plate they stand on: the impact under way at an instant that is looked at; in a
+    /// presentation, otherwise, the last one that ended.
     pub(super) fn caption_plate(&self, ui: &Ui) -> Option<(Arc<Galley>, Rect)> {
-        let area = self.picture_rect;
+        let presenting = self.is_presenting();
+        let area = ui.available_rect_before_wrap();
         let ink = ui.visuals().strong_text_color();
-        let text = self.last_impact()?;
+        if !presenting && (!overlay::has_room(area) || self.picture.is_plain()) {
+            return None;
+        }
+        let text = self.impact_badge().or_else(|| self.last_impact().filter(|_| presenting))?;
         let lay = |size| {
             let font = FontId::proportional(size);
             ui.painter().layout_no_wrap(text.clone(), font, ink)
         };
         let mut inside = area.shrink(12.0);
-        let mut words = lay(CAPTION);
+        if !presenting {
+            // Below the buttons and the time.
+            inside.min.y += overlay::plate(2)[1].max(ui.spacing().interact_size.y + 8.0);
+        }
+        let full = if presenting { CAPTION } else { BADGE };
+        let mut words = lay(full);
         let room = inside.width() - 2.0 * PAD.x;
         if words.size().x > room {
-            words = lay((CAPTION * room / words.size().x).max(SMALLEST));
+            words = lay((full * room / words.size().x).max(SMALLEST));
         }
         let middle = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
         // Beside a lesson there is no room in the middle: the time stands on the left. Beside the microscope, too, there is
         // room below the time alone.
-        let place = if middle.left() >= area.left() + TIME {
+        let place = if !presenting || middle.left() >= area.left() + TIME {
             middle
         } else {
             if inside.right() - words.size().x < area.left() + TIME {
@@ -178,8 +189,8 @@ impl App {
         Some((words, place.expand2(PAD)))
     }
 
-    fn caption(&self, ui: &mut Ui) {
-        let Some((words, plate)) = self.caption_plate(ui) else {
+    pub(super) fn caption(&self, ui: &Ui, caption: Option<(Arc<Galley>, Rect)>) {
+        let Some((words, plate)) = caption else {
             return;
         };
         let painter = ui.painter_at(self.picture_rect);
@@ -188,9 +199,13 @@ impl App {
         painter.galley(plate.min + PAD, words, ui.visuals().strong_text_color());
         let response = ui.interact(plate, Id::unique("last impact"), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &text));
-        response.on_hover_text(
-            "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched",
-        );
+        let help = if self.impact_badge().is_some() {
+            "The impact at this instant: its number and ball joint, when it began, its largest normal force, how long the ball \
+             touched, approach and rebound speed"
+        } else {
+            "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched"
+        };
+        response.on_hover_text(help);
     }
 }
 

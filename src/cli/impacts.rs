@@ -6,26 +6,10 @@ use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
 use super::output::{RowsFile, Table};
+use crate::analysis::impact_row::{COLUMNS, row};
 use crate::files::PendingFile;
 use crate::scene::Scene;
 use crate::simulate::{Impact, Simulation};
-
-const COLUMNS: [&str; 14] = [
-    "joint",
-    "start_s",
-    "end_s",
-    "approach_m_s",
-    "separation_m_s",
-    "restitution_asked",
-    "restitution_law",
-    "restitution_given",
-    "floored",
-    "disturbed",
-    "steps",
-    "deepest_m",
-    "peak_N",
-    "damping_over_elastic",
-];
 
 /// Collects the impacts of a run for a file.
 pub struct ImpactsFile {
@@ -73,26 +57,7 @@ impl ImpactsFile {
         meta.insert("rows".into(), json!(self.impacts.len()));
         // Indices in the column `joint`, from 0.
         meta.insert("ball_joints".into(), json!(names));
-        let flag = |is: bool| f64::from(u8::from(is));
-        let rows = self.impacts.iter().map(|impact| {
-            [
-                impact.joint as f64,
-                impact.start,
-                impact.end,
-                impact.approach_speed,
-                impact.separation_speed,
-                impact.asked,
-                impact.law,
-                impact.achieved(),
-                flag(impact.floored),
-                flag(impact.disturbed),
-                impact.steps as f64,
-                impact.deepest,
-                impact.peak,
-                impact.damping,
-            ]
-        });
-        let table = Table::of_rows(COLUMNS, rows);
+        let table = Table::of_rows(COLUMNS, self.impacts.iter().map(row));
         let files = self.file.fill(&table, meta)?;
         Ok((self.impacts.len(), files))
     }

@@ -12,6 +12,7 @@ mod frames;
 mod golden;
 mod hands;
 mod headless_window;
+mod impacts;
 mod instruments;
 mod lecture;
 mod lessons;

@@ -2,6 +2,7 @@
 //! taking the same steps again, with the logged events on the way. The result is the same to the bit.
 
 use super::contact_history::ContactHistory;
+use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
 use super::{FINEST_BIN, Player, sentences};
 use crate::app::log::{Entry, Event};
@@ -11,6 +12,9 @@ use crate::simulate::{Bin, History, Pull};
 
 /// Most steps retaken before a past instant, so that the plots show in detail what led to it.
 const LEAD: u64 = 512;
+
+/// How long after its beginning the end of the impact that is sought is waited for, s.
+const LONGEST_IMPACT: f64 = 10e-3;
 
 /// How far ahead the next contact is sought, s.
 const FARTHEST: f64 = 5.0;
@@ -79,6 +83,16 @@ impl Player {
     /// When the ball joints were free, slid or crept.
     pub fn contact_history(&self) -> &ContactHistory {
         &self.contact_history
+    }
+
+    /// The finished impacts of the run.
+    pub fn impact_record(&self) -> &ImpactRecord {
+        &self.impact_record
+    }
+
+    /// Whether the impact that began at `time`, s, has ended, or lasts so long that its end is not waited for.
+    fn is_impact_over(&self, joint: Option<usize>, time: f64) -> bool {
+        self.simulation.time() > time + LONGEST_IMPACT || self.impact_record.under_way(joint, time).is_some()
     }
 
     /// What was done to the run, its future included; of a pull only the beginning and the end.
@@ -163,6 +177,8 @@ impl Player {
         let found = loop {
             let found = self.contact_history.next_contact(sought.joint, from, true);
             let over = self.simulation.time() > sought.until || self.stopped.is_some();
+            // Its numbers are shown with it, so it has to be over.
+            let found = found.filter(|time| over || self.is_impact_over(sought.joint, *time));
             if found.is_some() || over || !self.pacer.may_step((self.clock)() - start) {
                 break found.map_or(over.then_some(f64::INFINITY), Some);
             }
@@ -358,6 +374,7 @@ impl Player {
         }
         self.contact_history.cut(start);
         self.blows.cut(start);
+        self.impact_record.cut(start_steps);
         self.watch.cut(start);
         self.keyframes.cut(start_steps);
         self.near = None;
@@ -404,6 +421,7 @@ impl Player {
         self.sought = None;
         self.contact_history.begin(0.0);
         self.blows.clear();
+        self.impact_record.begin();
         self.event_times.clear();
         (self.applied, self.most_steps) = (0, 0);
         (self.reached, self.recorded_to) = (0.0, 0.0);

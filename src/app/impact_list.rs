@@ -1,0 +1,257 @@
+//! The list of impacts: a row for each that has ended, the latest first; and the badge over the picture at the instant of one.
+
+use std::fmt::Write as _;
+
+use eframe::egui::{self, Align, Label, Layout, RichText, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+use serde_json::json;
+
+use super::host::SaveFile;
+use super::player::Player;
+use super::{App, value};
+use crate::analysis::impact_row;
+use crate::simulate::Impact;
+
+/// Height of a row, points.
+const ROW: f32 = 20.0;
+/// Most rows in sight at first.
+const ROWS: f32 = 9.0;
+
+/// A column: heading, width in points, what it says.
+type Column = (&'static str, f32, &'static str);
+
+const COLUMNS: [Column; 9] = [
+    ("No.", 44.0, "Number of the impact in this run, in the order in which impacts began"),
+    ("Joint", 58.0, "Ball joint"),
+    ("Time", 82.0, "Instant at which it began"),
+    ("Duration", 62.0, "From its beginning to its end"),
+    ("Peak", 62.0, "Largest normal force"),
+    ("Approach", 74.0, "Approach speed: penetration rate when it began"),
+    ("Rebound", 74.0, "Rebound speed: minus the penetration rate when it ended"),
+    ("Restitution", 70.0, "Rebound speed over approach speed"),
+    (
+        "Law",
+        106.0,
+        "Restitution that the normal-force law gives an undisturbed impact. Disturbed: another joint was in contact meanwhile or \
+         a parameter changed, so the law alone does not set the ratio. Slow: it began below the impact speed floor and rebounds \
+         higher.",
+    ),
+];
+
+/// The panel.
+#[derive(Default)]
+pub struct ImpactList {
+    open: bool,
+}
+
+/// A duration, to three digits.
+fn duration(seconds: f64) -> String {
+    let unit = match seconds {
+        _ if seconds < 1e-3 => "us",
+        _ if seconds < 1.0 => "ms",
+        _ => "s",
+    };
+    value::quantity(seconds, unit, 3)
+}
+
+/// A speed in mm/s, to three digits, without its unit.
+fn millimetres(speed: f64) -> String {
+    value::number(1e3 * speed, 3)
+}
+
+/// Restitution of the law, and why an impact may have another.
+fn law(impact: &Impact) -> String {
+    let law = value::number(impact.law, 3);
+    match (impact.disturbed, impact.floored) {
+        (true, _) => format!("{law}, disturbed"),
+        (false, true) => format!("{law}, slow"),
+        (false, false) => law,
+    }
+}
+
+/// What the columns say of an impact.
+fn cells(player: &Player, number: u64, impact: &Impact) -> [String; COLUMNS.len()] {
+    [
+        number.to_string(),
+        joint(player, impact),
+        value::time(impact.start),
+        duration(impact.end - impact.start),
+        value::quantity(impact.peak, "N", 3),
+        format!("{} mm/s", millimetres(impact.approach_speed)),
+        format!("{} mm/s", millimetres(impact.separation_speed)),
+        value::number(impact.achieved(), 3),
+        law(impact),
+    ]
+}
+
+fn joint(player: &Player, impact: &Impact) -> String {
+    let joints = &player.scene().ball_joints;
+    joints.get(impact.joint).map_or_else(String::new, |joint| joint.name.clone())
+}
+
+/// A row of cells in the widths of the columns.
+fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        for (index, (_, width, _)) in COLUMNS.iter().enumerate() {
+            ui.allocate_ui_with_layout(vec2(*width, ROW), Layout::left_to_right(Align::Center), |ui| {
+                ui.set_width(*width);
+                cell(ui, index);
+            });
+        }
+    });
+}
+
+impl ImpactList {
+    /// The table. Returns the instant of a row that was clicked, s.
+    fn table(ui: &mut Ui, player: &Player) -> Option<f64> {
+        let (shown, known) = (player.pacer.shown(), player.reached());
+        let record = player.impact_record();
+        let count = record.until(known).count();
+        let mut asked = None;
+        ui.spacing_mut().interact_size.y = ROW;
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let width = COLUMNS.iter().map(|(_, width, _)| width + 4.0).sum::<f32>();
+        ScrollArea::horizontal().id_salt("impacts sideways").auto_shrink([false, true]).show(ui, |ui| {
+            ui.set_min_width(width);
+            row(ui, |ui, index| {
+                let (heading, _, help) = COLUMNS[index];
+                ui.label(RichText::new(heading).small().strong()).on_hover_text(help);
+            });
+            ui.separator();
+            if count == 0 {
+                ui.label(RichText::new("No impact has ended yet").weak());
+                return;
+            }
+            let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]).max_height(ROWS * ROW);
+            place.show_rows(ui, ROW, count, |ui, rows| {
+                let seen = record.until(known).rev().skip(rows.start).take(rows.len());
+                for (number, impact) in seen {
+                    let words = cells(player, number, impact);
+                    let later = impact.end > shown;
+                    let top = ui.cursor().min;
+                    let place = egui::Rect::from_min_size(top, vec2(width, ROW));
+                    let response = ui.interact(place, ui.scope_id().with(("impact", number)), Sense::click());
+                    if response.hovered() {
+                        ui.painter().rect_filled(place, 3.0, ui.visuals().widgets.hovered.weak_bg_fill);
+                    }
+                    let all = format!("Impact {}", words.join(", "));
+                    response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &all));
+                    if response.on_hover_text("Go to its instant").clicked() {
+                        asked = Some(impact.start);
+                    }
+                    row(ui, |ui, index| {
+                        let mut text = RichText::new(&words[index]).small();
+                        if later {
+                            text = text.weak();
+                        }
+                        ui.add(Label::new(text).truncate().selectable(false));
+                    });
+                }
+            });
+        });
+        if record.dropped() > 0 {
+            let words = format!("The first {} impacts are no longer kept", record.dropped());
+            ui.label(RichText::new(words).small().weak());
+        }
+        asked
+    }
+}
+
+impl App {
+    /// Whether the list of impacts is shown.
+    pub fn has_impact_list(&self) -> bool {
+        self.impact_list.open
+    }
+
+    /// Shows or closes the list of impacts.
+    pub fn show_impact_list(&mut self, open: bool) {
+        self.impact_list.open = open;
+    }
+
+    /// The switch in the view menu.
+    pub(super) fn impact_switch(&mut self, ui: &mut Ui) {
+        ui.checkbox(&mut self.impact_list.open, "Impact list").on_hover_text(
+            "A row for each impact: time, duration, peak force, approach and rebound speed, restitution (key I)",
+        );
+    }
+
+    /// The list, in a window of its own over the lower left of the picture.
+    pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context) {
+        let (mut open, mut asked, mut save) = (self.impact_list.open, None, false);
+        let area = self.picture_rect;
+        let free = !self.is_under_way() && self.dialog.is_none();
+        egui::Window::new("Impacts")
+            .open(&mut open)
+            .resizable([true, false])
+            .collapsible(false)
+            .pivot(egui::Align2::LEFT_BOTTOM)
+            .default_pos(area.left_bottom() + vec2(10.0, -10.0))
+            .default_width((area.width() - 40.0).clamp(220.0, 680.0))
+            .enabled(free)
+            .show(ctx, |ui| {
+                asked = ImpactList::table(ui, &self.player);
+                ui.add_space(4.0);
+                save = ui
+                    .button("Save impacts…")
+                    .on_hover_text("All of them, CSV, with the columns of `run --impacts`")
+                    .clicked();
+            });
+        self.impact_list.open = open;
+        if save {
+            self.save_impacts();
+        }
+        if let Some(time) = asked {
+            self.player.go_to(time);
+            self.viewport.arrive(&self.player);
+        }
+    }
+
+    /// The impact under way at the instant shown, in a line: `>>` and `<<` arrive at one. `None` while time passes.
+    pub fn impact_badge(&self) -> Option<String> {
+        let player = &self.player;
+        if player.is_playing() {
+            return None;
+        }
+        let shown = player.pacer.shown();
+        let record = player.impact_record();
+        let followed = self.viewport.focus().and_then(|joint| record.under_way(Some(joint), shown));
+        let (number, impact) = followed.or_else(|| record.under_way(None, shown))?;
+        let speed = |speed| millimetres(speed);
+        Some(format!(
+            "Impact {number}, {}: {}, peak {}, {}, {} to {} mm/s",
+            joint(player, impact),
+            value::time(impact.start),
+            value::quantity(impact.peak, "N", 3),
+            duration(impact.end - impact.start),
+            speed(impact.approach_speed),
+            speed(impact.separation_speed)
+        ))
+    }
+
+    /// Saves the impacts of the run up to the instant shown.
+    pub fn save_impacts(&mut self) {
+        let player = &self.player;
+        let mut text = impact_row::COLUMNS.join(",");
+        text.push('\n');
+        let mut rows = 0;
+        for (_, impact) in player.impact_record().until(player.pacer.shown()) {
+            rows += 1;
+            let values = impact_row::row(impact).map(|value| value.to_string());
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{}", values.join(","));
+        }
+        let names: Vec<&str> = player.scene().ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+        let more = [
+            ("rows", json!(rows)),
+            // Indices in the column `joint`, from 0.
+            ("ball_joints", json!(names)),
+            ("impacts_no_longer_kept", json!(player.impact_record().dropped())),
+        ];
+        let name = format!("{}-impacts.csv", self.file_stem());
+        let meta = super::files::meta(player, more);
+        self.save(vec![
+            SaveFile { name: name.clone(), mime: "text/csv", bytes: text.into_bytes() },
+            SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
+        ]);
+    }
+}

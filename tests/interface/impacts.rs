@@ -1,0 +1,139 @@
+//! The list of impacts, its file, the badge at an impact, and the file of the plots: all numbers are those of the run's own records.
+
+use eframe::egui::{self, Key};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use jointplay::app::{App, AppOptions};
+use jointplay::scene::Scene;
+use jointplay::simulate::{Impact, Simulation};
+
+use crate::page::open;
+use crate::window::{click, shown, sized};
+
+/// The impacts of a run of the same scene until `time`, s, in the order in which they began.
+fn of_run(app: &App, time: f64) -> Vec<Impact> {
+    let mut simulation = Simulation::new(app.player().scene()).expect("starts");
+    let mut impacts = Vec::new();
+    while simulation.time() < time {
+        simulation.step().expect("runs");
+        simulation.take_impacts(&mut impacts);
+    }
+    impacts.retain(|impact| impact.end <= time);
+    impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
+    impacts
+}
+
+/// The numbers in a text, in order.
+fn numbers(text: &str) -> Vec<f64> {
+    let digit = |c: char| c.is_ascii_digit() || c == '.' || c == '-';
+    text.split(|c| !digit(c)).filter_map(|word| word.parse().ok()).collect()
+}
+
+fn near(found: f64, expected: f64) -> bool {
+    (found / expected - 1.0).abs() < 6e-3
+}
+
+#[test]
+fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_instant() {
+    let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(40e-3);
+    harness.run();
+    let impacts = of_run(harness.state(), 40e-3);
+    assert!(impacts.len() > 9, "{}", impacts.len());
+    let before = harness.state().player().simulation().state_hash();
+    harness.key_press(Key::I);
+    harness.run();
+    assert!(harness.state().has_impact_list());
+    // The latest comes first.
+    let names = ["S1", "S2", "S3"];
+    for (at, impact) in impacts.iter().enumerate().rev().take(3) {
+        let number = at + 1;
+        let start = format!("Impact {number}, {}, ", names[impact.joint]);
+        let row = harness.get_by_label_contains(&start);
+        let words = row.accesskit_node().label().expect("a label");
+        let rest = words.split_once(names[impact.joint]).expect("the joint").1;
+        let found = numbers(rest);
+        let expected = [
+            impact.start * 1e3,
+            (impact.end - impact.start) * 1e6,
+            impact.peak,
+            impact.approach_speed * 1e3,
+            impact.separation_speed * 1e3,
+            impact.achieved(),
+            impact.law,
+        ];
+        assert_eq!(found.len(), expected.len(), "{words}");
+        assert!(found.iter().zip(expected).all(|(a, b)| near(*a, b)), "{words}: {expected:?}");
+        assert_eq!(words.contains("disturbed"), impact.disturbed, "{words}");
+    }
+    assert_eq!(harness.state().player().simulation().state_hash(), before);
+    let last = impacts.last().expect("some");
+    harness.get_by_label_contains(&format!("Impact {}, ", impacts.len())).click();
+    harness.run();
+    assert!((shown(&harness) - last.start).abs() < 1e-9);
+    // It is under way now.
+    let badge = harness.state().impact_badge().expect("a badge");
+    assert!(badge.starts_with(&format!("Impact {}, ", impacts.len())), "{badge}");
+}
+
+#[test]
+fn the_badge_at_an_impact_says_what_the_run_recorded() {
+    for presenting in [false, true] {
+        let mut harness = sized("spcmm", [1280.0, 720.0], egui::Theme::Light);
+        if presenting {
+            harness.key_press(Key::F5);
+            harness.step();
+        }
+        assert_eq!(harness.state().impact_badge(), None);
+        harness.key_press(Key::Period);
+        harness.step();
+        while harness.state().player().is_seeking() {
+            harness.step();
+        }
+        harness.run();
+        let badge = harness.state().impact_badge().expect("stands at an impact");
+        harness.get_by_label(&badge);
+        let impact = of_run(harness.state(), 9e-3)[0];
+        assert!(badge.starts_with("Impact 1, S1: 7.80"), "{badge}");
+        let found = numbers(badge.split_once(": ").expect("numbers").1);
+        let expected = [
+            impact.start * 1e3,
+            impact.peak,
+            (impact.end - impact.start) * 1e6,
+            impact.approach_speed * 1e3,
+            impact.separation_speed * 1e3,
+        ];
+        assert_eq!(found.len(), 5, "{badge}");
+        assert!(found.iter().zip(expected).all(|(a, b)| near(*a, b)), "{badge}: {expected:?}");
+        harness.key_press(Key::Space);
+        harness.step();
+        assert_eq!(harness.state().impact_badge(), None, "not while time passes");
+    }
+}
+
+#[test]
+fn the_file_has_the_columns_and_values_of_the_command_line_s() {
+    let scene = Scene::load("spcmm", &[]).expect("built in");
+    let options = AppOptions { playing: false, ..AppOptions::new(scene) };
+    let (mut harness, calls) = open(options, [1280.0, 800.0]);
+    harness.state_mut().player_mut().run_to(30e-3);
+    // What was gone back from counts no more than once.
+    harness.state_mut().player_mut().go_to(10e-3);
+    harness.state_mut().player_mut().go_to(30e-3);
+    harness.run();
+    click(&mut harness, "Save");
+    click(&mut harness, "Impacts…");
+    let saved = calls.borrow().saved.clone();
+    assert!(saved[0].name.ends_with("-impacts.csv") && saved[1].name.ends_with(".meta.json"));
+    let text = String::from_utf8(saved[0].bytes.clone()).expect("text");
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    assert_eq!(header[..3], ["joint", "start_s", "end_s"]);
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|value| value.parse().expect("a number")).collect()).collect();
+    let expected = of_run(harness.state(), shown(&harness));
+    assert_eq!(rows.len(), expected.len());
+    for (row, impact) in rows.iter().zip(&expected) {
+        let own = jointplay::analysis::impact_row::row(impact);
+        assert_eq!(row[..], own[..]);
+    }
+}
