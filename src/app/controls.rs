@@ -62,6 +62,11 @@ impl Controls {
         self.joint = 0;
     }
 
+    /// Forgets half-typed values alone.
+    pub fn forget_drafts(&mut self) {
+        self.drafts.clear();
+    }
+
     /// All controls, one under the other.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
         ui.label(RichText::new(&player.scene().title).small().weak()).on_hover_text(&player.scene().description);

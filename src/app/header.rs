@@ -74,6 +74,7 @@ impl App {
             };
             layout::menu(ui, "Save", true, save).on_hover_text("Save a picture, a film, the data or the scene");
             self.link_button(ui);
+            self.undo_buttons(ui);
             layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
                 .on_hover_text("Ten lessons on play in joints, step by step");
             let panels = [
@@ -203,6 +204,7 @@ impl App {
         self.save_menu(ui);
         ui.separator();
         ui.label(RichText::new("Lessons").small().weak());
+        self.undo_entries(ui);
         self.lesson_menu(ui);
         ui.separator();
         theme_box(ui);

@@ -21,6 +21,8 @@ pub enum Icon {
     After,
     /// Curved arrow: back to the default.
     Undo,
+    /// The same the other way round.
+    Redo,
 }
 
 /// A button with a painted icon, `name` as its label and `help` as its tooltip. `prominent` fills it.
@@ -77,22 +79,24 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, colour: Color32) {
                 painter.add(triangle([point(0.0, 0.1), point(0.5, 0.5), point(0.0, 0.9)]));
             }
         }
-        Icon::Undo => {
+        Icon::Undo | Icon::Redo => {
             let centre = rect.center();
             let radius = rect.width() * 0.46;
+            let mirrored = |p: Pos2| if icon == Icon::Redo { pos2(2.0 * centre.x - p.x, p.y) } else { p };
             let on_circle = |turn: f32| {
                 let angle = turn * std::f32::consts::TAU;
                 centre + radius * vec2(angle.cos(), angle.sin())
             };
-            let points: Vec<Pos2> = (0..=20).map(|i| on_circle(0.70 + 0.78 * i as f32 / 20.0)).collect();
+            let points: Vec<Pos2> = (0..=20).map(|i| mirrored(on_circle(0.70 + 0.78 * i as f32 / 20.0))).collect();
             painter.add(Shape::line(points, Stroke::new(1.6, colour)));
             let tip = on_circle(0.70);
             let size = rect.width() * 0.34;
-            painter.add(triangle([
+            let head = [
                 pos2(tip.x - size * 0.75, tip.y + size * 0.55),
                 pos2(tip.x - size * 0.25, tip.y - size * 0.75),
                 pos2(tip.x + size * 0.65, tip.y + size * 0.35),
-            ]));
+            ];
+            painter.add(triangle(head.map(mirrored)));
         }
     }
 }

@@ -120,7 +120,7 @@ pub const BINDINGS: [Binding; 41] = [
 ];
 
 /// Mouse and touch, for the overlay.
-pub const POINTER: [(&str, &str); 12] = [
+pub const POINTER: [(&str, &str); 13] = [
     ("Drag beside the machine, one finger", "Turn the view"),
     ("Drag on a body; a finger stays first", "Pull it by a spring; with shift along the line of sight"),
     ("Right or middle drag, shift-drag, two fingers", "Pan the view"),
@@ -130,6 +130,7 @@ pub const POINTER: [(&str, &str); 12] = [
     ("Double-click, double tap", "Follow a body or joint; on the ground: stop following"),
     ("Double-click, double tap on the lowest bar", "Presentation, as F5"),
     ("Ctrl +, Ctrl -, Ctrl 0", "Larger, smaller and default type"),
+    ("Ctrl Z, Ctrl Shift Z", "Undo and redo a change of a parameter or of the view"),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),
     ("Arrows after a drag on a slider", "Move that slider"),

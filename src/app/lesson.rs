@@ -383,6 +383,8 @@ impl App {
                     self.problem = Some(error.to_string());
                 }
             }
+            // Not the user's.
+            self.player.take_edits();
             if begin.twin {
                 self.player.set_twin(true);
             }

@@ -54,6 +54,7 @@ mod theme;
 mod timeline;
 mod transport;
 mod twin;
+mod undo;
 mod value;
 mod viewport;
 mod watch;
@@ -284,6 +285,7 @@ pub struct App {
     announcer: Announcer,
     microscope: Microscope,
     impact_list: impact_list::ImpactList,
+    undo: undo::Undo,
     picture: Picture,
     /// A film being made.
     film: Option<film::Making>,
@@ -353,6 +355,7 @@ impl App {
             announcer: Announcer::default(),
             microscope: Microscope::default(),
             impact_list: impact_list::ImpactList::default(),
+            undo: undo::Undo::default(),
             picture: Picture::default(),
             film: None,
             film_wanted: None,
@@ -557,6 +560,7 @@ impl App {
         let Some(arrival) = load.advance(&mut self.player, may_step) else {
             return;
         };
+        self.player.take_edits();
         match arrival {
             Ok(()) => {
                 self.player.set_twin(*twin);
@@ -683,6 +687,8 @@ impl App {
         if let Some(replay) = &mut self.replay {
             let may_step = replay_budget(self.player.clock);
             self.verdict = replay.advance(&mut self.player, may_step);
+            // What the link did is not to be undone.
+            self.player.take_edits();
             if self.verdict.is_some() {
                 self.verdict_shown = None;
                 self.replay = None;
@@ -727,6 +733,7 @@ impl App {
             self.plots.begin(scene);
         }
         self.controls.clear();
+        self.undo.clear();
         self.problem = None;
         self.replay = None;
         self.load = None;
@@ -917,6 +924,7 @@ impl eframe::App for App {
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
             return;
         }
+        self.follow_changes(ctx);
         for action in keys::pressed(ctx) {
             self.act(ctx, action);
         }

@@ -84,6 +84,8 @@ pub struct Player {
     sought: Option<ContactSearch>,
     /// What was done since the start.
     log: Log,
+    /// Changes of parameters since they were last taken.
+    edits: Vec<Edit>,
     /// Number of log entries before the displayed instant; and the time of every entry, s.
     applied: usize,
     event_times: Vec<f64>,
@@ -97,6 +99,22 @@ pub struct Player {
     /// Simulated time and the stepping time that it took, s, both fading.
     stepped: f64,
     stepping: f64,
+}
+
+/// A change of a parameter: the texts before and after, `None` where the scene's file decides.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Edit {
+    /// Key.
+    pub key: String,
+    #[allow(missing_docs)]
+    pub before: Option<String>,
+    #[allow(missing_docs)]
+    pub after: Option<String>,
+}
+
+/// Text of `key` among `changes`.
+fn changed(changes: &[(String, String)], key: &str) -> Option<String> {
+    changes.iter().rev().find(|(other, _)| other == key).map(|(_, text)| text.clone())
 }
 
 /// Seconds of viewing that the automatic window of the plots shows.
@@ -144,6 +162,7 @@ impl Player {
             near: None,
             contact_history: ContactHistory::default(),
             blows: Blows::default(),
+            impact_record: ImpactRecord::default(),
             channels,
             picks: Vec::new(),
             recorded: Frame::default(),
@@ -161,8 +180,8 @@ impl Player {
             stepped: 0.0,
             stepping: 0.0,
             log: Log::new(&scene.changes),
+            edits: Vec::new(),
             sections: None,
-            impact_record: ImpactRecord::default(),
             watch: RunWatch::new(scene),
             twin: None,
             gravity: Gravity::new(scene.gravity),
@@ -522,9 +541,45 @@ impl Player {
             self.wanted().clone().set(key, value)?;
             self.branch();
         }
+        let before = self.wanted().changes.clone();
         let effect = self.apply_set(key, value)?;
         self.note(Event::set(key, value));
+        self.note_edits(&before);
         Ok(effect)
+    }
+
+    /// Notes what differs from the changes `before`.
+    fn note_edits(&mut self, before: &[(String, String)]) {
+        let after = &self.simulation.scene().changes;
+        for (key, _) in before.iter().chain(after) {
+            let (old, new) = (changed(before, key), changed(after, key));
+            if old == new {
+                continue;
+            }
+            match self.edits.iter_mut().find(|edit| edit.key == *key) {
+                Some(edit) => edit.after = new,
+                None => self.edits.push(Edit { key: key.clone(), before: old, after: new }),
+            }
+        }
+    }
+
+    /// Changes of parameters by the user since the last call.
+    pub(super) fn take_edits(&mut self) -> Vec<Edit> {
+        std::mem::take(&mut self.edits)
+    }
+
+    /// Gives `key` the value `text` again, or without one that of the scene's file.
+    ///
+    /// # Errors
+    /// As [`Self::set`].
+    pub(super) fn put_back(&mut self, key: &str, text: Option<&str>) -> Result<(), ChangeError> {
+        if changed(&self.wanted().changes, key).as_deref() == text {
+            return Ok(());
+        }
+        match text {
+            Some(text) => self.set(key, text).map(|_| ()),
+            None => self.set_original(key).map(|_| ()),
+        }
     }
 
     fn apply_set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
@@ -553,9 +608,11 @@ impl Player {
     pub fn set_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
         self.original.get(key)?;
         self.branch();
+        let before = self.wanted().changes.clone();
         let effect = self.apply_original(key)?;
         let key = key.to_owned();
         self.note(Event::Original { key });
+        self.note_edits(&before);
         Ok(effect)
     }
 
@@ -657,6 +714,7 @@ impl Player {
             Ok(()) => {
                 self.unchanged = None;
                 self.simulation.take_peaks(&mut self.coming);
+                self.impact_record.record(&mut self.simulation);
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
@@ -714,7 +772,6 @@ impl Player {
                     self.record(peak);
                     self.pass_peaks(peak);
                 }
-                self.impact_record.record(&mut self.simulation);
                 self.record(end);
             }
         }

@@ -61,7 +61,7 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
 }
 
 /// Name and displayed value of `key` of `scene`; `None` if the scene has no such key.
-fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
+pub(super) fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
     let (value, parameter) = (scene.get(key).ok()?, scene.parameter(key).ok()?);
     let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
         Some((joint, _)) => format!("{} of {joint}", parameter.label),

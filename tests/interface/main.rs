@@ -24,4 +24,5 @@ mod reload;
 mod readings;
 mod sound;
 mod touch;
+mod undo;
 mod window;

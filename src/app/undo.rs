@@ -1,0 +1,329 @@
+//! Undo and redo of what was changed: parameters of the scene, and the view. A gesture, such as a drag on a slider, is one change.
+//!
+//! Undoing a parameter changes it at the instant shown, like any other change: it does not go back in time.
+
+use eframe::egui::{self, Key, Modifiers, Ui};
+
+use super::icons::{Icon, icon_button};
+use super::player::Edit;
+use super::plots::Window;
+use super::share::CameraPose;
+use super::{App, layout, theme, value};
+use crate::scene::Scene;
+use crate::simulate::Quantity;
+use crate::view::{Picked, Quality, ViewOptions};
+
+/// Most changes kept; the oldest are dropped.
+const KEPT: usize = 200;
+/// Changes of the same thing that follow each other within this time are one, s: notches of a wheel, arrows on a slider.
+const TOGETHER: f64 = 0.5;
+/// Side of a button in the header, points.
+const BUTTON: f32 = 26.0;
+/// What chooses several parameters at once: it comes first.
+const PRESET: &str = "solver.preset";
+
+/// What the user has chosen about the view.
+#[derive(Clone, Debug, PartialEq)]
+struct View {
+    options: ViewOptions,
+    camera: CameraPose,
+    followed: Option<Picked>,
+    chosen: Vec<Quantity>,
+    picked: Vec<String>,
+    window: Window,
+}
+
+impl View {
+    fn of(app: &App) -> Option<Self> {
+        let mut options = app.viewport.options.clone();
+        // Not chosen by hand.
+        options.quality = Quality::FULL;
+        options.theme = crate::view::Theme::Light;
+        options.arrows.thickness = 1.0;
+        Some(Self {
+            options,
+            camera: app.viewport.pose()?,
+            followed: app.viewport.followed(),
+            chosen: app.plots.chosen.clone(),
+            picked: app.plots.picked.clone(),
+            window: app.plots.window,
+        })
+    }
+
+    /// The camera is where it was, apart from what it follows and how it fits the picture.
+    fn has_camera_of(&self, other: &Self) -> bool {
+        let (a, b) = (&self.camera, &other.camera);
+        let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * (1.0 + a.abs());
+        let fits = a.fitted.is_some() && b.fitted.is_some();
+        let follows = self.followed.is_some() && self.followed == other.followed;
+        let there = || near(a.distance, b.distance) && a.target.iter().zip(b.target).all(|(a, b)| near(*a, b));
+        let stays = self.followed == other.followed && near(a.yaw, b.yaw) && near(a.pitch, b.pitch);
+        stays && (fits || (follows && near(a.distance, b.distance)) || there())
+    }
+
+    /// What differs from `other`, in words; `None` if nothing does.
+    fn difference(&self, other: &Self) -> Option<&'static str> {
+        if self.options.magnification != other.options.magnification {
+            return Some("Magnification of the play");
+        }
+        if self.options != other.options {
+            return Some("View options");
+        }
+        if self.chosen != other.chosen || self.picked != other.picked {
+            return Some("Choice of plots");
+        }
+        if self.window != other.window {
+            return Some("Window of the plots");
+        }
+        (!self.has_camera_of(other)).then_some("Camera")
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Change {
+    Parameters(Vec<Edit>),
+    View(Box<[View; 2]>),
+}
+
+struct Entry {
+    /// What was changed.
+    name: String,
+    /// Before and after, in words; "" for the view.
+    values: [String; 2],
+    change: Change,
+    /// When it was last made, s of viewing.
+    at: f64,
+}
+
+impl Entry {
+    fn keys(&self) -> Vec<&str> {
+        match &self.change {
+            Change::Parameters(edits) => edits.iter().map(|edit| &*edit.key).collect(),
+            Change::View(_) => Vec::new(),
+        }
+    }
+
+    /// Whether `later` goes on with it.
+    fn goes_on_in(&self, later: &Self) -> bool {
+        self.name == later.name && self.keys() == later.keys()
+    }
+
+    /// Whether it leaves everything as it was.
+    fn is_nothing(&self) -> bool {
+        match &self.change {
+            Change::Parameters(edits) => edits.iter().all(|edit| edit.before == edit.after),
+            Change::View(ends) => ends[0].difference(&ends[1]).is_none(),
+        }
+    }
+
+    fn extend(&mut self, later: Self) {
+        match (&mut self.change, later.change) {
+            (Change::Parameters(own), Change::Parameters(later)) => {
+                for (own, later) in own.iter_mut().zip(later) {
+                    own.after = later.after;
+                }
+            }
+            (Change::View(own), Change::View(later)) => {
+                let [_, after] = *later;
+                own[1] = after;
+            }
+            _ => {}
+        }
+        let [_, after] = later.values;
+        self.values[1] = after;
+        self.at = later.at;
+    }
+}
+
+/// What was changed, and what was undone of it.
+#[derive(Default)]
+pub struct Undo {
+    done: Vec<Entry>,
+    undone: Vec<Entry>,
+    /// The view as last noted.
+    view: Option<View>,
+    /// Whether the pointer has been down since the latest change.
+    held: bool,
+}
+
+impl Undo {
+    /// Forgets everything: another scene is shown.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    fn note(&mut self, entry: Entry, held: bool) {
+        self.undone.clear();
+        let last = self.done.last_mut().filter(|last| last.goes_on_in(&entry));
+        match last.filter(|last| self.held || entry.at - last.at < TOGETHER) {
+            Some(last) => last.extend(entry),
+            None => self.done.push(entry),
+        }
+        self.held = held;
+        self.done.pop_if(|last| last.is_nothing());
+        if self.done.len() > KEPT {
+            self.done.remove(0);
+        }
+    }
+
+    /// What undoing would do, and redoing, in words; `None` if there is nothing.
+    pub fn words(&self, redo: bool) -> Option<String> {
+        let entry = if redo { &self.undone } else { &self.done }.last()?;
+        let value = &entry.values[usize::from(redo)];
+        let act = if redo { "Redo" } else { "Undo" };
+        Some(if value.is_empty() {
+            format!("{act}: {}", entry.name)
+        } else {
+            format!("{act}: {}, to {value}", entry.name)
+        })
+    }
+}
+
+/// Name of the parameter `key`, and `text` as it is shown; without one, the value of the scene's file.
+fn described(scene: &Scene, original: Option<String>, key: &str, text: Option<&str>) -> (String, String) {
+    let name = value::named(scene, key).map_or_else(|| key.to_owned(), |(name, _)| name);
+    let value = text.map(value::typeset).or(original).unwrap_or_default();
+    (name, value)
+}
+
+impl App {
+    /// Undoes the latest change, or redoes the one undone last. Returns whether there was one.
+    pub fn undo(&mut self, redo: bool) -> bool {
+        if self.is_under_way() {
+            return false;
+        }
+        let from = if redo { &mut self.undo.undone } else { &mut self.undo.done };
+        let Some(entry) = from.pop() else {
+            return false;
+        };
+        match &entry.change {
+            Change::Parameters(edits) => {
+                let mut edits: Vec<&Edit> = edits.iter().collect();
+                edits.sort_by_key(|edit| edit.key != PRESET);
+                for edit in edits {
+                    let wanted = if redo { &edit.after } else { &edit.before };
+                    if let Err(error) = self.player.put_back(&edit.key, wanted.as_deref()) {
+                        self.problem = Some(error.to_string());
+                    }
+                }
+                self.player.take_edits();
+                self.controls.forget_drafts();
+            }
+            Change::View(ends) => {
+                let view = ends[usize::from(redo)].clone();
+                let now = &self.viewport.options;
+                let (quality, theme, thickness) = (now.quality, now.theme, now.arrows.thickness);
+                self.viewport.options = view.options.clone();
+                let options = &mut self.viewport.options;
+                (options.quality, options.theme, options.arrows.thickness) = (quality, theme, thickness);
+                let other = View::of(self);
+                if other.is_some_and(|other| !other.has_camera_of(&view)) {
+                    self.viewport.set_pose(view.camera);
+                    self.viewport.follow(view.followed);
+                }
+                self.plots.chosen.clone_from(&view.chosen);
+                self.plots.picked.clone_from(&view.picked);
+                self.plots.window = view.window;
+                self.undo.view = Some(view);
+            }
+        }
+        let to = if redo { &mut self.undo.done } else { &mut self.undo.undone };
+        to.push(entry);
+        true
+    }
+
+    /// Notes what was changed since the frame before, and undoes or redoes if a key asks for it.
+    pub(super) fn follow_changes(&mut self, ctx: &egui::Context) {
+        let (now, held) = ctx.input(|input| (input.time, input.pointer.any_down() || input.any_touches()));
+        let edits = self.player.take_edits();
+        if self.is_under_way() {
+            self.undo.view = None;
+            return;
+        }
+        if let Some(edit) = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()) {
+            let original = self.player.original(&edit.key);
+            let scene = self.player.wanted();
+            let kind = scene.parameter(&edit.key).ok().map(|parameter| &parameter.kind);
+            let original = original.zip(kind).map(|(value, kind)| value::shown(&value, kind));
+            let ends = [&edit.before, &edit.after];
+            let [(name, before), (_, after)] =
+                ends.map(|text| described(scene, original.clone(), &edit.key, text.as_deref()));
+            self.undo.note(Entry { name, values: [before, after], change: Change::Parameters(edits), at: now }, held);
+        }
+        self.follow_view(now, held);
+        self.undo.held &= held;
+        if self.dialog.is_some() || ctx.text_edit_focused() {
+            return;
+        }
+        let both = Modifiers::COMMAND | Modifiers::SHIFT;
+        let redo =
+            ctx.input_mut(|input| input.consume_key(both, Key::Z) || input.consume_key(Modifiers::COMMAND, Key::Y));
+        if redo || ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
+            self.undo(redo);
+        }
+    }
+
+    /// Notes a change of the view once the gesture that makes it is over. The steps of a lesson change the view, too: within one
+    /// only parameters are noted.
+    fn follow_view(&mut self, now: f64, held: bool) {
+        let view = View::of(self).filter(|_| self.course().is_none());
+        let Some(view) = view else {
+            self.undo.view = None;
+            return;
+        };
+        let Some(before) = &mut self.undo.view else {
+            self.undo.view = Some(view);
+            return;
+        };
+        match view.difference(before) {
+            // What follows a body, or fits everything, moves by itself.
+            None => *before = view,
+            Some(_) if held => {}
+            Some(name) => {
+                let ends = [std::mem::replace(before, view.clone()), view];
+                let change = Change::View(Box::new(ends));
+                self.undo.note(Entry { name: name.to_owned(), values: Default::default(), change, at: now }, held);
+            }
+        }
+    }
+
+    /// Undo and redo in the header.
+    pub(super) fn undo_buttons(&mut self, ui: &mut Ui) {
+        let side = theme::side(ui, BUTTON);
+        for (redo, icon, name, key) in
+            [(false, Icon::Undo, "Undo", "Ctrl+Z"), (true, Icon::Redo, "Redo", "Ctrl+Shift+Z")]
+        {
+            let words = self.undo.words(redo);
+            let help = words
+                .as_ref()
+                .map_or_else(|| format!("Nothing to {}", name.to_lowercase()), |words| format!("{words} ({key})"));
+            let free = words.is_some() && !self.is_under_way();
+            let clicked = ui
+                .add_enabled_ui(free, |ui| icon_button(ui, icon, name, "", side, false))
+                .inner
+                .on_hover_text(&help)
+                .on_disabled_hover_text(&help)
+                .clicked();
+            if clicked {
+                self.undo(redo);
+            }
+        }
+    }
+
+    /// The same in the menu of a small window.
+    pub(super) fn undo_entries(&mut self, ui: &mut Ui) {
+        for (redo, name) in [(false, "Undo"), (true, "Redo")] {
+            let words = self.undo.words(redo);
+            let button = egui::Button::new(words.as_deref().unwrap_or(name));
+            if ui.add_enabled(words.is_some() && !self.is_under_way(), button).clicked() {
+                self.undo(redo);
+                layout::close_menu(ui);
+            }
+        }
+    }
+
+    /// What undoing would do (`redo`: redoing), in words; `None` if there is nothing.
+    pub fn undo_words(&self, redo: bool) -> Option<String> {
+        self.undo.words(redo)
+    }
+}

@@ -1,0 +1,132 @@
+//! Undo and redo.
+
+use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use egui_kittest::{Harness, kittest::Queryable as _};
+use jointplay::app::App;
+use jointplay::simulate::Quantity;
+
+use crate::window::{click, sized};
+
+fn window() -> Harness<'static, App> {
+    sized("spcmm", [1280.0, 800.0], egui::Theme::Light)
+}
+
+fn friction(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().wanted().contact.friction
+}
+
+fn clearance(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().wanted().contact.clearance
+}
+
+fn press(harness: &mut Harness<'_, App>, modifiers: Modifiers) {
+    harness.key_press_modifiers(modifiers, Key::Z);
+    harness.run_steps(3);
+}
+
+const UNDO: Modifiers = Modifiers::COMMAND;
+
+fn redo() -> Modifiers {
+    Modifiers::COMMAND | Modifiers::SHIFT
+}
+
+#[test]
+fn a_drag_on_a_slider_is_one_change_that_is_undone_and_redone() {
+    let mut harness = window();
+    assert_eq!(harness.state().undo_words(false), None);
+    let first = friction(&harness);
+    let track = harness.get_by_role_and_label(Role::Slider, "Friction coefficient").rect();
+    harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
+    for part in 1..10 {
+        harness.hover_at(track.left_center() + egui::vec2(12.0 + 20.0 * part as f32, 0.0));
+        // Slower than changes that count as one by time alone.
+        harness.run_steps(40);
+    }
+    harness.drop_at(track.left_center() + egui::vec2(192.0, 0.0));
+    harness.run_steps(3);
+    let dragged = friction(&harness);
+    assert!(dragged > first);
+    let words = harness.state().undo_words(false).expect("something");
+    assert_eq!(words, "Undo: Friction coefficient, to 0.15");
+    press(&mut harness, UNDO);
+    assert_eq!(friction(&harness), first);
+    assert_eq!(harness.state().undo_words(false), None, "one change");
+    press(&mut harness, redo());
+    assert_eq!(friction(&harness), dragged);
+    // The buttons do it, too.
+    click(&mut harness, "Undo");
+    assert_eq!(friction(&harness), first);
+    click(&mut harness, "Redo");
+    assert_eq!(friction(&harness), dragged);
+}
+
+#[test]
+fn changes_are_undone_one_after_another_and_a_new_one_ends_what_could_be_redone() {
+    let mut harness = window();
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.5);
+    harness.run_steps(40);
+    harness.get_by_role_and_label(Role::Slider, "Friction coefficient").set_value_accesskit(0.4);
+    harness.run_steps(40);
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.6);
+    harness.run_steps(40);
+    press(&mut harness, UNDO);
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-9 && friction(&harness) == 0.4);
+    press(&mut harness, UNDO);
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-9 && friction(&harness) == 0.15);
+    press(&mut harness, UNDO);
+    assert!((clearance(&harness) - 0.3e-3).abs() < 1e-9);
+    press(&mut harness, UNDO);
+    assert!((clearance(&harness) - 0.3e-3).abs() < 1e-9, "no more");
+    press(&mut harness, redo());
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-9);
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.4);
+    harness.run_steps(3);
+    assert_eq!(harness.state().undo_words(true), None);
+    // Going back in time changes no parameter by itself.
+    let words = harness.state().undo_words(false);
+    harness.state_mut().player_mut().run_to(20e-3);
+    harness.run();
+    harness.state_mut().player_mut().go_to(0.0);
+    harness.run_steps(3);
+    assert_eq!(harness.state().undo_words(false), words);
+}
+
+#[test]
+fn the_view_and_the_choice_of_plots_are_undone_too() {
+    let mut harness = window();
+    harness.run_steps(60);
+    let pose = harness.state().camera_pose().expect("drawn");
+    harness.key_press(Key::Num4);
+    harness.run_steps(90);
+    let turned = harness.state().camera_pose().expect("drawn");
+    assert!((turned.pitch - pose.pitch).abs() > 0.1);
+    assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Camera"));
+    harness.key_press(Key::X);
+    harness.run_steps(60);
+    assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Magnification of the play"));
+    harness.state_mut().plots_mut().chosen.push(Quantity::TipError);
+    harness.run_steps(3);
+    assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Choice of plots"));
+    press(&mut harness, UNDO);
+    assert_eq!(harness.state_mut().plots_mut().chosen.len(), 2);
+    press(&mut harness, UNDO);
+    press(&mut harness, UNDO);
+    harness.run_steps(60);
+    let back = harness.state().camera_pose().expect("drawn");
+    assert!((back.pitch - pose.pitch).abs() < 1e-3 && (back.yaw - pose.yaw).abs() < 1e-3, "{back:?} {pose:?}");
+    assert_eq!(harness.state().undo_words(false), None);
+    press(&mut harness, redo());
+    let again = harness.state().camera_pose().expect("drawn");
+    assert!((again.pitch - turned.pitch).abs() < 1e-3, "{again:?} {turned:?}");
+}
+
+#[test]
+fn another_scene_has_nothing_to_undo() {
+    let mut harness = window();
+    harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.5);
+    harness.run_steps(3);
+    assert!(harness.state().undo_words(false).is_some());
+    harness.state_mut().open("pendulum").expect("opens");
+    harness.run_steps(3);
+    assert_eq!(harness.state().undo_words(false), None);
+}
