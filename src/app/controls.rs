@@ -11,7 +11,7 @@ use eframe::egui::{
 use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::{keys, theme, value};
+use super::{equations, keys, theme, value};
 use crate::scene::{Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display};
 use crate::simulate::{ChangeError, Effect};
 
@@ -392,10 +392,10 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     tooltip.show(|ui| {
         ui.strong(parameter.label);
         ui.label(value::typeset(parameter.help));
-        let equation = match parameter.equation.strip_prefix("Paper") {
-            Some(rest) => format!("Enters paper{rest}"),
-            None => parameter.equation.to_owned(),
-        };
+        if let Some((law, formula)) = equations::formula(key) {
+            ui.label(RichText::new(format!("{law}: {formula}")).small());
+        }
+        let equation = equations::source(parameter.equation);
         if !equation.is_empty() {
             ui.label(RichText::new(equation).small());
         }

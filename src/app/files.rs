@@ -266,6 +266,22 @@ impl App {
         ]);
     }
 
+    /// Saves the plots on show as SVG.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn save_plots(&mut self) {
+        let Some(sheet) = self.plots.sheet(&self.player, self.describe()) else {
+            self.problem = Some("No plot is chosen".to_owned());
+            return;
+        };
+        match sheet.svg() {
+            Ok(text) => {
+                let name = format!("{}-plots.svg", self.file_stem());
+                self.save(vec![SaveFile { name, mime: "image/svg+xml", bytes: text.into_bytes() }]);
+            }
+            Err(error) => self.problem = Some(format!("The plots cannot be saved: {error}")),
+        }
+    }
+
     /// Description of a picture, stored in it.
     pub(super) fn describe(&self) -> String {
         describe(&self.player)
@@ -416,6 +432,9 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         meta["scene_text"] = json!(wanted.source.text);
         meta["scene_files"] = texts.collect();
     }
+    for (key, value) in more {
+        meta[key] = value;
+    }
     format!("{meta:#}\n")
 }
 
@@ -432,9 +451,6 @@ fn describe(player: &Player) -> String {
     }
     words
 }
-    for (key, value) in more {
-        meta[key] = value;
-    }
 
 #[cfg(test)]
 mod tests {

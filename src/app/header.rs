@@ -170,9 +170,24 @@ impl App {
             self.dialog = Some(Dialog::Film { wanted });
             layout::close_menu(ui);
         }
+<<<<<<< HEAD
         let help = "Everything that the plots have recorded since the reset";
         if ui.button("Data (CSV)…").on_hover_text(help).clicked() {
+=======
+        #[cfg(not(target_arch = "wasm32"))]
+        if ui.button("Plots…").on_hover_text("The plots on show, for print: SVG").clicked() {
+            self.save_plots();
+            layout::close_menu(ui);
+        }
+        let help = "What the plots recorded since the reset, CSV";
+        if ui.button("Record…").on_hover_text(help).clicked() {
+>>>>>>> 714409a (Plots as SVG, and formulas in the tooltips of contact parameters)
             self.save_record();
+            layout::close_menu(ui);
+        }
+        let help = "A row for each impact up to the instant shown, CSV";
+        if ui.button("Impacts…").on_hover_text(help).clicked() {
+            self.save_impacts();
             layout::close_menu(ui);
         }
         let help = "The scene file with the changed values in it, TOML";
@@ -181,11 +196,6 @@ impl App {
             layout::close_menu(ui);
         }
         ui.separator();
-        let help = "A row for each impact up to the instant shown, CSV";
-        if ui.button("Impacts…").on_hover_text(help).clicked() {
-            self.save_impacts();
-            layout::close_menu(ui);
-        }
         let help = "Copies the line of HTML that shows this scene in this state and view within another page: course page, slides";
         if ui.button("Embed").on_hover_text(help).clicked() {
             self.copy_embedding(ui.ctx());
@@ -199,12 +209,12 @@ impl App {
         self.open_button(ui);
         self.link_button(ui);
         self.code_button(ui);
+        self.undo_entries(ui);
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
         self.save_menu(ui);
         ui.separator();
         ui.label(RichText::new("Lessons").small().weak());
-        self.undo_entries(ui);
         self.lesson_menu(ui);
         ui.separator();
         theme_box(ui);

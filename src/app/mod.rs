@@ -15,6 +15,7 @@ mod curve;
 mod desktop;
 mod dialogs;
 mod embed;
+mod equations;
 mod files;
 mod film;
 mod ghosts;

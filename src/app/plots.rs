@@ -13,6 +13,9 @@ use super::{theme, value};
 use crate::scene::Scene;
 use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
+#[cfg(not(target_arch = "wasm32"))]
+mod sheet;
+
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
 /// The shortest time range that a plot zooms to, s.

@@ -137,3 +137,27 @@ fn the_file_has_the_columns_and_values_of_the_command_line_s() {
         assert_eq!(row[..], own[..]);
     }
 }
+
+#[test]
+fn the_plots_on_show_are_saved_as_a_drawing() {
+    let scene = Scene::load("spcmm", &[]).expect("built in");
+    let options = AppOptions { playing: false, ..AppOptions::new(scene) };
+    let (mut harness, calls) = open(options, [1280.0, 800.0]);
+    harness.state_mut().player_mut().run_to(20e-3);
+    harness.run();
+    click(&mut harness, "Save");
+    click(&mut harness, "Plots…");
+    let saved = calls.borrow().saved.clone();
+    assert_eq!(saved.len(), 1);
+    assert!(saved[0].name.ends_with("-plots.svg") && saved[0].mime == "image/svg+xml");
+    let text = String::from_utf8(saved[0].bytes.clone()).expect("text");
+    assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
+    for word in ["Normal force", "Eccentricity", "S1", "S3", "clearance", "state hash"] {
+        assert!(text.contains(word), "{word}");
+    }
+    // A line of the drawing for each curve.
+    assert!(text.matches("<polyline").count() >= 6, "{}", text.matches("<polyline").count());
+    if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+        std::fs::write(std::path::Path::new(&keep).join("plots.svg"), text).expect("writable");
+    }
+}

@@ -1,0 +1,79 @@
+//! The chosen plots as charts, for a file that is printed or drawn on.
+
+use super::{Panel, Plots, time_axis};
+use crate::app::player::Player;
+use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
+use crate::simulate::{Bin, PlotKind};
+
+/// Size of a chart, and the most instants in one, pixels: what is finer would not be seen.
+const CHART: (u32, u32) = (520, 320);
+const INSTANTS: usize = 1000;
+/// Charts side by side.
+const COLUMNS: usize = 2;
+/// Room for the legend and the line below the charts, pixels.
+const REST: u32 = 60;
+/// Colour of clearances.
+const LEVEL: Colour = (150, 150, 150);
+
+impl Plots {
+    /// The plots on show with their time range, and `note` below; `None` if there are none.
+    pub fn sheet(&self, player: &Player, note: String) -> Option<Sheet> {
+        let of_quantity = |quantity: &_| Panel::of_quantity(*quantity, player);
+        let mut panels: Vec<Panel<'_>> = self.chosen.iter().filter_map(of_quantity).collect();
+        panels.extend(self.picked.iter().flat_map(|name| Panel::of_pick(name, player)));
+        let charts: Vec<Chart> = panels.iter().map(|panel| self.chart(player, panel)).collect();
+        let columns = COLUMNS.min(charts.len());
+        let rows = charts.len().div_ceil(columns.max(1)) as u32;
+        let size = (CHART.0 * columns as u32, CHART.1 * rows + REST);
+        (!charts.is_empty()).then_some(Sheet { title: String::new(), charts, columns, size, note })
+    }
+
+    fn chart(&self, player: &Player, panel: &Panel<'_>) -> Chart {
+        let (from, to) = self.range(player);
+        let (time_unit, time_size) = time_axis(to - from);
+        let (unit, size) = panel.unit;
+        let mut bins: Vec<Bin> = Vec::new();
+        let mut points = |channel: usize| -> Vec<(f64, f64)> {
+            bins.clear();
+            player.bins(channel, from, to, INSTANTS, &mut bins);
+            let ends = |bin: &Bin| {
+                let time = 0.5 * (bin.from + bin.to) / time_size;
+                [bin.least, bin.greatest].map(|value| (time, value / size))
+            };
+            let ends =
+                bins.iter().flat_map(|bin| ends(bin).into_iter().take(1 + usize::from(bin.least != bin.greatest)));
+            ends.collect()
+        };
+        let line =
+            |label: &str, points, colour| Series { label: label.to_owned(), points, colour, line: true, marker: None };
+        let mut series = Vec::new();
+        if panel.kind == PlotKind::FromZeroWithClearances {
+            for channel in player.clearances() {
+                let level = line(if series.is_empty() { "clearance" } else { "" }, points(channel), LEVEL);
+                let closed = level.points.iter().all(|(_, value)| *value <= 0.0);
+                if !closed && !series.iter().any(|other: &Series| other.points == level.points) {
+                    series.push(level);
+                }
+            }
+        }
+        for (index, (channel, member)) in panel.members.iter().enumerate() {
+            if !self.hidden.contains(channel) {
+                // The first colour is for a reference.
+                let colour = PALETTE[1 + index % (PALETTE.len() - 1)];
+                series.push(line(member, points(*channel), colour));
+            }
+        }
+        Chart {
+            title: panel.label.to_owned(),
+            x: Axis {
+                label: "Time".to_owned(),
+                unit: time_unit.to_owned(),
+                range: Some((from / time_size, to / time_size)),
+                ..Axis::default()
+            },
+            y: Axis { label: panel.label.to_owned(), unit: unit.to_owned(), ..Axis::default() },
+            series,
+            ..Chart::default()
+        }
+    }
+}
