@@ -6,17 +6,19 @@ use glam::{Mat3, Quat, Vec3, Vec4};
 use parry3d::query::Ray;
 
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
+use super::attachments::{Style, push_bushing, push_motor, push_stop};
 use super::cast::{cast, room};
 use super::coil::push_coil;
-use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
+use super::drawn::{self, DrawnJoint, DrawnShape};
 use super::ground::push_ground;
 use super::instances::{self, bar, placed, push_label};
 use super::near::Near;
+use super::solids::push_solid;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
-    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette,
-    Shot, ViewOptions, WearMap, to_f32,
+    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Light, Line, Mesh, MeshData, Palette, Shot,
+    ViewOptions, WearMap, to_f32,
 };
 use crate::scene::{ElementLook, Role, Scene, SignedAxis};
 use crate::simulate::{ContactState, Frame, JointReport};
@@ -240,7 +242,15 @@ impl SceneView {
         for (element, report) in scene.elements.iter().zip(&frame.elements) {
             let [from, to] = report.points.map(|point| to_f32(&point));
             let width = 2.2 * shot.pixels_per_point;
-            let colour = palette.material(Role::Pin).colour;
+            let material = palette.material(Role::Pin);
+            let colour = material.colour;
+            let style = Style {
+                radius: self.bounds.radius,
+                width,
+                material,
+                outer: palette.material(Role::Slider),
+                colour: palette.text,
+            };
             match element.kind.look {
                 ElementLook::Coil => {
                     let radius = COIL * self.bounds.radius;
@@ -250,6 +260,11 @@ impl SceneView {
                     let up = to_f32(&element.vector("up"));
                     let radius = GROUND * self.bounds.radius;
                     push_ground(from, up, radius, width, colour, &mut out.lines);
+                }
+                ElementLook::Bushing => push_bushing(element, report, frame, &style, &mut out.solid),
+                ElementLook::Stop => push_stop(element, report, (scene, frame), &style, &mut out.solid),
+                ElementLook::Motor => {
+                    push_motor(element, report, (scene, frame), &style, &mut out.solid, &mut out.lines);
                 }
                 ElementLook::Arrow | ElementLook::Hidden => {}
             }
@@ -407,28 +422,6 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
         format!("clearance drawn ×{} (×{} does not fit)", times(drawn), times(asked))
     } else {
         format!("clearance drawn ×{}", times(drawn))
-    }
-}
-
-pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
-    match *solid {
-        Solid::Bar { from, to, radius, kind, capped } => {
-            if from == to {
-                return;
-            }
-            let mesh = if kind == BarKind::Cone { Mesh::Cone } else { Mesh::Cylinder };
-            layer.push(mesh, bar(from, to - from, radius, material));
-            if kind == BarKind::Capsule {
-                for (end, _) in [from, to].into_iter().zip(capped).filter(|(_, capped)| *capped) {
-                    layer.push(Mesh::Sphere, instances::ball(end, radius, material));
-                }
-            }
-        }
-        Solid::Box { centre, size, rotation } => {
-            layer.push(Mesh::Cube, placed(rotation * Mat3::from_diagonal(size), centre, material));
-        }
-        Solid::Ball { centre, radius } => layer.push(Mesh::Sphere, instances::ball(centre, radius, material)),
-        Solid::Own { mesh, pose, .. } => layer.push(mesh, placed(pose.rotation, pose.position, material)),
     }
 }
 

@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::arrows::push_error;
-use super::build::{self, push_solid};
+use super::build;
 use super::instances::ball;
 use super::near::Near;
+use super::solids::push_solid;
 use super::theme::{Ghost, GhostLook, Material};
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
 use crate::scene::{Output, format_quantity_digits};

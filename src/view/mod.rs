@@ -10,6 +10,7 @@
 //! ```
 
 mod arrows;
+mod attachments;
 mod build;
 mod camera;
 mod cast;
@@ -26,6 +27,7 @@ mod options;
 mod peaks;
 mod pick;
 mod shot;
+mod solids;
 mod sticks;
 mod surface;
 mod symbols;

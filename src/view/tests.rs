@@ -521,3 +521,48 @@ fn shapes_of_one_file_share_a_mesh_and_are_picked() {
     let pixel = drawn.eye.project(Vec3::new(0.045, 0.02, 0.0), SIZE).unwrap();
     assert_eq!(view.pick(&shot, pixel), None);
 }
+
+/// A slide with a stop at either end, a hinge with a motor, and a bushing between them.
+const ATTACHED: &str = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+    shapes = [{ form = \"box\", centre = [0, 0, 0], size = \"20 20 20 mm\", role = \"slider\" }]\n\
+    [[body]]\nname = \"arm\"\nmass = \"1 kg\"\ncentre = \"50 0 0 mm\"\ninertia = \"1 1 1 kg m^2\"\n\
+    shapes = [{ form = \"capsule\", from = [0, 0, 0], to = \"100 0 0 mm\", radius = \"4 mm\", role = \"driven-rod\" }]\n\
+    [[joint]]\nname = \"slide\"\nkind = \"prismatic\"\nchild = \"mass\"\naxis = [1, 0, 0]\n\
+    [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\nparent_point = \"0 0 150 mm\"\n";
+
+#[test]
+fn bushings_stops_and_motors_are_in_the_picture_where_they_act() {
+    let stop = "[[stop]]\nname = \"ends\"\njoint = \"slide\"\nlower = \"-60 mm\"\nupper = \"80 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
+    let turn =
+        "[[stop]]\nname = \"ends\"\njoint = \"hinge\"\nupper = \"90 deg\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n";
+    let motor = "[[motor]]\nname = \"m\"\njoint = \"hinge\"\ntorque = \"1 N m\"\n";
+    let push = "[[motor]]\nname = \"m\"\njoint = \"slide\"\nforce = \"1 N\"\n";
+    let bushing = "[[bushing]]\nname = \"b\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nstiffness = [\"1 N/m\", 0, 0]\n";
+    let count = |list: &DrawList| list.solid.by_mesh[Mesh::Cylinder.index()].len();
+    let drawn = |text: &str| {
+        let (scene, frame) = started(&format!("{ATTACHED}{text}"), &[]);
+        list(&scene, &frame, &ViewOptions::default())
+    };
+    let bare = drawn("");
+    for (text, cylinders, has_lines) in
+        [(stop, 2, false), (turn, 1, false), (motor, 1, true), (push, 1, true), (bushing, 2, false)]
+    {
+        let list = drawn(text);
+        assert_eq!(count(&list), count(&bare) + cylinders, "{text}");
+        assert_eq!(list.lines.len() > bare.lines.len(), has_lines, "{text}");
+    }
+    // The discs begin where the slide ends, and face away from it.
+    let list = drawn(stop);
+    let ends: Vec<f32> = list.solid.by_mesh[Mesh::Cylinder.index()].iter().map(|bar| place(bar).x).collect();
+    for limit in [-0.06, 0.08] {
+        assert!(ends.iter().any(|x| (x - limit).abs() < 1e-6), "{ends:?}");
+    }
+    // Turned by its limit, the arm would point down: along -z.
+    let list = drawn(turn);
+    let pegs = &list.solid.by_mesh[Mesh::Cylinder.index()];
+    let below = pegs.iter().any(|peg| {
+        let at = place(peg);
+        at.x.abs() < 1e-5 && at.y.abs() < 1e-5 && (0.05..0.149).contains(&at.z)
+    });
+    assert!(below, "{:?}", pegs.iter().map(place).collect::<Vec<_>>());
+}

@@ -131,3 +131,63 @@ fn the_manifest_has_the_state_that_a_run_reaches() {
         assert_eq!(frame["state_hash"], run["state_hash"], "at {end} s");
     }
 }
+
+/// Of a force element that is drawn a picture differs from one without it, and of two it differs in different places.
+#[test]
+fn bushings_stops_and_motors_are_drawn() {
+    const MACHINE: &str = "[[body]]
+name = \"mass\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+shapes = [{ form = \"box\", centre = [0, 0, 0], size = \"20 20 20 mm\", role = \"slider\" }]
+[[body]]
+name = \"arm\"
+mass = \"1 kg\"
+centre = \"50 0 0 mm\"
+inertia = \"1 1 1 kg m^2\"
+shapes = [{ form = \"capsule\", from = [0, 0, 0], to = \"100 0 0 mm\", radius = \"4 mm\", role = \"driven-rod\" }]
+[[joint]]
+name = \"slide\"
+kind = \"prismatic\"
+child = \"mass\"
+axis = [1, 0, 0]
+[[joint]]
+name = \"hinge\"
+kind = \"revolute\"
+child = \"arm\"
+axis = [0, 1, 0]
+parent_point = \"0 0 150 mm\"
+";
+    const ELEMENTS: [(&str, &str); 6] = [
+        ("nothing", ""),
+        (
+            "stop-of-slide",
+            "[[stop]]\nname = \"e\"\njoint = \"slide\"\nlower = \"-60 mm\"\nupper = \"80 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n",
+        ),
+        (
+            "stop-of-hinge",
+            "[[stop]]\nname = \"e\"\njoint = \"hinge\"\nlower = \"-60 deg\"\nupper = \"90 deg\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n",
+        ),
+        ("motor-of-slide", "[[motor]]\nname = \"e\"\njoint = \"slide\"\nforce = \"1 N\"\n"),
+        ("motor-of-hinge", "[[motor]]\nname = \"e\"\njoint = \"hinge\"\ntorque = \"1 N m\"\n"),
+        (
+            "bushing",
+            "[[bushing]]\nname = \"e\"\nfrom = { body = \"world\" }\nto = { body = \"arm\", at = \"115 0 0 mm\" }\nstiffness = [\"1 N/m\", 0, 0]\n",
+        ),
+    ];
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let pictures = ELEMENTS.map(|(name, text)| {
+        fs::write(folder.path().join(format!("{name}.toml")), format!("{MACHINE}{text}")).expect("writable");
+        let picture = Picture::read(&draw(folder.path(), &format!("{name}.toml --at 0s --size 600x450 --arrows none")));
+        if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+            picture.write(&Path::new(&keep).join(format!("{name}.png")));
+        }
+        picture
+    });
+    for (at, one) in pictures.iter().enumerate() {
+        for (other, name) in pictures[at + 1..].iter().zip(&ELEMENTS[at + 1..]) {
+            let count = one.differences(other);
+            assert!(count > 2 * TOLERANCE.1, "{} and {} differ in {count} pixels only", ELEMENTS[at].0, name.0);
+        }
+    }
+}

@@ -298,6 +298,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
         ],
         acts_by: &["force"],
         fault: stop_fault,
+        look: ElementLook::Stop,
         ..PLAIN
     },
     ElementKind {
@@ -316,6 +317,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
             ("rotation", "orientation of the body of `to` in that of `from` in which it exerts no torque"),
         ],
         acts_by: &["stiffness", "damping", "turning_stiffness", "turning_damping"],
+        look: ElementLook::Bushing,
         ..PLAIN
     },
     ElementKind {
@@ -364,6 +366,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
         acts_by: &["force", "stiffness", "damping"],
         force: |motor| motor.force_at_joint("force").min(motor.number("limit")),
         fault: motor_fault,
+        look: ElementLook::Motor,
         ..PLAIN
     },
     ElementKind {

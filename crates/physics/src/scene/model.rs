@@ -749,6 +749,12 @@ pub enum ElementLook {
     Arrow,
     /// A disc on the ground at its first point.
     Ground,
+    /// A sleeve at its first point and a pin at its second.
+    Bushing,
+    /// Where its joint's coordinate ends.
+    Stop,
+    /// A case on its joint's axis, with an arrow in the positive sense.
+    Motor,
     /// Nothing.
     Hidden,
 }

@@ -1,0 +1,169 @@
+//! What bushings, stops and motors look like: simple bodies at their points and joints.
+
+use std::f32::consts::TAU;
+
+use glam::{Mat3, Quat, Vec3};
+
+use super::drawn::{BarKind, Pose, Solid};
+use super::solids::push_solid;
+use super::theme::Material;
+use super::{Colour, Layer, Line, to_f32};
+use crate::scene::{self, Element, Freedom, Joint, Scene};
+use crate::simulate::{ElementReport, Frame};
+
+/// Half the length and radius of a bushing's sleeve, and the same of the pin in it, in radii of the scene.
+const SLEEVE: [f32; 2] = [0.03, 0.055];
+const PIN: [f32; 2] = [0.06, 0.02];
+/// Thickness and radius of the disc at the end of a slide.
+const BUFFER: [f32; 2] = [0.016, 0.055];
+/// Where the bar at the end of a turn begins and ends, from the joint, and its radius.
+const PEG: [f32; 3] = [0.05, 0.16, 0.013];
+/// Where a motor's case begins and ends along the axis of a turn, on both sides of what turns, or behind a slide; and its radius.
+const ABOUT: [f32; 2] = [-0.09, 0.09];
+const BEHIND: [f32; 2] = [-0.36, -0.24];
+const CASE: f32 = 0.035;
+/// Radius of the arc about a motor's axis, and the length of a straight arrow beside it.
+const ARC: f32 = 0.075;
+const ARROW: f32 = 0.12;
+/// Pieces of an arc, its extent in turns, and the length of the strokes at its tip in its radii.
+const SEGMENTS: u16 = 36;
+const TURNS: f32 = 0.75;
+const TIP: f32 = 0.45;
+
+/// How something is drawn.
+pub(super) struct Style {
+    /// Radius of the scene, m.
+    pub radius: f32,
+    /// Width of lines, pixels.
+    pub width: f32,
+    /// What it is made of.
+    pub material: Material,
+    /// What holds another: the sleeve of a bushing, the case of a motor.
+    pub outer: Material,
+    /// Colour of lines.
+    pub colour: Colour,
+}
+
+fn bar(from: Vec3, to: Vec3, radius: f32) -> Solid<'static> {
+    Solid::Bar { from, to, radius, kind: BarKind::Cylinder, capped: [false; 2] }
+}
+
+fn rotation(quat: &scene::Quat) -> Mat3 {
+    Mat3::from_quat(Quat::from_xyzw(quat.i as f32, quat.j as f32, quat.k as f32, quat.w as f32))
+}
+
+/// A sleeve at the point of one body and a pin at that of the other, along the axis of the bushing that is turned about most softly.
+pub(super) fn push_bushing(element: &Element, report: &ElementReport, frame: &Frame, style: &Style, layer: &mut Layer) {
+    let body = element.points.first().and_then(|end| end.body);
+    let axes = Pose::in_frame(frame, body).rotation * rotation(&element.rotation("axes"));
+    let turning = element.vector("turning_stiffness");
+    // Of equal ones the last: the axis of a turned part is z.
+    let softest = (0..3).rev().min_by(|&a, &b| turning[a].total_cmp(&turning[b])).unwrap_or(2);
+    let along = axes.col(softest) * style.radius;
+    let [outer, inner] = report.points.map(|point| to_f32(&point));
+    push_solid(
+        layer,
+        &bar(outer - along * SLEEVE[0], outer + along * SLEEVE[0], SLEEVE[1] * style.radius),
+        style.outer,
+    );
+    push_solid(layer, &bar(inner - along * PIN[0], inner + along * PIN[0], PIN[1] * style.radius), style.material);
+}
+
+/// The coordinate of a joint that an element acts on, world axes.
+struct Axis<'a> {
+    joint: &'a Joint,
+    freedom: Freedom,
+    parent: Pose,
+    /// Where it begins, m, and its unit vector.
+    origin: Vec3,
+    along: Vec3,
+}
+
+impl<'a> Axis<'a> {
+    fn of(element: &Element, report: &ElementReport, scene: &'a Scene, frame: &Frame) -> Option<Self> {
+        let (index, freedom) = element.joint?;
+        let joint = scene.kinematic_joints().nth(index)?;
+        let parent = Pose::in_frame(frame, joint.parent);
+        let (pose, axis) = match freedom {
+            Freedom::SecondTurn => (Pose::in_frame(frame, Some(joint.child)), &joint.child_axis),
+            _ => (parent, &joint.axis),
+        };
+        let along = (pose.rotation * to_f32(axis)).normalize_or(Vec3::X);
+        Some(Self { joint, freedom, parent, origin: to_f32(&report.points[0]), along })
+    }
+
+    /// Where the middle of the child points where its angle is `angle`, unit vector; `None` if that lies on the axis.
+    fn direction(&self, scene: &Scene, angle: f32) -> Option<Vec3> {
+        let arm = scene.bodies[self.joint.child].centre - self.joint.child_point;
+        let at_zero = self.parent.rotation * rotation(&self.joint.rotation) * to_f32(&arm);
+        let across = at_zero.reject_from_normalized(self.along).try_normalize()?;
+        Some(Quat::from_axis_angle(self.along, angle) * across)
+    }
+}
+
+/// A disc where a slide ends; at a hinge a bar where the middle of the turning body then points.
+pub(super) fn push_stop(
+    element: &Element,
+    report: &ElementReport,
+    (scene, frame): (&Scene, &Frame),
+    style: &Style,
+    layer: &mut Layer,
+) {
+    let Some(axis) = Axis::of(element, report, scene, frame) else {
+        return;
+    };
+    for (key, side) in [("lower", -1.0), ("upper", 1.0)] {
+        let limit = element.number(key) as f32;
+        if !limit.is_finite() {
+            continue;
+        }
+        let solid = if axis.freedom.turns() {
+            let out = axis.direction(scene, limit).unwrap_or_else(|| axis.along.any_orthonormal_vector());
+            let [from, to, radius] = PEG.map(|part| part * style.radius);
+            bar(axis.origin + out * from, axis.origin + out * to, radius)
+        } else {
+            let [thick, radius] = BUFFER.map(|part| part * style.radius);
+            let from = axis.origin + axis.along * limit;
+            bar(from, from + axis.along * (side * thick), radius)
+        };
+        push_solid(layer, &solid, style.material);
+    }
+}
+
+/// A case on the axis of the joint, with an arrow about it or along it.
+pub(super) fn push_motor(
+    element: &Element,
+    report: &ElementReport,
+    (scene, frame): (&Scene, &Frame),
+    style: &Style,
+    layer: &mut Layer,
+    lines: &mut Vec<Line>,
+) {
+    let Some(axis) = Axis::of(element, report, scene, frame) else {
+        return;
+    };
+    let thick = CASE * style.radius;
+    let [from, to] = if axis.freedom.turns() { ABOUT } else { BEHIND }.map(|part| part * style.radius);
+    let at = |along: f32| axis.origin + axis.along * along;
+    push_solid(layer, &bar(at(from), at(to), thick), style.outer);
+    let side = axis.along.any_orthonormal_vector();
+    let other = axis.along.cross(side);
+    let mut line = |from, to| lines.push(Line::new(from, to, style.width, [style.colour; 2]));
+    if axis.freedom.turns() {
+        let (centre, radius) = (at(to), ARC * style.radius);
+        let on = |part: f32, out: f32| {
+            let (sin, cos) = (TAU * TURNS * part).sin_cos();
+            centre + (side * cos + other * sin) * (radius * out)
+        };
+        let place = |k: u16| on(f32::from(k) / f32::from(SEGMENTS), 1.0);
+        (0..SEGMENTS).for_each(|k| line(place(k), place(k + 1)));
+        let back = 1.0 - TIP / (TAU * TURNS);
+        [1.0 - 0.6 * TIP, 1.0 + 0.6 * TIP].into_iter().for_each(|out| line(on(back, out), on(1.0, 1.0)));
+    } else {
+        let beside = side * (1.5 * thick);
+        let (tail, tip) = (at(from) + beside, at(from + ARROW * style.radius) + beside);
+        let back = tip - axis.along * (TIP * ARC * style.radius);
+        line(tail, tip);
+        [-1.0, 1.0].into_iter().for_each(|sign| line(back + side * (sign * 0.6 * TIP * ARC * style.radius), tip));
+    }
+}
