@@ -170,18 +170,13 @@ impl App {
             self.dialog = Some(Dialog::Film { wanted });
             layout::close_menu(ui);
         }
-<<<<<<< HEAD
-        let help = "Everything that the plots have recorded since the reset";
-        if ui.button("Data (CSV)…").on_hover_text(help).clicked() {
-=======
         #[cfg(not(target_arch = "wasm32"))]
         if ui.button("Plots…").on_hover_text("The plots on show, for print: SVG").clicked() {
             self.save_plots();
             layout::close_menu(ui);
         }
-        let help = "What the plots recorded since the reset, CSV";
-        if ui.button("Record…").on_hover_text(help).clicked() {
->>>>>>> 714409a (Plots as SVG, and formulas in the tooltips of contact parameters)
+        let help = "Everything that the plots have recorded since the reset";
+        if ui.button("Data (CSV)…").on_hover_text(help).clicked() {
             self.save_record();
             layout::close_menu(ui);
         }
