@@ -183,6 +183,7 @@ impl Group {
             Action::Panel
             | Action::Plots
             | Action::Bench
+            | Action::ImpactList
             | Action::Present
             | Action::TurnPage { .. }
             | Action::Theme
