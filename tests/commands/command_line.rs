@@ -477,7 +477,7 @@ fn lessons_are_listed_and_a_file_is_checked() {
     assert_eq!(list.lines().count(), 10, "{list}");
     assert!(list.starts_with("rattle "), "{list}");
     let printed = jointplay(folder.path(), "lessons rattle").expect(0).stdout;
-    assert!(printed.contains("[x]  S1") && printed.contains("7.8 ms"), "{printed}");
+    assert!(printed.contains("[x]  At nearly the same time") && printed.contains("7.8 ms"), "{printed}");
     let near = jointplay(folder.path(), "lessons ratle").expect(2).stderr;
     assert!(near.contains("did you mean `rattle`?"), "{near}");
     let own = "title = \"x\"\nscene = \"pendulum\"\n[measure]\nfirst = { impact = 1 }\n[[step]]\ntitle = \"x\"\ntext = \"\"\n\

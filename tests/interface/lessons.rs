@@ -407,7 +407,7 @@ fn lessons_show_what_is_stored() {
 
 #[test]
 fn a_presented_lesson_has_the_plots_that_it_speaks_of() {
-    for (name, plot) in [("ideal", "Probe error"), ("rattle", "Normal force")] {
+    for (name, plot) in [("ideal", "Tip error"), ("rattle", "Normal force")] {
         let mut harness = taught(name, 0, WIDE);
         harness.key_press(Key::F5);
         harness.step();
