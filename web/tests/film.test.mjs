@@ -11,7 +11,7 @@ after(quit);
 
 test('the page makes a film of its timeline, which a browser plays, and stands where it stood', async () => {
     const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
-    await lab.runTo(0.002);
+    await lab.runTo(0.02);
     const before = await lab.state();
     const download = lab.page.waitForEvent('download');
     let file;
@@ -28,7 +28,7 @@ test('the page makes a film of its timeline, which a browser plays, and stands w
     assert.equal(file.suggestedFilename(), 'pendulum.mp4');
     const bytes = fs.readFileSync(await file.path());
     await lab.close();
-    // 2 ms at a fiftieth of real time, 30 frames a second.
+    // 20 ms at a fifth of real time, 30 frames a second.
     const empty = await blank({ ownTime: true });
     const film = await play(empty, bytes, [0.05]);
     assert.deepEqual([film.width, film.height], [640, 360]);

@@ -205,6 +205,7 @@ test('the page is there without a network, and a newer one replaces it whole', a
         server = await serveFolder(folder, port);
         // The page that is open goes on with its own files: with the newer worker it would stop.
         await first.page.evaluate(async () => (await navigator.serviceWorker.getRegistration()).update());
+        await first.activate('button', 'Accuracy');
         await first.activate('button', 'Measure preset');
         await first.until(async () => (await first.widgets()).some(({ role, value }) => role === 'ProgressIndicator' && value > 0), 'no worker');
         assert.equal(await isSecond(first), false);

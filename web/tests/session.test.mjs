@@ -241,6 +241,7 @@ test('computations run in workers: they say how far they are, the page goes on, 
     const progress = async () => (await lab.widgets()).find(({ role }) => role === 'ProgressIndicator');
     const workers = () => lab.page.workers().length;
     const ended = () => lab.until(() => workers() === 0, 'the worker goes on');
+    await lab.activate('button', 'Accuracy');
     await lab.activate('button', 'Measure preset');
     // However soon it is done, no more than this is heard of it until further notice.
     while ((await lab.hear('Progress')).Progress === 0);
