@@ -537,7 +537,7 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
     let summary = jointplay(folder.path(), summary).expect(0).stdout;
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     for (joint, peak) in summary["peak_normal_N"].as_object().unwrap() {
-        let own = falls.lines().filter(|line| line.trim_start().starts_with(&format!("{joint} "))).next_back().unwrap();
+        let own = falls.lines().rfind(|line| line.trim_start().starts_with(&format!("{joint} "))).unwrap();
         let said: f64 = own.split_whitespace().nth(1).unwrap().parse().unwrap();
         assert!((said / peak.as_f64().unwrap() - 1.0).abs() < 1e-3, "{own}: {peak}");
     }
