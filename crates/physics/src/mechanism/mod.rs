@@ -613,7 +613,8 @@ impl Mechanism {
         of_scene.map(move |e| e.report(t, motion))
     }
 
-    /// As [`SceneElement::pressed`], of every element that has edges, at `t`, the time of the motion last measured: two numbers each.
+    /// How deep every element that has edges is pressed in, and that or, where it has let go meanwhile, not above 0: two numbers each, in
+    /// any unit, at `t`, s, the time of the motion last measured.
     pub fn pressed(&self, t: f64) -> impl Iterator<Item = f64> {
         let motion = self.equations.motion();
         self.elements.iter().filter_map(move |e| e.pressed(t, motion)).flatten()
