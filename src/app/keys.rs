@@ -45,6 +45,8 @@ pub enum Action {
 
 /// Key, how it is written in the overlay (empty: with the line above), what it does.
 pub struct Binding {
+    /// Where the overlay lists it.
+    pub group: Group,
     /// Key.
     pub key: Key,
     /// What it asks for.
@@ -55,68 +57,71 @@ pub struct Binding {
     pub help: &'static str,
 }
 
-const fn bind(key: Key, action: Action, written: &'static str, help: &'static str) -> Binding {
-    Binding { key, action, written, help }
+const fn bind(group: Group, key: Key, action: Action, written: &'static str, help: &'static str) -> Binding {
+    Binding { group, key, action, written, help }
 }
 
 /// All keys.
 pub const BINDINGS: [Binding; 41] = [
-    bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
-    bind(Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
-    bind(Key::ArrowLeft, Action::StepBack, "Left arrow", "Undo the latest step"),
+    bind(Group::Run, Key::Space, Action::PlayPause, "Space", "Play or pause"),
+    bind(Group::Run, Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
+    bind(Group::Run, Key::ArrowLeft, Action::StepBack, "Left arrow", "Undo the latest step"),
     bind(
+        Group::Run,
         Key::Comma,
         Action::Impact { forward: false },
         ", and .",
         "Previous and next impact of the ball joint that is followed, or else of any",
     ),
-    bind(Key::Period, Action::Impact { forward: true }, "", ""),
-    bind(Key::J, Action::Backwards, "J", "Play backwards"),
-    bind(Key::Home, Action::Home, "Home, End", "Start and end of the run so far"),
-    bind(Key::End, Action::End, "", ""),
-    bind(Key::R, Action::Reset, "R", "Reset to t = 0"),
-    bind(Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
-    bind(Key::Plus, Action::Faster, "", ""),
-    bind(Key::Equals, Action::Faster, "", ""),
-    bind(Key::ArrowDown, Action::Slower, "Down arrow, -", "Slower"),
-    bind(Key::Minus, Action::Slower, "", ""),
-    bind(Key::F, Action::Fit, "F", "Show everything"),
-    bind(Key::Num1, Action::Preset(0), "1", "Isometric view"),
-    bind(Key::Num2, Action::Preset(1), "2", "Front view"),
-    bind(Key::Num3, Action::Preset(2), "3", "Side view"),
-    bind(Key::Num4, Action::Preset(3), "4", "Top view"),
+    bind(Group::Run, Key::Period, Action::Impact { forward: true }, "", ""),
+    bind(Group::Run, Key::J, Action::Backwards, "J", "Play backwards"),
+    bind(Group::Run, Key::Home, Action::Home, "Home, End", "Start and end of the run so far"),
+    bind(Group::Run, Key::End, Action::End, "", ""),
+    bind(Group::Run, Key::R, Action::Reset, "R", "Reset to t = 0"),
+    bind(Group::Run, Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
+    bind(Group::Run, Key::Plus, Action::Faster, "", ""),
+    bind(Group::Run, Key::Equals, Action::Faster, "", ""),
+    bind(Group::Run, Key::ArrowDown, Action::Slower, "Down arrow, -", "Slower"),
+    bind(Group::Run, Key::Minus, Action::Slower, "", ""),
+    bind(Group::Picture, Key::F, Action::Fit, "F", "Show everything"),
+    bind(Group::Picture, Key::Num1, Action::Preset(0), "1", "Isometric view"),
+    bind(Group::Picture, Key::Num2, Action::Preset(1), "2", "Front view"),
+    bind(Group::Picture, Key::Num3, Action::Preset(2), "3", "Side view"),
+    bind(Group::Picture, Key::Num4, Action::Preset(3), "4", "Top view"),
     bind(
+        Group::Picture,
         Key::Num5,
         Action::CloseUp(0),
         "5, 6, 7, 8, 9",
         "Close-up of the first, second, … ball joint; the view follows it",
     ),
-    bind(Key::Num6, Action::CloseUp(1), "", ""),
-    bind(Key::Num7, Action::CloseUp(2), "", ""),
-    bind(Key::Num8, Action::CloseUp(3), "", ""),
-    bind(Key::Num9, Action::CloseUp(4), "", ""),
-    bind(Key::X, Action::Magnify, "X", "Next magnification of the clearance"),
-    bind(Key::M, Action::Sound, "M", "Sound on or off: a click for every impact"),
-    bind(Key::L, Action::Microscope, "L", "Microscope on the ball joint in focus, shown or hidden"),
-    bind(Key::I, Action::ImpactList, "I", "Impact list shown or hidden"),
-    bind(Key::G, Action::IdealGhost, "G", "Ideal ghost: the machine without play, shown or hidden"),
-    bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
-    bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
-    bind(Key::P, Action::Plots, "P", "Plots shown or hidden"),
-    bind(Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
-    bind(Key::F5, Action::Present, "F5", "Presentation: the picture alone, large type, thick arrows"),
+    bind(Group::Picture, Key::Num6, Action::CloseUp(1), "", ""),
+    bind(Group::Picture, Key::Num7, Action::CloseUp(2), "", ""),
+    bind(Group::Picture, Key::Num8, Action::CloseUp(3), "", ""),
+    bind(Group::Picture, Key::Num9, Action::CloseUp(4), "", ""),
+    bind(Group::Picture, Key::X, Action::Magnify, "X", "Next magnification of the clearance"),
+    bind(Group::Picture, Key::M, Action::Sound, "M", "Sound on or off: a click for every impact"),
+    bind(Group::Picture, Key::L, Action::Microscope, "L", "Microscope on the ball joint in focus, shown or hidden"),
+    bind(Group::Window, Key::I, Action::ImpactList, "I", "Impact list shown or hidden"),
+    bind(Group::Picture, Key::G, Action::IdealGhost, "G", "Ideal ghost: the machine without play, shown or hidden"),
+    bind(Group::Picture, Key::A, Action::Arrows, "A", "Force arrows on or off"),
+    bind(Group::Window, Key::C, Action::Panel, "C", "Controls shown or hidden"),
+    bind(Group::Window, Key::P, Action::Plots, "P", "Plots shown or hidden"),
+    bind(Group::Window, Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
+    bind(Group::Window, Key::F5, Action::Present, "F5", "Presentation: the picture alone, large type, thick arrows"),
     bind(
+        Group::Window,
         Key::PageDown,
         Action::TurnPage { forward: true },
         "Page Down, Page Up",
         "Next and previous step of a lesson, as a presenter's remote sends them",
     ),
-    bind(Key::PageUp, Action::TurnPage { forward: false }, "", ""),
-    bind(Key::T, Action::Theme, "T", "Light or dark"),
-    bind(Key::Questionmark, Action::Help, "?", "This list"),
-    bind(Key::Slash, Action::Help, "", ""),
-    bind(Key::F1, Action::Help, "", ""),
-    bind(Key::Escape, Action::Close, "Esc", "Close"),
+    bind(Group::Window, Key::PageUp, Action::TurnPage { forward: false }, "", ""),
+    bind(Group::Window, Key::T, Action::Theme, "T", "Light or dark"),
+    bind(Group::Window, Key::Questionmark, Action::Help, "?", "This list"),
+    bind(Group::Window, Key::Slash, Action::Help, "", ""),
+    bind(Group::Window, Key::F1, Action::Help, "", ""),
+    bind(Group::Window, Key::Escape, Action::Close, "Esc", "Close"),
 ];
 
 /// Mouse and touch, for the overlay.
@@ -160,41 +165,9 @@ impl Group {
         }
     }
 
-    fn of(action: Action) -> Self {
-        match action {
-            Action::PlayPause
-            | Action::Step
-            | Action::StepBack
-            | Action::Backwards
-            | Action::Impact { .. }
-            | Action::Home
-            | Action::End
-            | Action::Reset
-            | Action::Slower
-            | Action::Faster => Self::Run,
-            Action::Fit
-            | Action::Preset(_)
-            | Action::CloseUp(_)
-            | Action::Magnify
-            | Action::Sound
-            | Action::Microscope
-            | Action::IdealGhost
-            | Action::Arrows => Self::Picture,
-            Action::Panel
-            | Action::Plots
-            | Action::Bench
-            | Action::ImpactList
-            | Action::Present
-            | Action::TurnPage { .. }
-            | Action::Theme
-            | Action::Help
-            | Action::Close => Self::Window,
-        }
-    }
-
     /// What is listed under it: key or gesture, and what it does.
     pub fn rows(self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        let keys = BINDINGS.iter().filter(move |b| !b.written.is_empty() && Self::of(b.action) == self);
+        let keys = BINDINGS.iter().filter(move |b| !b.written.is_empty() && b.group == self);
         let pointer = POINTER.into_iter().filter(move |_| self == Self::Pointer);
         keys.map(|b| (b.written, b.help)).chain(pointer)
     }

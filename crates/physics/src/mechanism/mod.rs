@@ -633,12 +633,12 @@ impl Mechanism {
     }
 
     /// Lets the elements that have edges follow their laws as if they pressed, or not, wherever they are, as `pressed` says, as of
-    /// [`Self::pressed`]; with `None` as the motion has it.
-    pub fn hold_elements(&mut self, pressed: Option<&[f64]>) {
+    /// [`Self::pressed`]; if it is empty, as the motion has it.
+    pub fn hold_elements(&mut self, pressed: &[f64]) {
         let motion = self.equations.motion();
         let with_edges = self.elements.iter_mut().filter(|e| e.pressed(0.0, motion).is_some());
         for (i, element) in with_edges.enumerate() {
-            element.hold(pressed.map(|pressed| pressed[2 * i + 1] > 0.0));
+            element.hold(pressed.get(2 * i + 1).map(|pressed| *pressed > 0.0));
         }
     }
 

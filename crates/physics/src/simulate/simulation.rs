@@ -419,6 +419,7 @@ impl Simulation {
         // A fixed step is the user's choice.
         let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
         self.attempt.sides.clear();
+        self.attempt.edge = false;
         if self.mechanism.is_kinematic() {
             self.kinematic_step(follows_drives)?;
         } else if self.running.solver.method.is_adaptive() {
@@ -478,10 +479,7 @@ impl Simulation {
         let Self { mechanism, stepper, state, attempt, running, .. } = self;
         let StepEnd { t, y, k, memory, .. } = &state.now;
         mechanism.contacts.forget_left_pieces();
-        let sides = &attempt.sides;
-        if !sides.is_empty() {
-            mechanism.hold_elements(Some(sides));
-        }
+        mechanism.hold_elements(&attempt.sides);
         let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
         let end = &mut attempt.end;
         let tolerance = running.solver.tolerance;
@@ -489,9 +487,7 @@ impl Simulation {
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
         attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
-        if !attempt.sides.is_empty() {
-            mechanism.hold_elements(None);
-        }
+        mechanism.hold_elements(&[]);
         error
     }
 

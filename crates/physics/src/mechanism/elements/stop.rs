@@ -116,7 +116,8 @@ impl ForceElement for Stop {
         let (place, press) = self.at(motion);
         let nearest = self.nearest(&place);
         // Where it has let go, what it still stores is lost as it comes out.
-        let elastic = if nearest.depth > 0.0 || press.is_some() { nearest.elastic } else { 0.0 };
+        let let_go = nearest.depth > 0.0 && 1.0 + self.damping * nearest.rate <= 0.0;
+        let elastic = if let_go || press.is_some() { nearest.elastic } else { 0.0 };
         powers.damping += (press.map_or(0.0, |press| press.force) - elastic) * nearest.rate;
     }
 }

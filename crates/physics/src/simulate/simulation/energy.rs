@@ -54,8 +54,8 @@ impl Simulation {
         let energies = energies(mechanism, state);
         if mechanism.has_powers() {
             // Powers may jump at an edge at the step's end: those of the step count.
-            if !self.attempt.sides.is_empty() {
-                mechanism.hold_elements(Some(&self.attempt.sides));
+            if self.attempt.edge {
+                mechanism.hold_elements(&self.attempt.sides);
                 mechanism.forget_evaluation();
             }
             let now = &state.now;
@@ -68,9 +68,7 @@ impl Simulation {
                 self.begin_wear_of_step();
             }
             self.lay_out_course(h, end);
-            if !self.attempt.sides.is_empty() {
-                self.mechanism.hold_elements(None);
-            }
+            self.mechanism.hold_elements(&[]);
             let switched = switched || self.attempt.edge;
             let Record { account, wear, .. } = &mut self.state.record;
             account.powers = (!switched).then_some(end);
