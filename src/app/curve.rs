@@ -12,7 +12,7 @@ use crate::simulate::Bin;
 /// Width of a curve, points.
 pub const WIDTH: f32 = 1.4;
 /// Length of a dash of one colour where curves coincide, points.
-const DASH: f32 = 6.0;
+pub const DASH: f32 = 6.0;
 
 /// Most pixels over which a steep curve fades into the next column.
 const SOFTEST: f32 = 6.0;
@@ -43,18 +43,19 @@ pub struct Curves<'a> {
     /// Unit of the time axis in s, and of the value axis in SI units.
     units: [f64; 2],
     width: f32,
-    dashed: bool,
+    /// Length of its dashes, points; `None` for full lines.
+    dashes: Option<f32>,
 }
 
 impl<'a> Curves<'a> {
     /// Curves over axes with the given `units`: of time in s, and of the value in SI units.
     pub fn new(traces: &'a [Trace], units: [f64; 2]) -> Self {
-        Self { base: PlotItemBase::new("curves".to_owned()), traces, units, width: WIDTH, dashed: false }
+        Self { base: PlotItemBase::new("curves".to_owned()), traces, units, width: WIDTH, dashes: None }
     }
 
-    /// Thin and dashed, for a constant level rather than a motion.
-    pub fn dashed(mut self) -> Self {
-        (self.width, self.dashed) = (1.0, true);
+    /// In dashes of `length` points, `width` points thick.
+    pub fn dashed(mut self, width: f32, length: f32) -> Self {
+        (self.width, self.dashes) = (width, Some(length));
         self
     }
 
@@ -88,8 +89,8 @@ impl<'a> Curves<'a> {
             here.clear();
             let present = all.iter().enumerate().map(|(index, bars)| (index, bars[column]));
             here.extend(present.filter(|(_, bar)| bar.height() > 0.0));
-            if self.dashed {
-                let gap = (column as f32 / dash) as usize % 2 == 1;
+            if let Some(length) = self.dashes {
+                let gap = (column as f32 / (length * scale).max(1.0)) as usize % 2 == 1;
                 here.retain(|(_, bar)| !gap || bar.height() > 3.0 * width);
             }
             // Curves that run side by side keep their order, whichever is steeper just here.

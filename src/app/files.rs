@@ -258,12 +258,7 @@ impl App {
 
     /// Saves what the plots recorded.
     pub fn save_record(&mut self) {
-        let name = format!("{}.csv", self.file_stem());
-        let (rows, meta) = (record_csv(&self.player), meta(&self.player, []));
-        self.save(vec![
-            SaveFile { name: name.clone(), mime: "text/csv", bytes: rows.into_bytes() },
-            SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
-        ]);
+        self.save(record_files(&self.player));
     }
 
     /// Saves the plots on show as SVG.
@@ -289,8 +284,7 @@ impl App {
 
     /// Scene and time, for the names of files.
     pub(super) fn file_stem(&self) -> String {
-        let time = self.player.pacer.shown() * 1e3;
-        format!("{}-{time:.3}ms", self.player.scene().name)
+        file_stem(&self.player)
     }
 
     /// What the application itself has to say, in a sentence; "" for nothing.
@@ -358,6 +352,21 @@ pub fn verdict_words(verdict: &Verdict) -> String {
         Verdict::Reached => "State of the link reached; it has no hash to compare with".to_owned(),
         Verdict::Failed(reason) => format!("State of the link not reproduced: {reason}"),
     }
+}
+
+/// Scene and time, for the names of files.
+fn file_stem(player: &Player) -> String {
+    format!("{}-{:.3}ms", player.scene().name, player.pacer.shown() * 1e3)
+}
+
+/// The record of a run, and what made it.
+pub(super) fn record_files(player: &Player) -> Vec<SaveFile> {
+    let name = format!("{}.csv", file_stem(player));
+    let (rows, meta) = (record_csv(player), meta(player, []));
+    vec![
+        SaveFile { name: name.clone(), mime: "text/csv", bytes: rows.into_bytes() },
+        SaveFile { name: format!("{name}.meta.json"), mime: "application/json", bytes: meta.into_bytes() },
+    ]
 }
 
 /// The record as a table: time, then the least and the greatest value of each channel since the row before; SI units.

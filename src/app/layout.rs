@@ -178,6 +178,7 @@ impl App {
 
     /// What lies over all panels.
     fn over_all(&mut self, ui: &Ui) {
+        self.save_kept();
         self.impact_list_ui(ui.ctx());
         self.point_out(ui);
         self.dialog_ui(ui.ctx());
@@ -432,12 +433,16 @@ impl App {
             self.microscope_beside(ui);
         }
         let area = ui.available_rect_before_wrap();
+        let whole = area;
+        let area = self.picture_before(ui, area, plain);
         self.picture_rect = area;
         let presenting = self.is_presenting() || self.embedded().is_some();
         self.player.place_ghost();
         let caption = self.caption_plate(ui);
         let above = caption.as_ref().map(|(_, plate)| *plate);
-        self.viewport.ui(ui, &self.player, plain, above);
+        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
+        self.viewport.ui(&mut place, &self.player, plain, above);
+        ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.viewport.take_clicked() {
             self.focus(joint);
             self.microscope.set_open(true);
@@ -479,8 +484,8 @@ impl App {
             }
         });
         self.caption(ui, caption);
-        drop_hint(ui, area);
-        let messages = self.messages(ui, inner);
+        drop_hint(ui, whole);
+        let messages = self.messages(ui, whole.shrink(10.0));
         self.notice_plate(ui, messages);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player)).inner

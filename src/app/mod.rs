@@ -9,6 +9,7 @@ mod background;
 mod bench;
 mod canvas;
 mod click;
+mod compare;
 mod controls;
 mod curve;
 #[cfg(not(target_arch = "wasm32"))]
@@ -79,6 +80,7 @@ use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
 pub use click::{Click, MOST_CLICKS, PITCHES, Stretch, Voice, clicks};
+pub use compare::{Comparison, Kept};
 use controls::Controls;
 #[cfg(not(target_arch = "wasm32"))]
 pub use desktop::DesktopHost;
@@ -596,6 +598,7 @@ impl App {
                 self.problem = None;
                 self.timeline.reset();
                 self.plots.reset();
+                self.plots.comparison.reset();
                 self.viewport.restart(&self.player);
             }
             Err(error) => self.problem = Some(error.located(self.player.wanted()).to_string()),
@@ -711,6 +714,7 @@ impl App {
         }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
+        let moves = self.plots.comparison.advance(&self.player, dt as f32) || moves;
         moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
@@ -730,6 +734,7 @@ impl App {
         self.viewport.show_scene(&self.player);
         self.timeline.reset();
         self.plots.reset();
+        self.plots.comparison.clear();
         if another {
             self.plots.begin(scene);
         }

@@ -18,11 +18,12 @@ pub struct Point {
 }
 
 /// The latest path of each of the first [`RECORDED_JOINTS`] ball joints.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Paths {
     joints: Vec<Path>,
 }
 
+#[derive(Clone)]
 struct Path {
     /// The body that carries the socket; `None` is the world.
     carrier: Option<usize>,

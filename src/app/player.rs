@@ -86,6 +86,9 @@ pub struct Player {
     log: Log,
     /// Changes of parameters since they were last taken.
     edits: Vec<Edit>,
+    /// Whether the run is to be copied before its next change; and that copy.
+    keeps_before: bool,
+    before: Option<Box<Self>>,
     /// Number of log entries before the displayed instant; and the time of every entry, s.
     applied: usize,
     event_times: Vec<f64>,
@@ -181,6 +184,8 @@ impl Player {
             stepping: 0.0,
             log: Log::new(&scene.changes),
             edits: Vec::new(),
+            keeps_before: false,
+            before: None,
             sections: None,
             watch: RunWatch::new(scene),
             twin: None,
@@ -190,6 +195,105 @@ impl Player {
         };
         player.start_record();
         Ok(player)
+    }
+
+    /// A copy of the run with its record, paused, without its twin: it goes on as this run would have done without what is done to it
+    /// from now on.
+    fn copy(&self) -> Self {
+        let run = |run: &Simulation| Simulation::of(&run.snapshot());
+        let scene = self.simulation.running_scene();
+        Self {
+            pacer: self.pacer.clone(),
+            clock: self.clock,
+            simulation: run(&self.simulation),
+            unchanged: self.unchanged.as_ref().map(|unchanged| Box::new(run(unchanged))),
+            original: self.original.clone(),
+            warnings: self.warnings.clone(),
+            playing: false,
+            backwards: false,
+            stopped: self.stopped.clone(),
+            frame: self.frame.clone(),
+            peaks: self.peaks.clone(),
+            coming: self.coming.clone(),
+            passed: self.passed.clone(),
+            channels: self.channels.clone(),
+            picks: self.picks.clone(),
+            history: self.history.clone(),
+            near: self.near.clone(),
+            contact_history: self.contact_history.clone(),
+            blows: self.blows.clone(),
+            impact_record: self.impact_record.clone(),
+            recorded: self.recorded.clone(),
+            recorded_to: self.recorded_to,
+            values: self.values.clone(),
+            settling: self.settling.clone(),
+            paths: self.paths.clone(),
+            keyframes: self.keyframes.copy(),
+            reached: self.reached,
+            most_steps: self.most_steps,
+            left: None,
+            sought: None,
+            log: self.log.clone(),
+            edits: Vec::new(),
+            keeps_before: false,
+            before: None,
+            applied: self.applied,
+            event_times: self.event_times.clone(),
+            sections: self.sections,
+            watch: self.watch.clone(),
+            twin: None,
+            gravity: self.gravity.clone(),
+            ideal: self.ideal.is_some().then(|| Box::new(Ideal::new(scene))),
+            stepped: self.stepped,
+            stepping: self.stepping,
+        }
+    }
+
+    /// Whether the run is copied before its next change of a parameter, for [`Self::take_before`].
+    pub(super) fn keep_before(&mut self, on: bool) {
+        self.keeps_before = on;
+    }
+
+    /// The run as it was before the change since [`Self::keep_before`], if there was one.
+    pub(super) fn take_before(&mut self) -> Option<Box<Self>> {
+        self.before.take()
+    }
+
+    /// Whether all of the record was made with the parameters in force now, and nobody pulled.
+    pub(super) fn is_as_started(&self) -> bool {
+        self.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_waiting()
+    }
+
+    /// Shows `time`, s, as far as the run can be taken there while `may_step`; whether it got there, or as far as it goes.
+    pub(super) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
+        let there = if time <= self.reached {
+            if time != self.pacer.shown() {
+                self.go_to(time);
+            }
+            true
+        } else {
+            self.run_towards(time, may_step)
+        };
+        self.hand_out_peaks();
+        there
+    }
+
+    /// By what names channels are picked.
+    pub(super) fn picks(&self) -> &[String] {
+        &self.picks
+    }
+
+    /// The run as it is, if it is to be kept before a change.
+    fn before_change(&self) -> Option<Box<Self>> {
+        self.keeps_before.then(|| Box::new(self.copy()))
+    }
+
+    /// A change was made to the run that was `before`; nothing if it changed no parameter.
+    fn changed_from(&mut self, before: Option<Box<Self>>) {
+        let changed = |before: &Self| before.wanted().changes != self.wanted().changes;
+        if let Some(before) = before.filter(|before| changed(before)) {
+            (self.before, self.keeps_before) = (Some(before), false);
+        }
     }
 
     /// The simulation.
@@ -536,6 +640,7 @@ impl Player {
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
+        let run_before = self.before_change();
         if self.has_future() {
             // A refused change must not abandon the future.
             self.wanted().clone().set(key, value)?;
@@ -545,6 +650,7 @@ impl Player {
         let effect = self.apply_set(key, value)?;
         self.note(Event::set(key, value));
         self.note_edits(&before);
+        self.changed_from(run_before);
         Ok(effect)
     }
 
@@ -607,12 +713,14 @@ impl Player {
     /// As [`Simulation::set_value`]; nothing has changed then.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
         self.original.get(key)?;
+        let run_before = self.before_change();
         self.branch();
         let before = self.wanted().changes.clone();
         let effect = self.apply_original(key)?;
         let key = key.to_owned();
         self.note(Event::Original { key });
         self.note_edits(&before);
+        self.changed_from(run_before);
         Ok(effect)
     }
 

@@ -4,11 +4,12 @@
 use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo, vec2};
 use egui_plot::{AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform};
 
+use super::compare::{Comparison, Kept};
 use super::curve::{Curves, Path, Trace};
 use super::player::Player;
 use super::stack::stack;
 use super::zoom::{self, Zoom};
-use super::{layout, opening};
+use super::{curve, layout, opening};
 use super::{theme, value};
 use crate::scene::Scene;
 use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
@@ -59,6 +60,10 @@ pub struct Plots {
     traces: Vec<Trace>,
     levels: Vec<Trace>,
     readings: Vec<Vec<PlotPoint>>,
+    /// Traces of one plot of the runs before a change.
+    before: Vec<Vec<Trace>>,
+    /// Runs before a change, whose curves are shown, too.
+    pub comparison: Comparison,
     /// Latest place of each plot of a quantity.
     places: Vec<(Quantity, Place)>,
     /// Time range that the user has zoomed to, s, in place of the window.
@@ -204,6 +209,8 @@ impl Plots {
             traces: Vec::new(),
             levels: Vec::new(),
             readings: Vec::new(),
+            before: Vec::new(),
+            comparison: Comparison::default(),
             places: Vec::new(),
             zoomed: None,
         }
@@ -253,6 +260,7 @@ impl Plots {
                      an instant on show, double-click for the window chosen here",
                 )
                 .accessible_name("Window");
+            self.comparison.ui(ui, player);
         });
     }
 
@@ -438,8 +446,13 @@ impl Plots {
                 query(*channel, &mut trace.bins);
             }
         }
-        self.levels.clear();
         let kind = panel.kind;
+        self.before.clear();
+        if kind != PlotKind::Bands {
+            let shown = self.comparison.shown();
+            self.before.extend(shown.map(|kept| before(kept, player, panel, &self.hidden, dark, (from, to, bins))));
+        }
+        self.levels.clear();
         if kind == PlotKind::FromZeroWithClearances {
             // As recorded: the present value says nothing about the past.
             for index in player.clearances() {
@@ -454,7 +467,7 @@ impl Plots {
         let bands = if kind == PlotKind::Bands { self.bands(members, units) } else { Vec::new() };
         let from_zero = matches!(kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
         let values = if bands.is_empty() {
-            extremes(self.traces.iter().chain(&self.levels), size)
+            extremes(self.traces.iter().chain(&self.levels).chain(self.before.iter().flatten()), size)
         } else {
             let edges = bands.iter().flat_map(|band| band.low.iter().chain(&band.high));
             edges.fold(None, |all, &edge| widened(all, edge, edge))
@@ -520,7 +533,7 @@ impl Plots {
                 .grid_spacing(Rangef::new(MARKS_APART, 300.0))
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0);
-            let Self { traces, levels, readings, hidden, .. } = &*self;
+            let Self { traces, levels, readings, hidden, comparison, before, .. } = &*self;
             // All curves at the time under the pointer.
             let reading = |position: &HoverPosition<'_>| {
                 let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
@@ -555,7 +568,14 @@ impl Plots {
                     }
                     return;
                 }
-                plot.add(Curves::new(levels, units).dashed());
+                plot.add(Curves::new(levels, units).dashed(1.0, curve::DASH));
+                for (kept, traces) in comparison.shown().zip(before) {
+                    let curves = Curves::new(traces, units);
+                    plot.add(match kept.dashes() {
+                        Some(length) => curves.dashed(curve::WIDTH, length),
+                        None => curves,
+                    });
+                }
                 plot.add(Curves::new(traces, units));
                 for ((channel, member), (trace, points)) in members.iter().zip(traces.iter().zip(readings)) {
                     if !hidden.contains(channel) {
@@ -681,8 +701,31 @@ impl Plots {
                     }
                 }
             }
+            if panel.kind != PlotKind::Bands {
+                self.comparison.legend(ui, height);
+            }
         });
     }
+}
+
+/// What `kept` recorded of the members of `panel`, from and to these instants, s, in at most so many bins.
+fn before(
+    kept: &Kept,
+    player: &Player,
+    panel: &Panel<'_>,
+    hidden: &[usize],
+    dark: bool,
+    (from, to, bins): (f64, f64, usize),
+) -> Vec<Trace> {
+    let seen = panel.members.iter().enumerate().filter(|(_, (channel, _))| !hidden.contains(channel));
+    let trace = |(index, (channel, _)): (usize, &(usize, &str))| {
+        let mut trace = Trace { colour: kept.colour(theme::series(index, dark), dark), ..Trace::default() };
+        if let Some(channel) = kept.channel(player, *channel) {
+            kept.run().bins(channel, from, to, bins, &mut trace.bins);
+        }
+        trace
+    };
+    seen.map(trace).collect()
 }
 
 /// One term of a stack, in the units of the axes.

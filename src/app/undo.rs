@@ -166,6 +166,11 @@ impl Undo {
         }
     }
 
+    /// When the latest change was made, s of viewing.
+    fn last(&self) -> Option<f64> {
+        self.done.last().map(|last| last.at)
+    }
+
     /// What undoing would do, and redoing, in words; `None` if there is nothing.
     pub fn words(&self, redo: bool) -> Option<String> {
         let entry = if redo { &self.undone } else { &self.done }.last()?;
@@ -240,6 +245,8 @@ impl App {
             self.undo.view = None;
             return;
         }
+        let key = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()).map(|edit| &*edit.key);
+        self.compare(key, !held && self.undo.last().is_none_or(|at| now - at > TOGETHER));
         if let Some(edit) = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()) {
             let original = self.player.original(&edit.key);
             let scene = self.player.wanted();

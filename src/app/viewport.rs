@@ -84,6 +84,10 @@ pub struct Viewport {
     clicked: Option<usize>,
     /// What the frames on the screen allow; `None`: the options' quality, always.
     pace: Option<Pace>,
+    /// What it shows, where another picture is beside it.
+    pub title: Option<String>,
+    /// Which of the pictures in a window it is.
+    number: usize,
 }
 
 impl Viewport {
@@ -112,7 +116,28 @@ impl Viewport {
             pinched: false,
             clicked: None,
             pace: None,
+            title: None,
+            number: 0,
         }
+    }
+
+    /// A second viewport, for another run beside the first.
+    pub fn beside(player: &Player) -> Self {
+        Self { number: 1, ..Self::new(player, ViewOptions::default()) }
+    }
+
+    /// Looks from where `other` looks.
+    pub fn look_as(&mut self, other: &Self) {
+        (self.camera, self.goal) = (other.camera, other.goal);
+        (self.fit_pending, self.fitted, self.moved) = (other.fit_pending, other.fitted, other.moved);
+        (self.frozen, self.followed) = (other.frozen, other.followed);
+    }
+
+    /// The same with its options, as it is drawn.
+    pub fn link(&mut self, other: &Self) {
+        self.options.clone_from(&other.options);
+        self.options.quality = other.quality();
+        self.look_as(other);
     }
 
     /// Where the camera is or is moving to; `None` before the first picture.
@@ -342,7 +367,8 @@ impl Viewport {
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: Option<Rect>) {
         let (rect, response) =
             ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::click_and_drag());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
+        let name = if self.number == 0 { "3D view" } else { "3D view before the change" };
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
         let size = screen.size;
         self.options.theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
@@ -386,13 +412,19 @@ impl Viewport {
         let painter = ui.painter_at(rect);
         let revision = follows.then_some(self.revision);
         let list = self.list.clone();
-        painter.add(render::Viewport::revised(rect, list, revision));
+        painter.add(render::Viewport::revised(rect, list, revision, self.number));
         // Of what was drawn, which may have fewer pixels than are shown.
         let Screen { scale, .. } = screen.drawn_with(self.list.quality);
         let following = self.followed.and_then(|picked| name_of(player, picked));
         let overlay = Overlay {
             time: Some(player.pacer.shown()),
-            notes: following.map(|name| format!("following {name}")).into_iter().chain(said).collect(),
+            notes: self
+                .title
+                .clone()
+                .into_iter()
+                .chain(following.map(|name| format!("following {name}")))
+                .chain(said)
+                .collect(),
             legend: true,
             labels: true,
         };

@@ -20,6 +20,7 @@ const NO_PERIOD: f64 = 1.0;
 pub type Observed = [f64; OBSERVABLES.len()];
 
 /// The orbit and the section of one run.
+#[derive(Clone)]
 pub struct RunWatch {
     period: Result<f64, String>,
     phase: f64,

@@ -13,7 +13,8 @@ use crate::view::DrawList;
 struct Resources {
     renderer: Renderer,
     finish: Finish,
-    shown: Option<Shown>,
+    /// By the numbers of the pictures.
+    shown: Vec<Option<Shown>>,
 }
 
 /// What is drawn to, and which picture it holds.
@@ -26,7 +27,8 @@ struct Shown {
 /// Creates the renderer and stores it in egui's callback resources. Call once, when the application starts.
 pub fn install(state: &egui_wgpu::RenderState) {
     let renderer = Renderer::new(&state.device, &state.adapter);
-    let resources = Resources { finish: renderer.finish(&state.device, state.target_format), renderer, shown: None };
+    let resources =
+        Resources { finish: renderer.finish(&state.device, state.target_format), renderer, shown: Vec::new() };
     state.renderer.write().callback_resources.insert(resources);
 }
 
@@ -40,32 +42,38 @@ pub fn install(state: &egui_wgpu::RenderState) {
 pub struct Viewport {
     list: Arc<DrawList>,
     revision: Option<u64>,
+    number: usize,
 }
 
 impl Viewport {
     /// Shape for `egui::Painter::add`: draws `list` at `list.size` and shows it in `rect`.
     pub fn shape(rect: egui::Rect, list: Arc<DrawList>) -> egui::Shape {
-        Self::revised(rect, list, None)
+        Self::revised(rect, list, None, 0)
     }
 
-    /// The same; where the picture before had this `revision`, too, it is the same one and only shown again.
-    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>) -> egui::Shape {
-        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision }).into()
+    /// The same for picture `number` of the window, from 0; where the one before had this `revision`, too, it is the same one and only
+    /// shown again.
+    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>, number: usize) -> egui::Shape {
+        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision, number }).into()
     }
 }
 
 impl Resources {
-    /// What `list` is drawn to.
-    fn target_for(&mut self, device: &wgpu::Device, list: &DrawList) -> &mut Shown {
+    /// What `list` is drawn to as picture `number`.
+    fn target_for(&mut self, device: &wgpu::Device, list: &DrawList, number: usize) -> (&mut Renderer, &mut Shown) {
         // A window can briefly be 0 pixels wide, or wider than the largest texture.
         let limit = device.limits().max_texture_dimension_2d;
         let size = list.size.map(|n| n.clamp(1, limit));
         let fits = |shown: &Shown| shown.target.fits(list, size);
-        let shown = self.shown.take().filter(fits).unwrap_or_else(|| {
+        if self.shown.len() <= number {
+            self.shown.resize_with(number + 1, || None);
+        }
+        let place = &mut self.shown[number];
+        let shown = place.take().filter(fits).unwrap_or_else(|| {
             let target = self.renderer.target(device, size, list.quality.samples);
             Shown { group: self.finish.group(device, &target.light), target, revision: None }
         });
-        self.shown.insert(shown)
+        (&mut self.renderer, place.insert(shown))
     }
 }
 
@@ -75,24 +83,24 @@ impl egui_wgpu::CallbackTrait for Viewport {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         _screen: &egui_wgpu::ScreenDescriptor,
-        encoder: &mut wgpu::CommandEncoder,
+        _encoder: &mut wgpu::CommandEncoder,
         resources: &mut egui_wgpu::CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
         // Without `install` there is no renderer: the rectangle stays empty.
         let Some(resources) = resources.get_mut::<Resources>() else {
             return Vec::new();
         };
-        let shown = resources.target_for(device, &self.list);
+        let (renderer, shown) = resources.target_for(device, &self.list, self.number);
         let before = std::mem::replace(&mut shown.revision, self.revision);
-        if (before.is_none() || before != self.revision)
-            && let Some(Shown { target, .. }) = &resources.shown
-        {
-            let renderer = &mut resources.renderer;
+        if before.is_none() || before != self.revision {
             // The first picture comes as early as it can.
             if before.is_some() {
-                renderer.make_another_pipeline(device, target);
+                renderer.make_another_pipeline(device, &shown.target);
             }
-            renderer.draw(device, queue, encoder, target, &self.list);
+            // A submission of its own: the pictures of a window share the renderer's buffers.
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
+            renderer.draw(device, queue, &mut encoder, &shown.target, &self.list);
+            queue.submit([encoder.finish()]);
         }
         Vec::new()
     }
@@ -106,7 +114,7 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get::<Resources>() else {
             return;
         };
-        if let Some(shown) = &resources.shown {
+        if let Some(Some(shown)) = resources.shown.get(self.number) {
             resources.finish.draw(pass, &shown.group);
         }
     }

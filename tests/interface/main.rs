@@ -6,6 +6,7 @@ mod common;
 
 mod bench_window;
 mod clicks;
+mod compare;
 mod embed;
 mod film;
 mod frames;

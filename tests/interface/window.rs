@@ -977,6 +977,9 @@ fn the_clearance_of_the_past_stays_where_it_was() {
     player.set("contact.clearance", "0.6 mm").expect("in range");
     player.run_to(0.05);
     harness.run();
+    // The run before the change is drawn in greys, too.
+    harness.get_all_by_label("— Clearance: 0.3 mm").next().expect("in a legend").click();
+    harness.run();
     let drawn = picture(&mut harness);
     // Dashed in the colour of weak text: how much of it there is in a row, from one time to another.
     let dashes = |harness: &mut Harness<'_, App>, from: f64, to: f64, clearance: f64| {

@@ -1,5 +1,7 @@
 //! States to which a run can be taken back: closely spaced in the recent past, thinned out in the older.
 
+use std::sync::Arc;
+
 use crate::app::twin::TwinMark;
 use crate::simulate::{Mark, Snapshot};
 
@@ -13,7 +15,8 @@ const FINE_BUDGET: usize = 4 << 20;
 
 /// A state, and what else a player restores with it.
 pub(super) struct Keyframe {
-    pub state: Snapshot,
+    /// A copy of the run shares it.
+    pub state: Arc<Snapshot>,
     /// Number of log entries before it.
     pub events: usize,
     /// Position in the record; only the kept states have it.
@@ -26,6 +29,11 @@ impl Keyframe {
     fn bytes(&self) -> usize {
         let twin = self.twin.as_ref().map_or(0, TwinMark::bytes);
         self.state.bytes() + twin + self.record.as_ref().map_or(0, Mark::bytes)
+    }
+
+    /// The same for a run without a twin.
+    fn alone(&self) -> Self {
+        Self { state: self.state.clone(), record: self.record.clone(), twin: None, ..*self }
     }
 }
 
@@ -43,6 +51,12 @@ impl Keyframes {
     /// Forgets everything.
     pub fn clear(&mut self) {
         *self = Self::default();
+    }
+
+    /// Those of a copy of the run, without its twin.
+    pub fn copy(&self) -> Self {
+        let alone = |list: &[Keyframe]| list.iter().map(Keyframe::alone).collect();
+        Self { kept: alone(&self.kept), fine: alone(&self.fine), ..*self }
     }
 
     /// Whether to keep the state after `steps` steps, the latest so far.

@@ -406,7 +406,7 @@ impl Player {
 
     fn keyframe(&self, record: Option<crate::simulate::Mark>) -> Keyframe {
         Keyframe {
-            state: self.simulation.snapshot(),
+            state: self.simulation.snapshot().into(),
             events: self.applied,
             record,
             twin: self.twin.as_ref().map(|twin| twin.mark()),

@@ -1,0 +1,361 @@
+//! Before and after: runs kept as they were before a change of a parameter. They go on beside the run, their curves stay in grey in
+//! the plots, and one of them can be shown beside the picture, at the same instant and from the same side.
+
+use eframe::egui::{self, Color32, Rect, RichText, TextEdit, Ui, pos2, vec2};
+
+use super::files::record_files;
+use super::player::Player;
+use super::viewport::Viewport;
+use super::{App, layout, value};
+
+/// Most runs pinned. One more is the latest before a change.
+const MOST_PINNED: usize = 3;
+/// Stepping time per frame for all of them, s: while the run plays, and while it does not.
+const BUDGET: f64 = 3e-3;
+const BUDGET_AT_REST: f64 = 12e-3;
+/// Part of a member's colour in the grey of its curve before: enough to tell members apart.
+const HUE: f32 = 0.3;
+/// Length of the dashes of pinned curves, points.
+const DASHES: [f32; MOST_PINNED] = [8.0, 4.0, 2.0];
+/// Least width of a name in a legend, points.
+const LEAST_LEGEND: f32 = 30.0;
+/// How their lines look, in a legend.
+const LINES: [&str; 1 + MOST_PINNED] = ["—", "– –", "- -", "· ·"];
+/// Greys of the latest and of the pinned curves, 0 the background.
+const GREYS: [f32; 1 + MOST_PINNED] = [0.55, 0.7, 0.6, 0.5];
+
+/// A run as it was before a change.
+pub struct Kept {
+    /// The parameter that was changed.
+    key: String,
+    /// The name that the user gave it.
+    name: Option<String>,
+    /// 0: the latest, which the next change replaces; otherwise pinned.
+    place: usize,
+    /// Whether its curves are shown.
+    pub shown: bool,
+    run: Box<Player>,
+    /// Its picture, while that is shown.
+    picture: Option<Box<Viewport>>,
+}
+
+impl Kept {
+    /// Its name; by default the parameter that was changed with its value in this run.
+    pub fn name(&self) -> String {
+        let given = self.name.as_ref().filter(|name| !name.trim().is_empty());
+        given.cloned().unwrap_or_else(|| named(&self.run, &self.key))
+    }
+
+    /// The run.
+    pub fn run(&self) -> &Player {
+        &self.run
+    }
+
+    /// Colour of the curve that is drawn in `colour` now.
+    pub fn colour(&self, colour: Color32, dark: bool) -> Color32 {
+        let level = GREYS[self.place];
+        let grey = Color32::from_gray((255.0 * if dark { level } else { 1.0 - level }) as u8);
+        grey.lerp_to_gamma(colour, HUE)
+    }
+
+    /// Length of its dashes, points; `None` for a full line.
+    pub fn dashes(&self) -> Option<f32> {
+        self.place.checked_sub(1).map(|pinned| DASHES[pinned])
+    }
+
+    /// Where its record has what `player` records at `channel`.
+    pub fn channel(&self, player: &Player, channel: usize) -> Option<usize> {
+        let (own, other) = (&self.run, player.channels());
+        if let Some(wanted) = other.list().get(channel) {
+            return own.channels().list().iter().position(|channel| channel == wanted);
+        }
+        let picked = other.picked().get(channel.checked_sub(player.picked().start)?)?;
+        let same = own.channels().picked().iter().position(|channel| channel.column == picked.column)?;
+        Some(own.picked().start + same)
+    }
+
+    /// How it differs from the run of `player`, a line for each parameter.
+    fn differences(&self, player: &Player) -> String {
+        let all = value::differences(self.run.scene(), player.scene(), &[]);
+        let ends = self.run.stopped().map(|stopped| format!("It {stopped}"));
+        let all: Vec<String> = all.into_iter().chain(ends).collect();
+        if all.is_empty() { "The same parameters as now".to_owned() } else { all.join("\n") }
+    }
+}
+
+/// The parameter `key` of what runs, with its value.
+fn named(run: &Player, key: &str) -> String {
+    value::named(run.scene(), key).map_or_else(|| key.to_owned(), |(name, value)| format!("{name}: {value}"))
+}
+
+/// The kept runs.
+pub struct Comparison {
+    /// Whether the run before a change is kept.
+    on: bool,
+    kept: Vec<Kept>,
+    /// Place of the one shown beside the picture, and of the one whose record is to be saved.
+    beside: Option<usize>,
+    to_save: Option<usize>,
+}
+
+impl Default for Comparison {
+    fn default() -> Self {
+        Self { on: true, kept: Vec::new(), beside: None, to_save: None }
+    }
+}
+
+/// What the user asks for in the menu.
+enum Wish {
+    Pin,
+    Save,
+    Remove,
+}
+
+impl Comparison {
+    /// Forgets all runs: another scene is shown.
+    pub fn clear(&mut self) {
+        (self.kept, self.beside) = (Vec::new(), None);
+    }
+
+    /// Keeps `run`, as it was before `key` was changed, in place of the latest.
+    pub fn add(&mut self, run: Box<Player>, key: String) {
+        self.kept.retain(|kept| kept.place != 0);
+        self.kept.insert(0, Kept { key, name: None, place: 0, shown: true, run, picture: None });
+    }
+
+    /// The kept runs, the latest first.
+    pub fn kept(&self) -> &[Kept] {
+        &self.kept
+    }
+
+    /// Those whose curves are shown.
+    pub fn shown(&self) -> impl Iterator<Item = &Kept> {
+        self.kept.iter().filter(|kept| kept.shown)
+    }
+
+    /// Takes the runs to where `player` is; returns whether one of them still lags behind.
+    pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
+        let start = (player.clock)();
+        let budget = if player.is_playing() { BUDGET } else { BUDGET_AT_REST };
+        let may_step = || (player.clock)() - start < budget;
+        let mut lags = false;
+        for kept in &mut self.kept {
+            let run = &mut kept.run;
+            run.pick(player.picks());
+            run.pacer.set_scale(player.pacer.scale());
+            if run.ideal().is_some() != player.ideal().is_some() {
+                run.set_ideal(player.ideal().is_some());
+            }
+            let (before, shown) = (run.pacer.shown(), player.pacer.shown());
+            if self.beside == Some(kept.place) || shown > run.reached() {
+                lags |= !run.follow(shown, may_step);
+                run.place_ghost();
+            }
+            if let Some(picture) = &mut kept.picture {
+                picture.advance(run, dt);
+                if !player.is_playing() && run.pacer.shown() != before {
+                    picture.revisit(run);
+                }
+            }
+        }
+        lags
+    }
+
+    /// The run begins anew. What was recorded under other parameters than now is not what this start gives.
+    pub fn reset(&mut self) {
+        self.kept.retain_mut(|kept| kept.run.is_as_started() || kept.run.reset().is_ok());
+        for kept in &mut self.kept {
+            kept.run.follow(0.0, || true);
+            kept.picture = None;
+        }
+    }
+
+    fn pin(&mut self, at: usize) {
+        let free = (1..=MOST_PINNED).find(|place| self.kept.iter().all(|kept| kept.place != *place));
+        let Some(kept) = self.kept.get_mut(at) else {
+            return;
+        };
+        let place = if kept.place == 0 { free } else { Some(0) };
+        if let Some(place) = place {
+            if self.beside == Some(kept.place) {
+                self.beside = Some(place);
+            }
+            kept.place = place;
+        }
+        // What is no longer pinned replaces the latest.
+        if place == Some(0) {
+            let kept = self.kept.remove(at);
+            self.kept.retain(|kept| kept.place != 0);
+            self.kept.insert(0, kept);
+        }
+    }
+
+    /// What the grey curves of a plot are, in what is left of a row `height` points high.
+    pub fn legend(&mut self, ui: &mut Ui, height: f32) {
+        let dark = ui.visuals().dark_mode;
+        let count = self.kept.len().max(1) as f32;
+        let width = (ui.available_width() / count - 6.0).min(170.0);
+        if width < LEAST_LEGEND {
+            return;
+        }
+        for kept in &mut self.kept {
+            let text = format!("{} {}", LINES[kept.place], kept.name());
+            let mut text = RichText::new(text).small().color(kept.colour(Color32::GRAY, dark));
+            if !kept.shown {
+                text = text.strikethrough();
+            }
+            let button = egui::Button::new(text).frame(false).truncate();
+            let response = ui.scope(|ui| {
+                ui.set_max_width(width);
+                ui.add(button.min_size(vec2(0.0, height)))
+            });
+            let response = response.inner;
+            ui.ctx().accesskit_node_builder(response.id, |node| node.set_toggled(kept.shown.into()));
+            if response.on_hover_text("The run before the change: its curves shown or hidden").clicked() {
+                kept.shown = !kept.shown;
+            }
+        }
+    }
+
+    /// The menu.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+        let name = match self.kept.len() {
+            0 => "Before and after".to_owned(),
+            count => format!("Before and after ({count})"),
+        };
+        let help = "Runs as they were before a change of a parameter: in the plots, or beside the picture";
+        layout::menu(ui, &name, true, |ui| self.entries(ui, player)).on_hover_text(help);
+    }
+
+    fn entries(&mut self, ui: &mut Ui, player: &Player) {
+        ui.checkbox(&mut self.on, "Keep the run before a change").on_hover_text(
+            "When a parameter is changed, the run goes on with the old value beside the new one: its curves are grey",
+        );
+        if self.kept.is_empty() {
+            ui.weak("Change a parameter to compare");
+        }
+        let mut wish = None;
+        let full = self.kept.iter().filter(|kept| kept.place > 0).count() == MOST_PINNED;
+        for (at, kept) in self.kept.iter_mut().enumerate() {
+            ui.separator();
+            ui.push_id(at, |ui| {
+                let differences = kept.differences(player);
+                let own = named(&kept.run, &kept.key);
+                let name = kept.name.get_or_insert_with(|| own.clone());
+                ui.add(TextEdit::singleline(name).desired_width(240.0))
+                    .on_hover_text(format!("Name of this run in the legends\n{differences}"))
+                    .accessible_name("Name");
+                if *name == own {
+                    kept.name = None;
+                }
+                ui.horizontal(|ui| {
+                    ui.checkbox(&mut kept.shown, "Curves").on_hover_text("Its curves in the plots, grey");
+                    let pinned = kept.place > 0;
+                    let pin = egui::Button::selectable(pinned, "Pin");
+                    let help = format!("Keep it when another parameter is changed; up to {MOST_PINNED}");
+                    if ui.add_enabled(pinned || !full, pin).on_hover_text(help).clicked() {
+                        wish = Some((at, Wish::Pin));
+                    }
+                    let beside = self.beside == Some(kept.place);
+                    let help = "Its machine beside the machine now, at the same instant and from the same side";
+                    if ui.selectable_label(beside, "Side by side").on_hover_text(help).clicked() {
+                        self.beside = (!beside).then_some(kept.place);
+                    }
+                    if ui.button("Save").on_hover_text("Its record, CSV").clicked() {
+                        wish = Some((at, Wish::Save));
+                    }
+                    if ui.button("Remove").on_hover_text("Forget this run").clicked() {
+                        wish = Some((at, Wish::Remove));
+                    }
+                });
+            });
+        }
+        match wish {
+            Some((at, Wish::Save)) => self.to_save = Some(self.kept[at].place),
+            Some((at, Wish::Pin)) => self.pin(at),
+            Some((at, Wish::Remove)) => {
+                let removed = self.kept.remove(at);
+                self.beside = self.beside.filter(|place| *place != removed.place);
+            }
+            None => {}
+        }
+    }
+
+    /// The run whose record is to be saved.
+    fn take_to_save(&mut self) -> Option<&Kept> {
+        let place = self.to_save.take()?;
+        self.kept.iter().find(|kept| kept.place == place)
+    }
+}
+
+/// The two halves of `area`: what was before, and what is now.
+fn halves(area: Rect) -> (Rect, Rect) {
+    let middle = area.center();
+    if area.width() >= area.height() {
+        (area.with_max_x(middle.x - 1.0), area.with_min_x(middle.x + 1.0))
+    } else {
+        (Rect::from_min_max(area.min, pos2(area.right(), middle.y - 1.0)), area.with_min_y(middle.y + 1.0))
+    }
+}
+
+impl App {
+    /// Keeps the run as it was before the change of `key` that was just made, unless a lesson is under way, which speaks of its own
+    /// plots; from now on the run before the next change is kept, if a gesture is over.
+    pub(super) fn compare(&mut self, key: Option<&str>, is_over: bool) {
+        let comparison = &mut self.plots.comparison;
+        let wanted = comparison.on && self.course.is_none();
+        if let Some((run, key)) = self.player.take_before().filter(|_| wanted).zip(key) {
+            comparison.add(run, key.to_owned());
+        }
+        if is_over || !wanted {
+            self.player.keep_before(wanted);
+        }
+    }
+
+    /// The runs kept from before a change.
+    pub fn comparison(&self) -> &Comparison {
+        &self.plots.comparison
+    }
+
+    /// Saves the record of a kept run, if that was asked for.
+    pub(super) fn save_kept(&mut self) {
+        if let Some(kept) = self.plots.comparison.take_to_save() {
+            let files = record_files(&kept.run);
+            self.save(files);
+        }
+    }
+
+    /// Shows the machine before beside the one now, if that is asked for; returns what is left of `area`.
+    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
+        let Self { plots, player, viewport, .. } = self;
+        let comparison = &mut plots.comparison;
+        let beside = comparison.beside;
+        let Some(kept) = comparison.kept.iter_mut().find(|kept| Some(kept.place) == beside) else {
+            viewport.title = None;
+            return area;
+        };
+        let (before, now) = halves(area);
+        if plain {
+            kept.run.follow(player.pacer.shown(), || true);
+        }
+        let name = kept.name();
+        let run = &mut kept.run;
+        let picture = kept.picture.get_or_insert_with(|| {
+            let mut picture = Viewport::beside(run);
+            picture.revisit(run);
+            Box::new(picture)
+        });
+        picture.link(viewport);
+        picture.title = Some(format!("before: {name}"));
+        viewport.title = Some(format!("now: {}", named(player, &kept.key)));
+        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
+        picture.ui(&mut place, run, plain, None);
+        viewport.look_as(picture);
+        if let Some(pull) = picture.take_pull() {
+            // What cannot be pulled stays as it is.
+            let _ = run.pull(pull);
+        }
+        picture.take_clicked();
+        now
+    }
+}

@@ -1,0 +1,176 @@
+//! Runs kept from before a change: their curves in the plots, and their machine beside the machine.
+
+use eframe::egui::{self, Rect, Theme, accesskit::Role};
+use egui_kittest::{Harness, kittest::Queryable as _};
+use jointplay::app::{App, Player};
+use jointplay::simulate::Bin;
+
+use crate::hands::plain;
+use crate::window::click;
+use crate::window::pixels::{Area, Picture};
+
+fn window() -> Harness<'static, App> {
+    let mut harness = plain("slider-crank", &[], [1280.0, 800.0], Theme::Dark);
+    harness.state_mut().run_to(0.02);
+    harness.run_steps(2);
+    harness
+}
+
+/// Sets a slider, and lets so much time pass that the next change is one of its own.
+fn set(harness: &mut Harness<'_, App>, slider: &str, value: f64) {
+    harness.get_by_role_and_label(Role::Slider, slider).set_value_accesskit(value);
+    harness.run_steps(45);
+}
+
+fn names(harness: &Harness<'_, App>) -> Vec<String> {
+    harness.state().comparison().kept().iter().map(|kept| kept.name()).collect()
+}
+
+fn force(player: &Player, from: f64, to: f64) -> Vec<Bin> {
+    let channel = player.channels().normal_force(0).expect("has a joint");
+    let mut bins = Vec::new();
+    player.bins(channel, from, to, 2000, &mut bins);
+    bins
+}
+
+/// The window's pixels, as seen.
+fn seen(harness: &mut Harness<'_, App>) -> Picture {
+    let picture = harness.render().expect("draws");
+    Picture::new(picture.width(), picture.into_raw())
+}
+
+/// Levels of a colour by which pixels of the same picture at another place of the window differ.
+const DITHER: u8 = 10;
+
+/// Pixels of a rectangle.
+fn area(rect: Rect) -> Area {
+    [rect.left(), rect.top(), rect.right(), rect.bottom()].map(|edge| edge.round() as usize)
+}
+
+/// Number of pixels of an area of `one` that differ, by more than the dither, from those of `other` that lie `by` columns further to
+/// the right.
+fn differing(one: &Picture, other: &Picture, [left, top, right, bottom]: Area, by: usize) -> usize {
+    let places = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+    let apart = |x, y| one.at(x, y).iter().zip(other.at(x + by, y)).any(|(a, b)| a.abs_diff(b) > DITHER);
+    places.filter(|(x, y)| apart(*x, *y)).count()
+}
+
+#[test]
+fn the_grey_curves_are_the_run_that_would_have_been() {
+    let mut harness = window();
+    set(&mut harness, "Clearance", 0.9);
+    assert_eq!(names(&harness), ["Clearance: 0.3 mm"]);
+    harness.state_mut().run_to(0.05);
+    harness.run_steps(200);
+    let app = harness.state();
+    let kept = &app.comparison().kept()[0];
+    let mut other = Player::new(app.player().scene()).expect("starts");
+    other.set("contact.clearance", "0.3 mm").expect("is allowed");
+    other.reset().expect("starts");
+    other.run_to(0.02);
+    other.run_to(0.05);
+    let wanted = force(&other, 0.02, 0.05);
+    assert!(wanted.len() > 100 && wanted.iter().any(|bin| bin.greatest > 0.0));
+    assert_eq!(force(kept.run(), 0.02, 0.05), wanted);
+    assert_ne!(force(app.player(), 0.02, 0.05), wanted);
+    // They are drawn in every plot of curves, unless they are hidden.
+    let plots = ["Normal force", "Acceleration"].map(|plot| harness.get_by_label(&format!("Plot of {plot}")).rect());
+    let with = seen(&mut harness);
+    harness.get_all_by_label("— Clearance: 0.3 mm").next().expect("in a legend").click();
+    harness.run_steps(3);
+    let without = seen(&mut harness);
+    for plot in plots {
+        let changed = differing(&with, &without, area(plot), 0);
+        assert!(changed > 50, "{changed}");
+    }
+}
+
+#[test]
+fn of_many_changes_the_latest_and_three_pinned_runs_stay() {
+    let mut harness = window();
+    // A drag is one change.
+    let track = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
+    harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
+    for part in 1..4 {
+        harness.hover_at(track.left_center() + egui::vec2(12.0 + 20.0 * part as f32, 0.0));
+        harness.run_steps(40);
+    }
+    harness.drop_at(track.left_center() + egui::vec2(72.0, 0.0));
+    harness.run_steps(45);
+    assert_eq!(names(&harness), ["Clearance: 0.3 mm"]);
+    click(&mut harness, "Before and after (1)");
+    for (pinned, clearance) in [0.2, 0.4, 0.6, 0.8].into_iter().enumerate() {
+        let pins: Vec<_> = harness.get_all_by_role_and_label(Role::Button, "Pin").collect();
+        assert_eq!(pins.len(), pinned + 1);
+        pins[0].click();
+        harness.run_steps(3);
+        set(&mut harness, "Clearance", clearance);
+    }
+    assert_eq!(names(&harness).len(), 4, "the fourth is not pinned: the next change replaces it");
+    assert_eq!(names(&harness)[0], "Clearance: 0.6 mm");
+    assert_eq!(names(&harness)[1..], ["Clearance: 0.2 mm", "Clearance: 0.26 mm", "Clearance: 0.3 mm"]);
+}
+
+#[test]
+fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
+    let mut harness = window();
+    set(&mut harness, "Clearance", 0.9);
+    harness.state_mut().reset();
+    harness.run_steps(3);
+    let app = harness.state();
+    assert_eq!(app.player().pacer.shown(), 0.0);
+    let kept = app.comparison().kept()[0].run();
+    assert!(kept.reached() >= 0.02 && force(kept, 0.0, 0.02).len() > 100);
+    assert_eq!(kept.scene().contact.clearance, 3e-4);
+    // This one was changed on its way: it begins anew with what it had last.
+    harness.state_mut().run_to(0.01);
+    set(&mut harness, "Clearance", 0.7);
+    harness.state_mut().run_to(0.02);
+    set(&mut harness, "Clearance", 0.3);
+    harness.state_mut().reset();
+    harness.run_steps(3);
+    let kept = harness.state().comparison().kept()[0].run();
+    assert_eq!((kept.reached(), kept.scene().contact.clearance), (0.0, 7e-4));
+}
+
+#[test]
+fn two_machines_of_the_same_parameters_are_the_same_picture() {
+    let mut harness = window();
+    set(&mut harness, "Clearance", 0.9);
+    click(&mut harness, "Before and after (1)");
+    click(&mut harness, "Pin");
+    click(&mut harness, "Side by side");
+    click(&mut harness, "Before and after (1)");
+    let before = harness.get_by_label("3D view before the change").rect();
+    let now = harness.get_by_label("3D view").rect();
+    assert_eq!(before.size(), now.size());
+    // Below the time, above buttons and messages.
+    let middle = area(Rect::from_min_max(before.min + egui::vec2(1.0, 90.0), before.max - egui::vec2(1.0, 60.0)));
+    let by = (now.left() - before.left()).round() as usize;
+    harness.state_mut().run_to(0.05);
+    harness.run_steps(200);
+    let other = seen(&mut harness);
+    assert!(differing(&other, &other, middle, by) > 100, "other clearances");
+    // The same again, from the start.
+    set(&mut harness, "Clearance", 0.3);
+    harness.state_mut().reset();
+    harness.state_mut().run_to(0.06);
+    harness.state_mut().look_back(0.05);
+    harness.run_steps(200);
+    let app = harness.state();
+    let kept = &app.comparison().kept()[1];
+    assert_eq!(kept.name(), "Clearance: 0.3 mm");
+    assert_eq!(kept.run().frame().time, app.player().frame().time);
+    let same = seen(&mut harness);
+    assert_eq!(differing(&same, &same, middle, by), 0);
+    // There is one camera for both.
+    let centre = before.center();
+    harness.drag_at(centre);
+    harness.hover_at(centre + egui::vec2(60.0, 20.0));
+    harness.run_steps(2);
+    harness.drop_at(centre + egui::vec2(60.0, 20.0));
+    harness.run_steps(30);
+    let turned = seen(&mut harness);
+    assert!(differing(&same, &turned, middle, 0) > 1000, "turned");
+    assert_eq!(differing(&turned, &turned, middle, by), 0);
+}
