@@ -64,11 +64,14 @@ export class Messages {
 
     constructor(laboratory) {
         this.laboratory = laboratory;
-        addEventListener('message', ({ source, data }) => {
+        const hear = ({ source, data }) => {
             if (source !== window.parent || data?.jointplay !== VERSION) return;
             if (this.#begun) this.#obey(data);
             else this.#waiting.push(data);
-        });
+        };
+        // stuck.js has listened so far, and goes on to.
+        globalThis.jointplayMail.forEach(hear);
+        globalThis.jointplayMail = { push: hear };
     }
 
     /** There is a picture. */
@@ -77,6 +80,11 @@ export class Messages {
         this.#tell('ready', { scene, version });
         this.#begun = true;
         for (const message of this.#waiting) this.#obey(message);
+        // A key that is of no use here may be one for the page around, as when slides go on.
+        addEventListener('keydown', (event) => {
+            const { key, code, shiftKey: shift, ctrlKey: control, altKey: alt, metaKey: meta } = event;
+            if (!this.laboratory.page.uses(key, control || meta, alt)) this.#tell('key', { key, code, shift, control, alt, meta });
+        }, { capture: true });
         setInterval(() => this.#watch(), PACE);
     }
 

@@ -79,7 +79,7 @@ export function makeHost(laboratory, lost) {
 
         shared(link) {
             // The query stays for what is not in the link: which renderer to use.
-            history.replaceState(null, '', location.pathname + location.search + new URL(link).hash);
+            history.replaceState(null, '', location.pathname + laboratory.ownQuery() + new URL(link).hash);
             copy(link).then((done) => {
                 if (!done) laboratory.page.say('The link is in the address bar: this browser keeps it off the clipboard');
             });

@@ -35,9 +35,23 @@ const LEFT_OUT = {
 /** The way to draw that the address asks for, if any. */
 const asked = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
 
+/** Words of an address that belong to the browser and are in no link that the laboratory makes. */
+const OWN_WORDS = ['renderer', 'theme'];
+/** The query without the words of a link: once the fragment holds those, they would say the same twice. */
+function ownQuery() {
+    const own = OWN_WORDS.filter((word) => query.has(word)).map((word) => `${word}=${encodeURIComponent(query.get(word))}`);
+    return own.length ? `?${own.join('&')}` : '';
+}
+laboratory.ownQuery = ownQuery;
+
 /** What the page is to open: the address from its `?` on, or what this tab has kept in its place. */
 function wanted() {
-    if (new URLSearchParams(location.hash.slice(1)).has('kept')) {
+    const fragment = new URLSearchParams(location.hash.slice(1));
+    // The page has written its state behind the `#` and taken the words of the link from the query: what is there now was typed.
+    const written = window === window.top && (fragment.has('hash') || fragment.has('kept'));
+    const typed = [...new URLSearchParams(location.search).keys()].some((word) => !OWN_WORDS.includes(word));
+    if (written && typed) return location.search;
+    if (fragment.has('kept')) {
         try {
             const kept = sessionStorage.getItem(KEPT);
             if (kept) return kept;
@@ -156,12 +170,15 @@ async function download(address, bytes) {
     const response = await fetch(address);
     if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
     const megabytes = (n) => (n / 1e6).toFixed(1);
+    // The browser hands out what it has unpacked, and tells the length of what comes over the line.
+    const packed = response.headers.get('content-encoding') ? Number(response.headers.get('content-length')) : bytes;
     let got = 0;
     const counted = response.body.pipeThrough(
         new TransformStream({
             transform(chunk, out) {
                 got += chunk.byteLength;
-                stage(`Loading: ${megabytes(got)} of ${megabytes(bytes)} MB`, Math.min(got / bytes, 1));
+                const part = Math.min(got / bytes, 1);
+                stage(packed ? `Loading: ${megabytes(part * packed)} of ${megabytes(packed)} MB` : 'Loading', part);
                 out.enqueue(chunk);
             },
         }),
@@ -361,6 +378,8 @@ async function main() {
         // The address of the state may have been written over the link before this event came.
         if (location.href !== newURL) history.replaceState(null, '', newURL);
         opened = location.hash;
+        // What came with the page has been read.
+        if (location.search !== ownQuery()) history.replaceState(history.state, '', location.pathname + ownQuery() + opened);
         // Another way to draw needs another start.
         if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) {
             mendable = Infinity;
@@ -379,8 +398,6 @@ async function main() {
     }
 }
 
-/** Words of an address that belong to the browser and are in no link that the laboratory makes. */
-const OWN_WORDS = ['renderer', 'theme'];
 /** How often the address follows what is shown, ms. */
 const SESSION_PACE = 1000;
 /** How long a link that could not be opened stays in the address, to be mended there, ms; until when it does. */
@@ -392,7 +409,9 @@ const SPARING = 20;
 /** Keeps the state in the address, or in the tab, so that loading the page anew, or coming back to it, goes on from there. */
 function keepSession() {
     let told = false;
-    const present = () => (laboratory.trouble || Date.now() < mendable ? null : laboratory.page.session());
+    // A link that could not be opened stays in the address as well, until something else is done.
+    const mended = () => Date.now() >= mendable && !laboratory.page.refused();
+    const present = () => (laboratory.trouble || !mended() ? null : laboratory.page.session());
     function withOwnWords(fragment) {
         const words = [new URLSearchParams(location.hash.slice(1)), query];
         const own = OWN_WORDS.map((word) => [word, words.map((from) => from.get(word)).find(Boolean)]);
@@ -410,8 +429,9 @@ function keepSession() {
         }
         const address = withOwnWords(fragment);
         const unsaved = isUnsaved();
-        if (address === location.hash && unsaved === wasUnsaved()) return;
-        history.replaceState({ unsaved }, '', location.pathname + location.search + address);
+        const place = location.pathname + ownQuery() + address;
+        if (place === location.pathname + location.search + location.hash && unsaved === wasUnsaved()) return;
+        history.replaceState({ unsaved }, '', place);
     }
     function follow() {
         const began = Date.now();

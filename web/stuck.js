@@ -1,7 +1,18 @@
-// Says so where the program of the page does not come: the one script that any browser takes, from a file as well.
+// What has to be there before the program of the page: the one script that any browser takes, from a file as well.
 
+// A page around this one may speak as soon as this one has loaded, for which the browser waits for this script: what it says waits
+// for guest.js.
+window.jointplayMail = [];
+if (window !== window.top) {
+    addEventListener('message', function (event) {
+        window.jointplayMail.push(event);
+    });
+}
+
+// The program did not come: the page says so.
 function stuck() {
-    document.getElementById('stuck').hidden = false;
+    var sealed = window.origin === 'null';
+    document.getElementById(sealed ? 'sealed' : 'stuck').hidden = false;
 }
 
 // A script that cannot be loaded tells nobody but itself, and who listens on the way down to it.

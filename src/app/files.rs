@@ -19,6 +19,8 @@ use crate::simulate::Channel;
 
 /// Rows of a saved record.
 const ROWS: usize = 1000;
+/// Endings of what is dropped by mistake.
+const PICTURES: [&str; 8] = [".png", ".jpg", ".jpeg", ".gif", ".webp", ".svg", ".mp4", ".webm"];
 /// Media type of scene files.
 const SCENE_TYPE: &str = "application/toml";
 
@@ -175,6 +177,12 @@ impl App {
 
     /// Opens files that were chosen or dropped at once: a scene, and those that it names.
     fn open_together(&mut self, files: Vec<OpenedFile>) -> Result<(), String> {
+        let is_picture = |file: &&OpenedFile| {
+            file.content.is_ok() && PICTURES.iter().any(|ending| file.name.to_lowercase().ends_with(ending))
+        };
+        if let Some(OpenedFile { name, .. }) = files.iter().find(is_picture) {
+            return Err(format!("{name}: a picture or a film, not a scene; open a .toml file"));
+        }
         let mut read = Vec::with_capacity(files.len());
         for OpenedFile { name, content } in files {
             let bytes = content.map_err(|reason| format!("{name}: {reason}"))?;
@@ -343,9 +351,9 @@ pub fn verdict_words(verdict: &Verdict) -> String {
     match verdict {
         Verdict::Agrees(hash) => format!("State reproduced: hash {hash:016x} agrees"),
         Verdict::Differs { expected, found, version } => {
-            let made = version.as_deref().unwrap_or("another version");
+            let made = version.as_deref().map_or("another version".to_owned(), |version| format!("version {version}"));
             format!(
-                "State differs: hash {found:016x}, the link says {expected:016x}. It was made by version {made}, this is {}",
+                "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {made}, this is {}",
                 crate::VERSION
             )
         }

@@ -124,6 +124,11 @@ pub const BINDINGS: [Binding; 41] = [
     bind(Group::Window, Key::Escape, Action::Close, "Esc", "Close"),
 ];
 
+/// What `key` asks for.
+pub fn action(key: Key) -> Option<Action> {
+    BINDINGS.iter().find(|binding| binding.key == key).map(|binding| binding.action)
+}
+
 /// Mouse and touch, for the overlay.
 pub const POINTER: [(&str, &str); 13] = [
     ("Drag beside the machine, one finger", "Turn the view"),

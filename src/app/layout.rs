@@ -500,7 +500,14 @@ impl App {
             return area;
         }
         let row = ui.spacing().interact_size.y;
-        let most = (area.height() - row - 8.0).max(60.0);
+        let most = if self.is_refused() {
+            // What lies under it is not what the link promised.
+            let fill = ui.visuals().panel_fill;
+            ui.painter().rect_filled(area.expand(10.0), 0.0, fill);
+            area.height()
+        } else {
+            (area.height() - row - 8.0).max(60.0)
+        };
         // As high as in the frame before; at first a line with a button.
         let height = ui.data(|data| data.get_temp(id)).unwrap_or(row + 16.0);
         let size = egui::vec2(area.width().min(640.0), height);

@@ -187,6 +187,9 @@ impl AppOptions {
         let lesson = link.lesson.as_deref().map(Lesson::built_in).transpose();
         let lesson = lesson.map_err(|error| format!("link: {error}"))?;
         let lesson = lesson.map(|lesson| (lesson, link.step.unwrap_or(1) - 1));
+        if let Some((lesson, step)) = lesson.as_ref().filter(|(lesson, step)| *step >= lesson.steps.len()) {
+            return Err(format!("link: step = {}: allowed 1 to {}", step + 1, lesson.steps.len()));
+        }
         if let Some((lesson, step)) = &lesson
             && !link.has_instant()
             && link.log.base.is_empty()
@@ -222,11 +225,13 @@ impl AppOptions {
         Ok(options)
     }
 
-    /// As [`Self::from_link`], but a bad link gives the default scene, with the reason as [`Self::problem`].
+    /// As [`Self::from_link`], but a bad link gives the default scene, paused, in the panels that the link asks for, with the reason
+    /// as [`Self::problem`].
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
             let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
-            Self { problem: Some(problem), ..Self::new(scene) }
+            let embedded = share::embedded_in(text);
+            Self { problem: Some(problem), playing: false, embedded, ..Self::new(scene) }
         })
     }
 }
@@ -263,6 +268,8 @@ pub struct App {
     dialog: Option<Dialog>,
     /// Error of the last attempt to open or reset.
     problem: Option<String>,
+    /// It is why the link that the window began with could not be opened.
+    refused: bool,
     show_controls: bool,
     show_plots: bool,
     show_bench: bool,
@@ -339,6 +346,7 @@ impl App {
             timeline: Timeline::default(),
             bench: Bench::default(),
             dialog: None,
+            refused: options.problem.is_some(),
             problem: options.problem,
             show_controls: true,
             show_plots: true,
@@ -436,6 +444,26 @@ impl App {
     /// The running scene.
     pub fn player(&self) -> &Player {
         &self.player
+    }
+
+    /// Whether the link that the window began with could not be opened, and nothing else was done since: another scene stands in its
+    /// place, behind the reason.
+    pub fn is_refused(&self) -> bool {
+        self.refused && self.problem.is_some() && !self.player.is_playing()
+    }
+
+    /// Whether the key of a browser's event, its `name`, does something here, alone or with the command key.
+    pub fn uses(&self, ctx: &egui::Context, name: &str, command: bool) -> bool {
+        if ctx.memory(egui::Memory::focused).is_some() {
+            return true;
+        }
+        let key = egui::Key::from_name(if name == " " { "Space" } else { name });
+        match key.and_then(keys::action).filter(|_| !command) {
+            None => command,
+            Some(Action::TurnPage { .. }) => self.course.is_some(),
+            Some(Action::Close) => self.dialog.is_some() || self.problem.is_some() || self.is_under_way(),
+            Some(_) => true,
+        }
     }
 
     /// The running scene, to drive it.
@@ -740,7 +768,7 @@ impl App {
         }
         self.controls.clear();
         self.undo.clear();
-        self.problem = None;
+        (self.problem, self.refused) = (None, false);
         self.replay = None;
         self.load = None;
         self.film_wanted = None;

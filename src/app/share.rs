@@ -61,6 +61,8 @@ const WORDS: [&str; 22] = [
     "theme",
 ];
 
+/// Latest instant that a link may lead to, s: a run there takes days.
+const LATEST: f64 = 1e6;
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
@@ -175,6 +177,14 @@ fn is_file(text: &str) -> bool {
     cfg!(not(target_arch = "wasm32")) && std::path::Path::new(text).is_file()
 }
 
+/// The panels that a link asks for, though it cannot be opened.
+pub fn embedded_in(text: &str) -> Option<Embedded> {
+    let parts = text.split(['?', '#']);
+    let mut words = parts.flat_map(|part| form_urlencoded::parse(part.as_bytes()));
+    let (_, panels) = words.find(|(word, _)| word == "embed")?;
+    Some(Embedded::read(&panels).unwrap_or_default())
+}
+
 impl Link {
     /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands alone;
     /// otherwise the query's pairs come first and the fragment's override them. Or what [`Self::keep`] gives.
@@ -233,8 +243,8 @@ impl Link {
                 "log" => log = Some(unpack(key, value)?),
                 "t" => {
                     let time = parse_quantity(value, Dimension::Time).map_err(|error| wrong(&error.to_string()))?;
-                    if time < 0.0 {
-                        return Err(wrong("must not be before the start; allowed 0 s and later"));
+                    if !(0.0..=LATEST).contains(&time) {
+                        return Err(wrong("allowed 0 to 1000000 s"));
                     }
                     link.time = Some(time);
                 }

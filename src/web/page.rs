@@ -128,6 +128,16 @@ impl Page {
         })?
     }
 
+    /// Whether the address with which the page began could not be opened, and nothing else was done since.
+    pub fn refused(&self) -> bool {
+        self.with(|laboratory| laboratory.app.is_refused()).unwrap_or(false)
+    }
+
+    /// Whether a key by the name that the browser gives it does something here, alone or with the command key.
+    pub fn uses(&self, key: &str, command: bool, alt: bool) -> bool {
+        !alt && self.with(|laboratory| laboratory.app.uses(&laboratory.ctx, key, command)).unwrap_or(false)
+    }
+
     /// Opens files, an array of the browser's, that were chosen at once.
     #[wasm_bindgen(js_name = openFiles)]
     pub fn open_files(&self, files: &Array) {

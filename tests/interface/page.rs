@@ -228,8 +228,11 @@ fn a_long_way_shows_how_far_it_is_and_can_be_stopped() {
 }
 
 #[test]
-fn a_bad_link_is_explained_and_the_default_scene_runs() {
+fn a_bad_link_is_explained_and_the_default_scene_waits_behind_it() {
     for (link, words) in [
+        ("?scene=pendulun&embed=controls", "did you mean `pendulum`?"),
+        ("?t=2000000s", "allowed 0 to 1000000 s"),
+        ("?lesson=rattle&step=99", "allowed 1 to"),
         ("?scene=pendulun", "did you mean `pendulum`?"),
         ("?c=5", "contact.clearance = 5: needs a unit"),
         ("?scene=spcmm&spcmm.amplitude_x=500mm", "amplitude_x"),
@@ -244,9 +247,16 @@ fn a_bad_link_is_explained_and_the_default_scene_runs() {
         assert!(harness.state().announcement().contains(words), "{link}: {}", harness.state().announcement());
         let player = harness.state().player();
         assert_eq!(player.scene().name, DEFAULT_SCENE);
-        assert!(player.is_playing());
+        assert!(!player.is_playing() && harness.state().is_refused());
+        assert_eq!(
+            harness.state().embedded().map(|panels| panels.write()),
+            link.contains("embed").then(|| "controls".to_owned())
+        );
         let ctx = harness.ctx.clone();
         assert!(harness.state_mut().open_link(&ctx, "?c=2").is_err());
+        assert!(harness.state().is_refused());
+        harness.state_mut().open_link(&ctx, "?scene=pendulum").expect("opens");
+        assert!(!harness.state().is_refused());
     }
     let options = AppOptions::from_link_or_default("?scene=pendulum&c=0.5mm&scale=1:10");
     assert_eq!((options.problem, options.playing, options.time_scale), (None, true, 0.1));

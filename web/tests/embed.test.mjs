@@ -81,6 +81,39 @@ test('the line of the menu shows the same state in another page, which keeps foc
     await lab.close();
 });
 
+test('the example of the documents works as it stands, keys of no use go to the page around, and a bad link says so', async () => {
+    const lab = await blank({ size: { width: 820, height: 520 }, ownTime: true });
+    const text = fs.readFileSync(path.join(ROOT, 'docs/embedding.md'), 'utf8');
+    const [html, js] = ['html', 'js'].map((language) => text.split(`\`\`\`${language}\n`)[1].split('```')[0]);
+    await course(lab, `${html.replace('https://example.org/lab/', '{page}')}<script>${js}</script>`);
+    const [frame] = await running(lab);
+    const state = (frame) => frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
+    await lab.until(async () => {
+        const { playing, changed_parameters: changed } = await state(frame);
+        return playing && changed['contact.clearance'] === '0.5 mm';
+    }, 'the messages of the example are lost');
+    await lab.page.evaluate(() => {
+        globalThis.keys = [];
+        addEventListener('message', ({ data }) => data.event === 'key' && globalThis.keys.push(data.code));
+    });
+    await lab.page.mouse.click(500, 150);
+    for (const key of ['PageDown', 'Space', 'b', 'Control+Alt+k', 'PageUp']) await lab.page.keyboard.press(key);
+    await lab.until(async () => (await lab.page.evaluate(() => globalThis.keys)).includes('PageUp'), 'no key is told');
+    const keys = await lab.page.evaluate(() => globalThis.keys);
+    assert.deepEqual(keys.filter((code) => !/^(Control|Alt)/.test(code)), ['PageDown', 'KeyK', 'PageUp']);
+
+    await course(lab, '<iframe src="{page}?embed=controls&scene=pendulun&renderer=webgl" width="320" height="240"></iframe>');
+    const [bad] = await running(lab);
+    const { playing, time_s: time } = await state(bad);
+    assert.deepEqual([playing, time], [false, 0]);
+    assert.ok(await bad.evaluate(() => globalThis.jointplay.page.refused()));
+    const labels = () => bad.evaluate(() => JSON.parse(globalThis.jointplay.page.widgets() || '[]').map(({ label }) => label));
+    await lab.until(async () => (await labels()).some((label) => label.includes('did you mean `pendulum`')), 'it is not said');
+    assert.ok((await labels()).includes('Clearance'), 'the panels of the link are not there');
+    assert.match(bad.url(), /\?embed=controls&scene=pendulun&renderer=webgl$/);
+    await lab.close();
+});
+
 test('the page around opens, sets, plays and pauses by messages, and hears what happens', async () => {
     const lab = await blank({ size: { width: 340, height: 240 }, ownTime: true });
     await course(lab, '<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="320" height="200"></iframe>');

@@ -114,6 +114,16 @@ test('loading the page anew goes on from what was shown, and what no address hol
     assert.match(await hash(), /play=0.*theme=dark|theme=dark.*play=0/);
     assert.match(await hash(), /renderer=webgl/);
     assert.equal(await lab.page.evaluate(() => history.length), entries, 'every state is an entry of its own');
+    // The words of the link are in the fragment now; what is typed before it wins.
+    const search = () => lab.page.evaluate(() => location.search);
+    assert.match(await search(), /^\?renderer=webgl(&theme=dark)?$/);
+    const { origin, pathname, hash: written } = new URL(lab.page.url());
+    await lab.page.goto(`${origin}${pathname}?scene=chain&play=0&renderer=webgl${written}`);
+    await lab.started();
+    assert.equal((await lab.state()).scene, 'chain');
+    await lab.until(async () => (await search()) === '?renderer=webgl', 'the words stay in the query');
+    await lab.page.evaluate(() => (location.hash = '#scene=spcmm&play=0'));
+    await lab.until(async () => (await lab.state()).scene === 'spcmm', 'the link is not opened');
 
     await lab.drop('large.toml', own('large', 60_000));
     await lab.until(async () => (await lab.state()).scene === 'large', 'the file does not open');
