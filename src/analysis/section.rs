@@ -27,6 +27,23 @@ impl Schedule {
     pub fn kept(&self) -> usize {
         self.sections - self.discard
     }
+
+    /// Number of sections up to `now`, s.
+    pub fn passed(&self, now: f64) -> usize {
+        let guess = ((now - self.first) / self.interval).floor();
+        // Off by at most one through rounding; a negative guess is 0.
+        let mut k = (guess as usize).saturating_sub(1).min(self.sections);
+        while k < self.sections && self.time(k) <= now {
+            k += 1;
+        }
+        k
+    }
+
+    /// Time of the next section after `now`, s; infinite after the last.
+    pub fn next(&self, now: f64) -> f64 {
+        let k = self.passed(now);
+        if k < self.sections { self.time(k) } else { f64::INFINITY }
+    }
 }
 
 /// A motion being run through its sections.

@@ -469,7 +469,7 @@ impl Player {
     /// Instants of the schedule that are still to come.
     pub(super) fn sections_to_come(&self) -> usize {
         let now = self.simulation.time();
-        self.sections.map_or(0, |schedule| schedule.sections - passed(&schedule, now))
+        self.sections.map_or(0, |schedule| schedule.sections - schedule.passed(now))
     }
 
     /// Accepted steps since the start.
@@ -849,12 +849,7 @@ impl Player {
 
     /// Latest end of the next step, s.
     fn next_section(&self) -> f64 {
-        let now = self.simulation.time();
-        let schedule = self.sections.as_ref();
-        schedule.map_or(f64::INFINITY, |schedule| match passed(schedule, now) {
-            k if k < schedule.sections => schedule.time(k),
-            _ => f64::INFINITY,
-        })
+        self.sections.map_or(f64::INFINITY, |schedule| schedule.next(self.simulation.time()))
     }
 
     /// The run to sample at `time`, s, within the latest step.
@@ -1028,15 +1023,4 @@ fn record_of(scene: &Scene, channels: &Channels) -> History {
     let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
     let picked = channels.picked().len();
     History::new(channels.len() + joints + picked, FINEST_BIN)
-}
-
-/// Instants of `schedule` up to `now`, s.
-fn passed(schedule: &Schedule, now: f64) -> usize {
-    let guess = ((now - schedule.first) / schedule.interval).floor();
-    // Off by at most one through rounding; a negative guess is 0.
-    let mut k = (guess as usize).saturating_sub(1).min(schedule.sections);
-    while k < schedule.sections && schedule.time(k) <= now {
-        k += 1;
-    }
-    k
 }

@@ -58,10 +58,22 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct SceneArguments {
     /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`).
-    pub scene: OsString,
+    #[arg(required_unless_present = "link")]
+    pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
+    /// The scene of a share link instead, with the parameters that its run began with; `run` does what was done on the way as well,
+    /// to the link's instant, and compares the state's hash.
+    #[arg(long, value_name = "LINK", conflicts_with_all = ["scene", "changes"])]
+    pub link: Option<String>,
+}
+
+impl SceneArguments {
+    /// What to call the scene in a message or another command.
+    pub fn name(&self) -> std::path::PathBuf {
+        self.scene.as_ref().map_or_else(|| "--link …".into(), Into::into)
+    }
 }
 
 /// `lessons`.
@@ -110,9 +122,10 @@ pub struct RunArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Simulated time at the end, e.g. `20ms`, counted from the start of the run also with --from-state.
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
-    pub duration: String,
+    /// Simulated time at the end, e.g. `20ms`, counted from the start of the run also with --from-state; the last step ends exactly
+    /// there. With --link the default is the link's instant.
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, required_unless_present = "link")]
+    pub duration: Option<String>,
     /// Interval between rows, e.g. `0.1ms`; the first row is at 0.
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, requires = "out")]
     pub every: Option<String>,
@@ -135,7 +148,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "FILE")]
     pub save_state: Option<PathBuf>,
     /// Go on from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "link")]
     pub from_state: Option<PathBuf>,
     /// Form of the summary on standard output.
     #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
@@ -237,7 +250,8 @@ pub struct RenderArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Instants to draw, e.g. `0s,7.85ms`.
+    /// Instants to draw, e.g. `0s,7.85ms`. They end no step: a state hash is that at the end of the step that an instant lies in,
+    /// and not the one of `run --duration`, which ends a step there.
     #[arg(long, value_name = "TIME,…", value_delimiter = ',', allow_hyphen_values = true)]
     pub at: Vec<String>,
     /// Simulated time of a film, e.g. `0.1s`.

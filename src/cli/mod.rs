@@ -9,6 +9,8 @@ mod drivers;
 mod failure;
 mod impacts;
 mod interrupt;
+#[cfg_attr(not(feature = "gui"), path = "no_link.rs")]
+mod link;
 mod machine;
 mod measuring;
 pub mod output;
@@ -176,7 +178,13 @@ fn lessons(_arguments: &LessonArguments) -> Result<String, Failure> {
 }
 
 fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
-    Ok(Scene::load(&arguments.scene, &arguments.changes)?)
+    match (&arguments.link, &arguments.scene) {
+        #[cfg(feature = "gui")]
+        (Some(text), _) => Ok(link::parse(text)?.load()?),
+        #[cfg(not(feature = "gui"))]
+        (Some(_), _) => Err(no_graphics()),
+        (None, scene) => Ok(Scene::load(scene.as_deref().unwrap_or_default(), &arguments.changes)?),
+    }
 }
 
 /// Starts a scene; an error names the line of its file and the change that it concerns.

@@ -1,7 +1,7 @@
 //! `run`: simulate without a window and write rows at equal intervals.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
@@ -10,6 +10,7 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::assembly::Start;
 use super::impacts::ImpactsFile;
+use super::link::Way;
 use super::output::{NoRow, RowsFile, Table, check_distinct, check_size, significant};
 use super::state::{self, Begun, StateFile};
 use super::summary::{self, Status, Stepping};
@@ -80,12 +81,16 @@ struct End {
 /// # Errors
 /// Any: bad input before it starts; the divergence guard, Ctrl-C and the file system afterwards.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
-    let duration = quantity::duration("--duration", &arguments.duration)?;
+    let mut way = way(arguments)?;
+    let asked = arguments.duration.as_deref().map(|text| quantity::duration("--duration", text)).transpose()?;
+    let Some(duration) = asked.or(way.as_ref().and_then(Way::time)) else {
+        return Err(Failure::usage("--link: the link names no instant; say with --duration how long the run is"));
+    };
     let times = match &arguments.every {
         Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),
         None => None,
     };
-    let mut names = vec![("the scene".to_owned(), PathBuf::from(&arguments.scene.scene))];
+    let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
     for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts), ("--wear", &arguments.wear)] {
         names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
     }
@@ -135,7 +140,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Table::of_channels(&scene, &frame, &arguments.channels).map_err(|error| {
             Failure::usage(format!(
                 "--channels: {error}; `jointplay check {} --channels` lists them",
-                PathBuf::from(&arguments.scene.scene).display()
+                arguments.scene.name().display()
             ))
         })?
     };
@@ -166,7 +171,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         (from, duration),
         times,
         &mut table,
-        &mut Keepers { impacts: impacts.as_mut(), state: state.as_mut() },
+        &mut Keepers { impacts: impacts.as_mut(), state: state.as_mut(), way: way.as_mut(), end: asked },
         &mut frame,
         &mut stopwatch,
         &progress,
@@ -196,6 +201,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         let words = format!("{} s, from {}", significant(from, 9), path.display());
         summary::line(&mut text, "Went on at", &words);
         facts.insert("from_time_s".into(), json!(from));
+    }
+    let mut verdict = None;
+    if let Some(way) = way.as_ref().filter(|way| asked.is_none() && way.is_there(&simulation)) {
+        let compared = way.verdict(&simulation);
+        facts.insert("agrees_with_link".into(), json!(way.hash().map(|_| compared.is_ok())));
+        match compared {
+            Ok(words) => summary::line(&mut text, "Link", &words),
+            Err(words) => verdict = Some(Failure::new(Failure::MISSED, format!("--link: {words}"))),
+        }
     }
     let mut meta = facts.clone();
     // Files of the same run are the same, byte for byte: the machine's speed is left out.
@@ -230,7 +244,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         facts.insert("wear_out".into(), json!(path.display().to_string()));
         summary::written(&mut text, rows, "cell", path);
     }
-    let mut failure = end.failure;
+    let mut failure = end.failure.or(verdict);
     if let (Some(state), Some(path)) = (state, &arguments.save_state) {
         // A run that was stopped would be stopped again.
         if end.status != Status::Diverged {
@@ -251,6 +265,18 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
     }
     failure.map_or(Ok(()), Err)
+}
+
+/// What was done on the way of the run of `--link`, if there is one.
+#[cfg(feature = "gui")]
+fn way(arguments: &RunArguments) -> Result<Option<Way>, Failure> {
+    let text = arguments.scene.link.as_deref();
+    text.map(|text| Way::new(super::link::parse(text)?)).transpose()
+}
+
+#[cfg(not(feature = "gui"))]
+fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
+    Ok(None)
 }
 
 /// Puts `simulation`, which has just started, into the state of the file `path`; returns the time from which it goes on, s.
@@ -275,6 +301,17 @@ fn go_on(simulation: &mut Simulation, path: &Path, scene: &Scene, duration: f64)
 struct Keepers<'a> {
     impacts: Option<&'a mut ImpactsFile>,
     state: Option<&'a mut StateFile>,
+    /// What was done on the way of a link's run, and where the run is to end, s; by default where the link's is.
+    way: Option<&'a mut Way>,
+    end: Option<f64>,
+}
+
+impl Keepers<'_> {
+    /// Whether the run is over.
+    fn is_over(&self, simulation: &Simulation, duration: f64) -> bool {
+        let at_link = self.way.as_ref().filter(|_| self.end.is_none());
+        at_link.map_or(simulation.time() >= duration, |way| way.is_there(simulation))
+    }
 }
 
 /// Steps to `duration` and fills `table` with the rows at `from` and later; `stopwatch` runs only while the simulation steps.
@@ -313,7 +350,7 @@ fn simulate(
                 next += 1;
             }
         }
-        if simulation.time() >= duration {
+        if keepers.is_over(simulation, duration) {
             return Ok(End { status: Status::Done, failure: None });
         }
         progress.set_position(position(simulation.time()));
@@ -326,34 +363,30 @@ fn simulate(
                 )),
             });
         }
-        let row = times.filter(|times| next <= times.last).map_or(duration, |times| times.at(next));
+        let last = if keepers.way.is_some() { f64::INFINITY } else { duration };
+        let row = times.filter(|times| next <= times.last).map_or(last, |times| times.at(next));
         let started = Instant::now();
         let outcome = step_some(simulation, row, duration, keepers);
         *stopwatch += started.elapsed();
-        if let Err(stopped) = outcome {
-            return Ok(End {
-                status: Status::Diverged,
-                failure: Some(Failure::new(Failure::DIVERGED, stopped.to_string())),
-            });
+        if let Err(words) = outcome {
+            return Ok(End { status: Status::Diverged, failure: Some(Failure::new(Failure::DIVERGED, words)) });
         }
     }
 }
 
-/// Steps until `row` is reached, the run ends, or a check is due. A row never shortens a step.
-fn step_some(
-    simulation: &mut Simulation,
-    row: f64,
-    duration: f64,
-    keepers: &mut Keepers<'_>,
-) -> Result<(), crate::simulate::Stopped> {
+/// Steps until `row` is reached, the run ends, or a check is due; in words, why it stopped. A row never shortens a step.
+fn step_some(simulation: &mut Simulation, row: f64, duration: f64, keepers: &mut Keepers<'_>) -> Result<(), String> {
     for _ in 0..STEPS_BETWEEN_LOOKS {
-        if simulation.time() >= row {
+        if simulation.time() >= row || keepers.is_over(simulation, duration) {
             break;
         }
         if let Some(state) = &mut keepers.state {
             state.watch(simulation, duration);
         }
-        simulation.step_until(duration)?;
+        match &mut keepers.way {
+            None => simulation.step_until(duration).map_err(|stopped| stopped.to_string())?,
+            Some(way) => way.step(simulation, keepers.end)?,
+        }
         if let Some(impacts) = &mut keepers.impacts {
             impacts.collect(simulation);
         }

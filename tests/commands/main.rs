@@ -8,6 +8,7 @@ mod chart;
 mod cluster;
 mod command_line;
 mod ledger_files;
+mod links;
 mod peaks;
 mod program;
 mod reproduce;

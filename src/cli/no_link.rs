@@ -1,0 +1,33 @@
+//! In place of [`super::link`] in a program without the window, which reads no links.
+
+use crate::simulate::Simulation;
+
+/// There is none.
+pub enum Way {}
+
+impl Way {
+    /// As there.
+    pub fn time(&self) -> Option<f64> {
+        match *self {}
+    }
+
+    /// As there.
+    pub fn hash(&self) -> Option<u64> {
+        match *self {}
+    }
+
+    /// As there.
+    pub fn is_there(&self, _simulation: &Simulation) -> bool {
+        match *self {}
+    }
+
+    /// As there.
+    pub fn step(&mut self, _simulation: &mut Simulation, _end: Option<f64>) -> Result<(), String> {
+        match *self {}
+    }
+
+    /// As there.
+    pub fn verdict(&self, _simulation: &Simulation) -> Result<String, String> {
+        match *self {}
+    }
+}
