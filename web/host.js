@@ -106,8 +106,13 @@ export function makeHost(laboratory, lost) {
         },
 
         startWork(job) {
-            if (typeof Worker !== 'function') return undefined;
-            const worker = new Worker(new URL(`worker.js${build}`, import.meta.url), { type: 'module' });
+            let worker;
+            try {
+                worker = new Worker(new URL(`worker.js${build}`, import.meta.url), { type: 'module' });
+            } catch {
+                // There are none here, or not for a frame without an origin.
+                return undefined;
+            }
             const messages = [];
             const failed = (reason) => messages.push(JSON.stringify({ Failed: `the computation broke off: ${reason}` }));
             worker.addEventListener('message', ({ data }) => messages.push(data));

@@ -168,7 +168,10 @@ function stage(text, part) {
 /** The compiled code; the progress of its download is on the page. */
 async function download(address, bytes) {
     const response = await fetch(address);
-    if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
+    if (!response.ok) {
+        const reason = `${address}: ${response.status} ${response.statusText}`;
+        throw new Error(`${reason}. Files of this page are missing on its server: please tell whoever runs it, with this line`);
+    }
     const megabytes = (n) => (n / 1e6).toFixed(1);
     // The browser hands out what it has unpacked, and tells the length of what comes over the line.
     const packed = response.headers.get('content-encoding') ? Number(response.headers.get('content-length')) : bytes;
@@ -436,6 +439,8 @@ function keepSession() {
     function follow() {
         const began = Date.now();
         keep();
+        const state = laboratory.ready && laboratory.page.state();
+        if (state) document.title = `${JSON.parse(state).scene} - Jointplay`;
         setTimeout(follow, Math.max(SESSION_PACE, SPARING * (Date.now() - began)));
     }
     setTimeout(follow, SESSION_PACE);

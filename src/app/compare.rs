@@ -1,12 +1,10 @@
 //! Before and after: runs kept as they were before a change of a parameter. They go on beside the run, their curves stay in grey in
 //! the plots, and one of them can be shown beside the picture, at the same instant and from the same side.
 
-use eframe::egui::{self, Color32, Rect, RichText, TextEdit, Ui, pos2, vec2};
+use eframe::egui::{self, Color32, RichText, TextEdit, Ui, vec2};
 
-use super::files::record_files;
 use super::player::Player;
-use super::viewport::Viewport;
-use super::{App, layout, value};
+use super::{layout, value};
 
 /// Most runs pinned. One more is the latest before a change.
 const MOST_PINNED: usize = 3;
@@ -35,8 +33,8 @@ pub struct Kept {
     /// Whether its curves are shown.
     pub shown: bool,
     run: Box<Player>,
-    /// Its picture, while that is shown.
-    picture: Option<Box<Viewport>>,
+    /// Of all that were ever kept.
+    number: u64,
 }
 
 impl Kept {
@@ -49,6 +47,16 @@ impl Kept {
     /// The run.
     pub fn run(&self) -> &Player {
         &self.run
+    }
+
+    /// The same, to drive it.
+    pub(super) fn run_mut(&mut self) -> &mut Player {
+        &mut self.run
+    }
+
+    /// The parameter that was changed with its value in the run of `player`.
+    pub(super) fn named_in(&self, player: &Player) -> String {
+        named(player, &self.key)
     }
 
     /// Colour of the curve that is drawn in `colour` now.
@@ -96,11 +104,13 @@ pub struct Comparison {
     /// Place of the one shown beside the picture, and of the one whose record is to be saved.
     beside: Option<usize>,
     to_save: Option<usize>,
+    /// How many were ever kept.
+    count: u64,
 }
 
 impl Default for Comparison {
     fn default() -> Self {
-        Self { on: true, kept: Vec::new(), beside: None, to_save: None }
+        Self { on: true, kept: Vec::new(), beside: None, to_save: None, count: 0 }
     }
 }
 
@@ -117,10 +127,16 @@ impl Comparison {
         (self.kept, self.beside) = (Vec::new(), None);
     }
 
+    /// Whether the run before a change is kept.
+    pub fn is_on(&self) -> bool {
+        self.on
+    }
+
     /// Keeps `run`, as it was before `key` was changed, in place of the latest.
     pub fn add(&mut self, run: Box<Player>, key: String) {
         self.kept.retain(|kept| kept.place != 0);
-        self.kept.insert(0, Kept { key, name: None, place: 0, shown: true, run, picture: None });
+        self.kept.insert(0, Kept { key, name: None, place: 0, shown: true, run, number: self.count });
+        self.count += 1;
     }
 
     /// The kept runs, the latest first.
@@ -134,7 +150,7 @@ impl Comparison {
     }
 
     /// Takes the runs to where `player` is; returns whether one of them still lags behind.
-    pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
+    pub fn advance(&mut self, player: &Player) -> bool {
         let start = (player.clock)();
         let budget = if player.is_playing() { BUDGET } else { BUDGET_AT_REST };
         let may_step = || (player.clock)() - start < budget;
@@ -146,16 +162,10 @@ impl Comparison {
             if run.ideal().is_some() != player.ideal().is_some() {
                 run.set_ideal(player.ideal().is_some());
             }
-            let (before, shown) = (run.pacer.shown(), player.pacer.shown());
+            let shown = player.pacer.shown();
             if self.beside == Some(kept.place) || shown > run.reached() {
                 lags |= !run.follow(shown, may_step);
                 run.place_ghost();
-            }
-            if let Some(picture) = &mut kept.picture {
-                picture.advance(run, dt);
-                if !player.is_playing() && run.pacer.shown() != before {
-                    picture.revisit(run);
-                }
             }
         }
         lags
@@ -166,7 +176,6 @@ impl Comparison {
         self.kept.retain_mut(|kept| kept.run.is_as_started() || kept.run.reset().is_ok());
         for kept in &mut self.kept {
             kept.run.follow(0.0, || true);
-            kept.picture = None;
         }
     }
 
@@ -281,81 +290,17 @@ impl Comparison {
         }
     }
 
+    /// The run whose machine is to be shown beside the one now, and its number.
+    pub fn beside(&mut self) -> Option<(&mut Kept, u64)> {
+        let place = self.beside?;
+        let kept = self.kept.iter_mut().find(|kept| kept.place == place)?;
+        let number = kept.number;
+        Some((kept, number))
+    }
+
     /// The run whose record is to be saved.
-    fn take_to_save(&mut self) -> Option<&Kept> {
+    pub fn take_to_save(&mut self) -> Option<&Kept> {
         let place = self.to_save.take()?;
         self.kept.iter().find(|kept| kept.place == place)
-    }
-}
-
-/// The two halves of `area`: what was before, and what is now.
-fn halves(area: Rect) -> (Rect, Rect) {
-    let middle = area.center();
-    if area.width() >= area.height() {
-        (area.with_max_x(middle.x - 1.0), area.with_min_x(middle.x + 1.0))
-    } else {
-        (Rect::from_min_max(area.min, pos2(area.right(), middle.y - 1.0)), area.with_min_y(middle.y + 1.0))
-    }
-}
-
-impl App {
-    /// Keeps the run as it was before the change of `key` that was just made, unless a lesson is under way, which speaks of its own
-    /// plots; from now on the run before the next change is kept, if a gesture is over.
-    pub(super) fn compare(&mut self, key: Option<&str>, is_over: bool) {
-        let comparison = &mut self.plots.comparison;
-        let wanted = comparison.on && self.course.is_none();
-        if let Some((run, key)) = self.player.take_before().filter(|_| wanted).zip(key) {
-            comparison.add(run, key.to_owned());
-        }
-        if is_over || !wanted {
-            self.player.keep_before(wanted);
-        }
-    }
-
-    /// The runs kept from before a change.
-    pub fn comparison(&self) -> &Comparison {
-        &self.plots.comparison
-    }
-
-    /// Saves the record of a kept run, if that was asked for.
-    pub(super) fn save_kept(&mut self) {
-        if let Some(kept) = self.plots.comparison.take_to_save() {
-            let files = record_files(&kept.run);
-            self.save(files);
-        }
-    }
-
-    /// Shows the machine before beside the one now, if that is asked for; returns what is left of `area`.
-    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
-        let Self { plots, player, viewport, .. } = self;
-        let comparison = &mut plots.comparison;
-        let beside = comparison.beside;
-        let Some(kept) = comparison.kept.iter_mut().find(|kept| Some(kept.place) == beside) else {
-            viewport.title = None;
-            return area;
-        };
-        let (before, now) = halves(area);
-        if plain {
-            kept.run.follow(player.pacer.shown(), || true);
-        }
-        let name = kept.name();
-        let run = &mut kept.run;
-        let picture = kept.picture.get_or_insert_with(|| {
-            let mut picture = Viewport::beside(run);
-            picture.revisit(run);
-            Box::new(picture)
-        });
-        picture.link(viewport);
-        picture.title = Some(format!("before: {name}"));
-        viewport.title = Some(format!("now: {}", named(player, &kept.key)));
-        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
-        picture.ui(&mut place, run, plain, None);
-        viewport.look_as(picture);
-        if let Some(pull) = picture.take_pull() {
-            // What cannot be pulled stays as it is.
-            let _ = run.pull(pull);
-        }
-        picture.take_clicked();
-        now
     }
 }

@@ -7,6 +7,7 @@ mod announce;
 #[cfg(not(target_arch = "wasm32"))]
 mod background;
 mod bench;
+mod beside;
 mod canvas;
 mod click;
 mod compare;
@@ -262,6 +263,8 @@ pub struct App {
     controls: Controls,
     accuracy: Accuracy,
     viewport: Viewport,
+    /// The picture of a run from before a change, and the number of that run.
+    beside: Option<(u64, Box<Viewport>)>,
     plots: Plots,
     timeline: Timeline,
     bench: Bench,
@@ -342,6 +345,7 @@ impl App {
             viewport: Viewport::new(&player, options.view),
             controls: Controls::default(),
             accuracy: Accuracy::default(),
+            beside: None,
             plots: Plots::of(&options.scene),
             timeline: Timeline::default(),
             bench: Bench::default(),
@@ -627,6 +631,7 @@ impl App {
                 self.timeline.reset();
                 self.plots.reset();
                 self.plots.comparison.reset();
+                self.beside = None;
                 self.viewport.restart(&self.player);
             }
             Err(error) => self.problem = Some(error.located(self.player.wanted()).to_string()),
@@ -742,7 +747,7 @@ impl App {
         }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
-        let moves = self.plots.comparison.advance(&self.player, dt as f32) || moves;
+        let moves = self.advance_kept(dt as f32) || moves;
         moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
     }
 

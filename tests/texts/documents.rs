@@ -7,7 +7,7 @@ use jointplay::cli::{reference, schema};
 use jointplay::scene::{Role, Scene, Vec3, file_tables, reference_page};
 use jointplay::simulate::{Frame, Simulation};
 
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 

@@ -4,6 +4,7 @@ mod documents;
 mod drives;
 mod format;
 mod house;
+mod icons;
 mod joints;
 mod meshes;
 mod scene_corpus;

@@ -16,8 +16,8 @@ const NAME: &str = "jointplay";
 const PAGE: &str = "index.html";
 /// What keeps the page for when there is no network: knows all its files.
 const KEEPER: &str = "web/offline.js";
-/// Scripts, style and icon beside it, copied as they are.
-const PARTS: [&str; 10] = [
+/// Scripts, style and icons beside it, copied as they are.
+const PARTS: [&str; 12] = [
     "web/stuck.js",
     "web/main.js",
     "web/host.js",
@@ -27,8 +27,13 @@ const PARTS: [&str; 10] = [
     "web/worker.js",
     "web/page.css",
     "web/icon.svg",
+    "web/icon-180.png",
+    "web/icon-512.png",
     "web/page.webmanifest",
 ];
+
+/// What other sites show of the page; nobody who opens the page loads it.
+const PREVIEW: &str = "web/preview.png";
 
 /// Codings in which a file may lie beside itself, best first, with the ending that each has there.
 pub const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
@@ -79,6 +84,8 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     let to = scratch.join(from.file_name().expect("a file"));
     fs::write(&to, keeper).map_err(|e| failed(&to, &e))?;
     compress_all(&scratch, compress)?;
+    let from = root.join(PREVIEW);
+    fs::copy(&from, scratch.join(from.file_name().expect("a file"))).map_err(|e| failed(&from, &e))?;
     remove(folder)?;
     fs::rename(&scratch, folder).map_err(|e| failed(folder, &e))
 }

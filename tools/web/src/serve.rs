@@ -108,6 +108,10 @@ fn given(folder: &Path, request: &Request) -> Option<Response> {
         (header::CACHE_CONTROL, "no-cache"),
         (header::ETAG, &tag),
         (header::VARY, "Accept-Encoding"),
+        // A frame that is sandboxed without `allow-same-origin` is a page of another origin.
+        (header::ACCESS_CONTROL_ALLOW_ORIGIN, "*"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
     ];
     Some(if known {
         (StatusCode::NOT_MODIFIED, fields).into_response()
@@ -155,6 +159,7 @@ fn media_type(file: &Path) -> &'static str {
         Some("js") => "text/javascript; charset=utf-8",
         Some("css") => "text/css; charset=utf-8",
         Some("svg") => "image/svg+xml",
+        Some("png") => "image/png",
         Some("wasm") => "application/wasm",
         Some("webmanifest") => "application/manifest+json",
         _ => "application/octet-stream",

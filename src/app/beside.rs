@@ -1,0 +1,94 @@
+//! What the window does with the runs kept from before a change: keeping, saving, and the picture of one beside the machine.
+
+use eframe::egui::{self, Rect, Ui, pos2};
+
+use super::App;
+use super::compare::Comparison;
+use super::files::record_files;
+use super::viewport::Viewport;
+
+/// The two halves of `area`: what was before, and what is now.
+fn halves(area: Rect) -> (Rect, Rect) {
+    let middle = area.center();
+    if area.width() >= area.height() {
+        (area.with_max_x(middle.x - 1.0), area.with_min_x(middle.x + 1.0))
+    } else {
+        (Rect::from_min_max(area.min, pos2(area.right(), middle.y - 1.0)), area.with_min_y(middle.y + 1.0))
+    }
+}
+
+impl App {
+    /// Keeps the run as it was before the change of `key` that was just made, unless a lesson is under way, which speaks of its own
+    /// plots; from now on the run before the next change is kept, if a gesture is over.
+    pub(super) fn compare(&mut self, key: Option<&str>, is_over: bool) {
+        let comparison = &mut self.plots.comparison;
+        let wanted = comparison.is_on() && self.course.is_none();
+        if let Some((run, key)) = self.player.take_before().filter(|_| wanted).zip(key) {
+            comparison.add(run, key.to_owned());
+        }
+        if is_over || !wanted {
+            self.player.keep_before(wanted);
+        }
+    }
+
+    /// The runs kept from before a change.
+    pub fn comparison(&self) -> &Comparison {
+        &self.plots.comparison
+    }
+
+    /// Saves the record of a kept run, if that was asked for.
+    pub(super) fn save_kept(&mut self) {
+        if let Some(kept) = self.plots.comparison.take_to_save() {
+            let files = record_files(kept.run());
+            self.save(files);
+        }
+    }
+
+    /// Takes the kept runs on, and the picture of the one that is shown, `dt` seconds after the last frame. Returns whether one of
+    /// them still lags behind.
+    pub(super) fn advance_kept(&mut self, dt: f32) -> bool {
+        let Self { plots, player, beside, .. } = self;
+        let before = plots.comparison.beside().map(|(kept, _)| kept.run().pacer.shown());
+        let lags = plots.comparison.advance(player);
+        if let (Some((kept, _)), Some((_, picture))) = (plots.comparison.beside(), beside) {
+            picture.advance(kept.run(), dt);
+            if !player.is_playing() && before != Some(kept.run().pacer.shown()) {
+                picture.revisit(kept.run());
+            }
+        }
+        lags
+    }
+
+    /// Shows the machine before beside the one now, if that is asked for; returns what is left of `area`.
+    pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
+        let Self { plots, player, viewport, beside, .. } = self;
+        let Some((kept, number)) = plots.comparison.beside() else {
+            (viewport.title, *beside) = (None, None);
+            return area;
+        };
+        let (before, now) = halves(area);
+        if plain {
+            kept.run_mut().follow(player.pacer.shown(), || true);
+        }
+        let (_, picture) = match beside.take().filter(|(of, _)| *of == number) {
+            Some(shown) => beside.insert(shown),
+            None => {
+                let mut picture = Box::new(Viewport::beside(kept.run()));
+                picture.revisit(kept.run());
+                beside.insert((number, picture))
+            }
+        };
+        picture.link(viewport);
+        picture.title = Some(format!("before: {}", kept.name()));
+        viewport.title = Some(format!("now: {}", kept.named_in(player)));
+        let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
+        picture.ui(&mut place, kept.run(), plain, None);
+        viewport.look_as(picture);
+        picture.take_clicked();
+        if let Some(pull) = picture.take_pull() {
+            // What cannot be pulled stays as it is.
+            let _ = kept.run_mut().pull(pull);
+        }
+        now
+    }
+}
