@@ -225,6 +225,13 @@ function freshCanvas() {
     return canvas;
 }
 
+/** What the user's system asks of all pages, in the words of `Page.start`. */
+function wishes() {
+    const asks = (what) => matchMedia(`(${what})`).matches;
+    const calm = asks('prefers-reduced-motion: reduce') ? 'calm ' : '';
+    return calm + (asks('prefers-contrast: more') || asks('forced-colors: active') ? 'contrast' : '');
+}
+
 /** Starts on the first backend that works; what the others said goes to the console. */
 async function begin(found) {
     const { page } = laboratory;
@@ -235,7 +242,7 @@ async function begin(found) {
         try {
             // A laboratory that starts takes the focus, which in a frame is another's.
             if (window !== window.top) HTMLElement.prototype.focus = () => {};
-            await page.start(freshCanvas(), backend, laboratory.starts, left ?? wanted());
+            await page.start(freshCanvas(), backend, laboratory.starts, left ?? wanted(), wishes());
             // What eframe takes typed text by is no stop of its own on the way of Tab.
             for (const field of document.querySelectorAll('body > input')) field.tabIndex = -1;
             return null;

@@ -146,6 +146,10 @@ pub struct AppOptions {
     pub embedded: Option<Embedded>,
     /// A message to show at once, e.g. why a link could not be opened.
     pub problem: Option<String>,
+    /// Begins paused and without flashes, whatever else is asked for: for who wants little motion.
+    pub calm: bool,
+    /// Texts and edges in black and white.
+    pub contrast: bool,
     /// Clock that measures the stepping time of a frame.
     pub clock: Clock,
 }
@@ -163,6 +167,8 @@ impl AppOptions {
             lesson: None,
             embedded: None,
             problem: None,
+            calm: false,
+            contrast: false,
             clock: host::wall,
         }
     }
@@ -313,6 +319,8 @@ pub struct App {
     before_lesson: Option<Box<lesson::WindowBefore>>,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
+    /// Texts and edges are in black and white.
+    contrast: bool,
     /// The graphics adapter and its interface; "" without a window.
     renderer: String,
     /// The graphics of the window, to draw pictures off screen.
@@ -335,8 +343,14 @@ impl App {
     pub fn with_context(
         ctx: &egui::Context,
         state: Option<&egui_wgpu::RenderState>,
-        options: AppOptions,
+        mut options: AppOptions,
     ) -> Result<Self, StartError> {
+        if options.calm {
+            (options.playing, options.view.flash) = (false, false);
+            if let Some(link) = &mut options.link {
+                link.playing = Some(false);
+            }
+        }
         let mut player = Player::new(&options.scene)?;
         player.clock = options.clock;
         player.pacer.set_scale(options.time_scale);
@@ -380,6 +394,7 @@ impl App {
             course: None,
             before_lesson: None,
             picture_rect: egui::Rect::ZERO,
+            contrast: options.contrast,
             renderer: String::new(),
             graphics: None,
             player,
@@ -430,7 +445,7 @@ impl App {
 
     /// Continues in another window, or with new graphics after the old were lost; nothing else changes.
     pub fn attach(&mut self, ctx: &egui::Context, state: Option<&egui_wgpu::RenderState>, theme: ThemePreference) {
-        theme::apply(ctx);
+        theme::apply_with(ctx, self.contrast);
         ctx.set_theme(theme);
         self.renderer = String::new();
         if let Some(state) = state {

@@ -87,10 +87,21 @@ pub fn fonts() -> FontDefinitions {
 
 /// Sets the face of text and both themes' styles.
 pub fn apply(ctx: &egui::Context) {
+    apply_with(ctx, false);
+}
+
+/// The same, with `contrast` in black and white where they are grey.
+pub fn apply_with(ctx: &egui::Context, contrast: bool) {
     ctx.set_fonts(fonts());
     apply_size(ctx, false);
-    ctx.style_mut_of(Theme::Light, |style| style.visuals = visuals(false));
-    ctx.style_mut_of(Theme::Dark, |style| style.visuals = visuals(true));
+    for theme in [Theme::Light, Theme::Dark] {
+        ctx.style_mut_of(theme, |style| {
+            style.visuals = visuals(theme == Theme::Dark);
+            if contrast {
+                sharpen(&mut style.visuals);
+            }
+        });
+    }
     ctx.all_styles_mut(|style| {
         let spacing = &mut style.spacing;
         spacing.item_spacing = vec2(8.0, 6.0);
@@ -108,6 +119,26 @@ pub fn apply(ctx: &egui::Context) {
         ]
         .into();
     });
+}
+
+/// Makes texts and edges as strong as the screen allows.
+fn sharpen(visuals: &mut Visuals) {
+    let (ground, ink) =
+        if visuals.dark_mode { (Color32::BLACK, Color32::WHITE) } else { (Color32::WHITE, Color32::BLACK) };
+    (visuals.panel_fill, visuals.window_fill, visuals.extreme_bg_color) = (ground, ground, ground);
+    (visuals.weak_text_color, visuals.disabled_alpha) = (Some(ink), 0.7);
+    visuals.window_stroke = Stroke::new(1.0, ink);
+    let widgets = &mut visuals.widgets;
+    for widget in [
+        &mut widgets.noninteractive,
+        &mut widgets.inactive,
+        &mut widgets.hovered,
+        &mut widgets.active,
+        &mut widgets.open,
+    ] {
+        (widget.fg_stroke.color, widget.bg_stroke) = (ink, Stroke::new(1.0, ink));
+        (widget.weak_bg_fill, widget.bg_fill) = (ground, ground.lerp_to_gamma(ink, 0.3));
+    }
 }
 
 fn visuals(dark: bool) -> Visuals {

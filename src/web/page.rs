@@ -56,6 +56,7 @@ impl Page {
 
     /// Draws on `canvas` with `backend` (`webgpu` or `webgl`) from now on; `start` counts the starts. The first one opens
     /// `link`: the address from its `?` on, or what [`Self::session`] gave. What is wrong in it is shown beside the default scene.
+    /// `wishes` of the user's system: `calm` for little motion, `contrast` for much contrast, or both.
     ///
     /// # Errors
     /// Text: the backend does not work here. A laboratory that was running is still there for the next attempt.
@@ -65,6 +66,7 @@ impl Page {
         backend: String,
         start: u32,
         link: String,
+        wishes: String,
     ) -> Result<(), JsValue> {
         let mut setup = WgpuSetupCreateNew::without_display_handle();
         setup.instance_descriptor.backends = if backend == "webgl" { Backends::GL } else { Backends::BROWSER_WEBGPU };
@@ -81,7 +83,7 @@ impl Page {
             let mut slot = laboratory.borrow_mut();
             match &mut *slot {
                 Some(laboratory) => laboratory.attach(cc),
-                None => *slot = Some(Laboratory::new(cc, &link, inbox)?),
+                None => *slot = Some(Laboratory::new(cc, &link, &wishes, inbox)?),
             }
             drop(slot);
             Ok(Box::new(OnCanvas(laboratory)))
@@ -279,9 +281,15 @@ impl Laboratory {
     fn new(
         cc: &eframe::CreationContext<'_>,
         link: &str,
+        wishes: &str,
         inbox: Rc<Inbox>,
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
-        let mut app = App::new(cc, AppOptions::from_link_or_default(link))?;
+        let options = AppOptions {
+            calm: wishes.contains("calm"),
+            contrast: wishes.contains("contrast"),
+            ..AppOptions::from_link_or_default(link)
+        };
+        let mut app = App::new(cc, options)?;
         app.set_host(Box::new(WebHost { inbox, no_sound: None }));
         app.follow_frame_rate();
         Ok(Self { app, ctx: cc.egui_ctx.clone(), renderer: describe(cc), frames: 0, noted: None })

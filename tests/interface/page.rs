@@ -263,6 +263,27 @@ fn a_bad_link_is_explained_and_the_default_scene_waits_behind_it() {
     assert_eq!(options.scene.contact.clearance, 0.5e-3);
 }
 
+#[test]
+fn who_wants_little_motion_and_much_contrast_has_them() {
+    let link = "?scene=slider-crank&t=20ms&play=1";
+    let options = AppOptions { calm: true, contrast: true, ..AppOptions::from_link(link).expect("opens") };
+    let (mut harness, _) = open(options, LARGE);
+    for _ in 0..60 {
+        harness.step();
+    }
+    let player = harness.state().player();
+    assert_eq!((player.is_playing(), player.pacer.shown()), (false, 0.02));
+    for theme in [egui::Theme::Light, egui::Theme::Dark] {
+        let visuals = harness.ctx.style_of(theme).visuals.clone();
+        let [ink, ground] = [visuals.weak_text_color(), visuals.panel_fill].map(|colour| colour.r().abs_diff(0));
+        assert_eq!(ink.abs_diff(ground), 255, "{theme:?}");
+    }
+    harness.get_by_role_and_label(Role::Button, "View options").click();
+    harness.run_steps(3);
+    let flash = harness.get_by_role_and_label(Role::CheckBox, "Flash joints on impact");
+    assert_eq!(flash.accesskit_node().toggled(), Some(egui::accesskit::Toggled::False));
+}
+
 fn touch(harness: &Harness<'_, App>, id: u64, phase: TouchPhase, pos: Pos2) {
     harness.event(Event::Touch { device_id: TouchDeviceId(0), id: TouchId(id), phase, pos, force: None });
     // The first finger is the pointer, too.
