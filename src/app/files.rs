@@ -269,22 +269,6 @@ impl App {
         self.save(record_files(&self.player));
     }
 
-    /// Saves the plots on show as SVG.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub fn save_plots(&mut self) {
-        let Some(sheet) = self.plots.sheet(&self.player, self.describe()) else {
-            self.problem = Some("No plot is chosen".to_owned());
-            return;
-        };
-        match sheet.svg() {
-            Ok(text) => {
-                let name = format!("{}-plots.svg", self.file_stem());
-                self.save(vec![SaveFile { name, mime: "image/svg+xml", bytes: text.into_bytes() }]);
-            }
-            Err(error) => self.problem = Some(format!("The plots cannot be saved: {error}")),
-        }
-    }
-
     /// Description of a picture, stored in it.
     pub(super) fn describe(&self) -> String {
         describe(&self.player)

@@ -171,10 +171,7 @@ impl App {
             layout::close_menu(ui);
         }
         #[cfg(not(target_arch = "wasm32"))]
-        if ui.button("Plots…").on_hover_text("The plots on show, for print: SVG").clicked() {
-            self.save_plots();
-            layout::close_menu(ui);
-        }
+        self.plots_menu(ui);
         let help = "Everything that the plots have recorded since the reset";
         if ui.button("Data (CSV)…").on_hover_text(help).clicked() {
             self.save_record();

@@ -1,4 +1,4 @@
-//! Charts as data, and their pictures: one description gives an SVG, and a PNG drawn from it.
+//! Charts as data, and their pictures: one description gives an SVG, and a PNG and a PDF drawn from it.
 //!
 //! Knows nothing of mechanisms and needs no display.
 
@@ -6,6 +6,7 @@ mod draw;
 mod heat;
 mod ink;
 mod labels;
+mod pdf;
 mod png;
 mod thin;
 mod ticks;

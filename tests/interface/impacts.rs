@@ -139,25 +139,35 @@ fn the_file_has_the_columns_and_values_of_the_command_line_s() {
 }
 
 #[test]
-fn the_plots_on_show_are_saved_as_a_drawing() {
+fn the_plots_on_show_are_saved_as_page_drawing_and_picture() {
     let scene = Scene::load("spcmm", &[]).expect("built in");
     let options = AppOptions { playing: false, ..AppOptions::new(scene) };
     let (mut harness, calls) = open(options, [1280.0, 800.0]);
     harness.state_mut().player_mut().run_to(20e-3);
     harness.run();
-    click(&mut harness, "Save");
-    click(&mut harness, "Plots…");
+    for format in ["Plots as SVG", "Plots as PDF", "Plots as PNG"] {
+        click(&mut harness, "Save");
+        click(&mut harness, format);
+    }
     let saved = calls.borrow().saved.clone();
-    assert_eq!(saved.len(), 1);
-    assert!(saved[0].name.ends_with("-plots.svg") && saved[0].mime == "image/svg+xml");
-    let text = String::from_utf8(saved[0].bytes.clone()).expect("text");
+    let [svg, pdf, png] = &saved[..] else { panic!("{} files", saved.len()) };
+    assert!(svg.name.ends_with("-plots.svg") && svg.mime == "image/svg+xml");
+    let text = String::from_utf8(svg.bytes.clone()).expect("text");
     assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
     for word in ["Normal force", "Eccentricity", "S1", "S3", "clearance", "state hash"] {
         assert!(text.contains(word), "{word}");
     }
     // A line of the drawing for each curve.
     assert!(text.matches("<polyline").count() >= 6, "{}", text.matches("<polyline").count());
+    let holds = |bytes: &[u8], words: &str| bytes.windows(words.len()).any(|part| part == words.as_bytes());
+    assert!(pdf.name.ends_with("-plots.pdf") && pdf.mime == "application/pdf");
+    assert!(pdf.bytes.starts_with(b"%PDF-") && holds(&pdf.bytes, "state hash"));
+    assert!(png.name.ends_with("-plots.png") && png.mime == "image/png");
+    assert!(png.bytes.starts_with(b"\x89PNG"));
     if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
-        std::fs::write(std::path::Path::new(&keep).join("plots.svg"), text).expect("writable");
+        for file in &saved {
+            let ending = file.name.rsplit('.').next().expect("an ending");
+            std::fs::write(std::path::Path::new(&keep).join(format!("plots.{ending}")), &file.bytes).expect("writable");
+        }
     }
 }

@@ -1,7 +1,11 @@
 //! The chosen plots as charts, for a file that is printed or drawn on.
 
+use eframe::egui::Ui;
+
 use super::{Panel, Plots, time_axis};
+use crate::app::host::SaveFile;
 use crate::app::player::Player;
+use crate::app::{App, layout};
 use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
 use crate::simulate::{Bin, PlotKind};
 
@@ -14,6 +18,62 @@ const COLUMNS: usize = 2;
 const REST: u32 = 60;
 /// Colour of clearances.
 const LEVEL: Colour = (150, 150, 150);
+/// Pixels of a PNG to a pixel of the sheet.
+const SHARP: f32 = 2.0;
+
+/// A format in which plots are saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlotFormat {
+    /// A page for print.
+    Pdf,
+    /// A drawing to work on.
+    Svg,
+    /// A picture of pixels.
+    Png,
+}
+
+impl PlotFormat {
+    const ALL: [(Self, &'static str, &'static str, &'static str); 3] = [
+        (Self::Pdf, "PDF", "pdf", "application/pdf"),
+        (Self::Svg, "SVG", "svg", "image/svg+xml"),
+        (Self::Png, "PNG", "png", "image/png"),
+    ];
+}
+
+impl App {
+    /// A button for each format in which the plots on show can be saved.
+    pub(in crate::app) fn plots_menu(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.label("Plots");
+            for (format, name, ..) in PlotFormat::ALL {
+                let button = ui.button(format!("{name}…")).on_hover_text(format!("The plots on show, {name}"));
+                if button.accessible_name(format!("Plots as {name}")).clicked() {
+                    self.save_plots(format);
+                    layout::close_menu(ui);
+                }
+            }
+        });
+    }
+
+    /// Saves the plots on show.
+    pub fn save_plots(&mut self, format: PlotFormat) {
+        let Some(sheet) = self.plots.sheet(&self.player, self.describe()) else {
+            self.problem = Some("No plot is chosen".to_owned());
+            return;
+        };
+        let bytes = match format {
+            PlotFormat::Pdf => sheet.pdf(),
+            PlotFormat::Svg => sheet.svg().map(String::into_bytes),
+            PlotFormat::Png => sheet.png(SHARP),
+        };
+        let (_, _, ending, mime) = PlotFormat::ALL[format as usize];
+        let name = format!("{}-plots.{ending}", self.file_stem());
+        match bytes {
+            Ok(bytes) => self.save(vec![SaveFile { name, mime, bytes }]),
+            Err(error) => self.problem = Some(format!("The plots cannot be saved: {error}")),
+        }
+    }
+}
 
 impl Plots {
     /// The plots on show with their time range, and `note` below; `None` if there are none.
