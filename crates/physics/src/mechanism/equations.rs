@@ -133,11 +133,11 @@ pub(super) trait Equations: Send {
     /// Whether these are unique.
     fn is_closure_unique(&self, c: usize) -> bool;
 
-    /// Force (N) or torque (N m) of every actuator, given true accelerations in [`Self::motion`]. May change the loads.
+    /// Force (N) or torque (N m) of every actuator, given true accelerations in [`Self::motion`].
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);
 
     /// The motion, and force and torque about its centroid that the joint above each body exerts on it, actuators included,
-    /// after [`Self::actuators`]. Changes the loads.
+    /// after [`Self::actuators`].
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]);
 
     /// Whether the force or torque of actuator `i` is unique.
@@ -147,6 +147,6 @@ pub(super) trait Equations: Send {
     fn prescribes_drives(&self) -> bool;
 
     /// Power of all drives, W, after an evaluation at `y` with the accelerations `dv`; `all` if some of them are loaded by
-    /// bodies whose motion is not a function of time alone. May change the loads.
+    /// bodies whose motion is not a function of time alone. May change the accelerations in [`Self::motion`].
     fn drive_power(&mut self, model: &Model, gravity: &Vec3, y: &[f64], dv: &[f64], all: bool) -> f64;
 }

@@ -13,33 +13,38 @@ use crate::scene::Vec3;
 pub(super) struct Forest {
     tree: Tree,
     constraints: Option<Constraints>,
+    /// What the joint above each body bears at the latest [`Self::find_drive_forces`], about the body's centroid; then the world's.
+    borne: Vec<Wrench>,
 }
 
 impl Forest {
     /// For `model`.
     pub(super) fn new(model: &Model) -> Self {
         let constraints = || Constraints::new(model, &model.ideal_joints);
-        Self { tree: Tree::new(model), constraints: model.closes_loops().then(constraints) }
+        let tree = Tree::new(model);
+        Self {
+            borne: vec![Wrench::zero(); tree.wrench.len()],
+            tree,
+            constraints: model.closes_loops().then(constraints),
+        }
     }
 
-    /// Drive forces for the accelerations in the tree's motion, from the bodies selected by `moved`.
+    /// Drive forces for the accelerations in the tree's motion under its loads, from the bodies selected by `moved`; `closed`: the
+    /// joints that close loops exert their reactions, too.
     fn find_drive_forces(
         &mut self,
         model: &Model,
         gravity: &Vec3,
+        closed: bool,
         moved: impl Fn(usize) -> bool,
-        found: impl FnMut(usize, f64),
+        mut found: impl FnMut(&Driven, usize, f64),
     ) {
-        let Tree { motion, wrench, .. } = &mut self.tree;
-        inverse_dynamics(model, motion, wrench, gravity, moved, found);
-    }
-
-    /// Adds the reactions of the joints that close loops to the loads.
-    fn load_reactions(&mut self, model: &Model) {
-        if let Some(constraints) = &self.constraints {
-            let Tree { motion, wrench, .. } = &mut self.tree;
-            constraints.load(model, constraints.multipliers(), motion, wrench);
+        let Self { tree: Tree { motion, wrench, driven, .. }, constraints, borne } = self;
+        borne.copy_from_slice(wrench);
+        if let Some(constraints) = constraints.as_ref().filter(|_| closed) {
+            constraints.load(model, constraints.multipliers(), motion, borne);
         }
+        inverse_dynamics(model, motion, borne, gravity, moved, |drive, force| found(driven, drive, force));
     }
 }
 
@@ -224,25 +229,23 @@ impl Equations for Forest {
     }
 
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
-        self.load_reactions(model);
-        self.find_drive_forces(model, gravity, |_| true, |drive, force| out[drive] = force);
+        self.find_drive_forces(model, gravity, true, |_| true, |_, drive, force| out[drive] = force);
     }
 
-    /// What drives need, every joint bears: the loads hold it for each body.
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
-        (&self.tree.motion, &self.tree.wrench)
+        (&self.tree.motion, &self.borne)
     }
 
     fn is_actuator_unique(&mut self, model: &Model, gravity: &Vec3, i: usize) -> bool {
-        let Self { tree, constraints } = self;
-        let Some(constraints) = constraints else {
+        let Some(constraints) = &self.constraints else {
             return true;
         };
+        let motion = &self.tree.motion;
+        let mut wrench = vec![Wrench::zero(); self.borne.len()];
         let mut force_under = |multipliers: Option<&[f64]>| {
-            let Tree { motion, wrench, .. } = &mut *tree;
             wrench.fill(Wrench::zero());
             if let Some(multipliers) = multipliers {
-                constraints.load(model, multipliers, motion, wrench);
+                constraints.load(model, multipliers, motion, &mut wrench);
             }
             let mut force = 0.0;
             let found = |drive, value| {
@@ -250,7 +253,7 @@ impl Equations for Forest {
                     force = value;
                 }
             };
-            inverse_dynamics(model, motion, wrench, gravity, |_| true, found);
+            inverse_dynamics(model, motion, &mut wrench, gravity, |_| true, found);
             force
         };
         let without = force_under(None);
@@ -268,15 +271,42 @@ impl Equations for Forest {
     fn drive_power(&mut self, model: &Model, gravity: &Vec3, y: &[f64], dv: &[f64], all: bool) -> f64 {
         if all {
             self.tree.accelerate(model, y, dv);
-            self.load_reactions(model);
         }
-        let Tree { motion, wrench, driven, .. } = &mut self.tree;
         // If forces suffice, everything carried by a drive depends on time alone.
         let moved = |b: usize| all || model.bodies[b].driven_only;
         let mut power = 0.0;
-        inverse_dynamics(model, motion, wrench, gravity, moved, |drive, force| {
+        self.find_drive_forces(model, gravity, all, moved, |driven, drive, force| {
             power += force * driven.coordinates[drive].rate;
         });
         power
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mechanism::{Mechanism, Touching};
+    use crate::scene::{BUILT_IN, Formulation, Scene, Vec3};
+
+    #[test]
+    fn asking_for_the_forces_of_drives_again_changes_no_load() {
+        let mut driven = 0;
+        for (name, formulation) in BUILT_IN.iter().flat_map(|name| Formulation::ALL.map(|form| (name, form))) {
+            let change = ("formulation".to_owned(), formulation.to_string());
+            let Ok(mut mechanism) = Scene::load(name, &[change]).map(|scene| Mechanism::new(&scene).unwrap()) else {
+                continue;
+            };
+            let start = mechanism.start().unwrap();
+            mechanism.evaluator(Touching::Nothing).evaluate_fully(0.0, &start, &mut vec![0.0; start.len()]);
+            let mut ask = || {
+                let mut forces = vec![0.0; mechanism.drives()];
+                mechanism.actuators(&mut forces);
+                let loads: Vec<[Vec3; 2]> = mechanism.joint_reactions().collect();
+                (forces, loads)
+            };
+            let first = ask();
+            assert!((0..3).all(|_| ask() == first), "{name} {formulation}");
+            driven += usize::from(first.0.iter().any(|force| *force != 0.0));
+        }
+        assert!(driven > 5, "{driven}");
     }
 }

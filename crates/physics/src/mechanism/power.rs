@@ -66,7 +66,7 @@ impl Mechanism {
             let all = !self.sources.forces_suffice;
             let (model, gravity) = (&self.model, &self.gravity);
             powers.drive += self.equations.drive_power(model, gravity, y, dv, all);
-            // The loads were changed, and the accelerations may have been.
+            // The accelerations may have been changed.
             self.evaluated = None;
         }
         powers

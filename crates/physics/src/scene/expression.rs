@@ -180,7 +180,8 @@ impl Program {
     /// which a text begins, and the index of its size among the variables.
     ///
     /// # Errors
-    /// As [`Self::parse`], and a power of a number with its unit, which could be meant for the unit alone.
+    /// As [`Self::parse`], and a power of a number with its unit, unless it is written at a unit as in `m^2`: it could be meant for
+    /// either.
     pub fn parse_with_units(
         text: &str,
         variable: impl Fn(&str) -> Option<usize>,
@@ -540,14 +541,30 @@ impl<'t> Parser<'t> {
         let Some((length, size)) = (self.unit)(&self.text[self.at..]) else {
             return Ok(());
         };
+        let simple = !self.text[self.at..self.at + length].contains(['/', ' ', '^']);
         self.at += length;
         self.push(Step::Variable(size))?;
+        if simple && let Some(power) = self.unit_power() {
+            self.push(Step::Constant(power))?;
+            self.push(Step::Binary(Binary::Power))?;
+        }
         self.push(Step::Binary(Binary::Multiply))?;
         let power = self.peek() == Some('^') || self.text[self.at..].starts_with("**");
         if power {
             return Err(self.unexpected("an operator other than a power"));
         }
         Ok(())
+    }
+
+    /// A whole power written at the unit before, as in `m^2`, which is one of the unit alone.
+    fn unit_power(&mut self) -> Option<f64> {
+        let mut rest = self.text[self.at..].strip_prefix('^')?.chars();
+        let power = rest.next()?.to_digit(10).filter(|power| *power > 0)?;
+        let whole = !rest.next().is_some_and(|c| c.is_alphanumeric() || ".^_".contains(c));
+        whole.then(|| {
+            self.at += 2;
+            f64::from(power)
+        })
     }
 
     /// A variable, a constant or a call. A name may contain dots.

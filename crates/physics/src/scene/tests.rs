@@ -696,6 +696,15 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     let scene = read("", "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"").expect("reads");
     assert!((scene.contact.clearance - 0.21e-3).abs() < 1e-18);
     assert_eq!(scene.contact.friction, 1.0 / 3.0);
+    // A power at a unit is one of the unit.
+    let scene = read("", "clearance = \"3 mm^2 / (2 mm)^2 * 0.4 mm\"").expect("reads");
+    assert!((scene.contact.clearance - 0.3e-3).abs() < 1e-18);
+    for inertia in ["0.3 kg * 1.0001 m^2 / 12", "0.3 kg * 1.0001 m² / 12", "0.3 kg * (1 m)^2 * 1.0001 / 12"] {
+        let components = format!("[\"1e-3 kg m^2\", \"{inertia}\", \"{inertia}\"]");
+        let text = text("", "").replace("\"1 1 1 kg m^2\"", &components);
+        let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!((scene.bodies[0].inertia[(1, 1)] - 0.0250025).abs() < 1e-15);
+    }
     let drive = |law: &str| format!("drive = {{ law = {law} }}");
     let spin = "\"constant\", velocity = \"rate\"";
     assert!(read(&drive(spin), "").is_ok());
@@ -710,6 +719,11 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
             "",
             "`*` where an operator other than a power should stand",
         ),
+        // Of a unit with a stroke it could be meant for either part.
+        (String::new(), "clearance = \"3 m/s^3 * radius\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"radius * 3 mm ^2\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"radius * 3 mm^2.5\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"radius * 3 mm^2\"", "m^3, which is not in m"),
         (String::new(), "clearance = \"radius\"", "clearance 50 mm must be below the ball radius"),
         (String::new(), "friction = \"2 * radius\"", "gives 0.1 m, but must be a pure number; allowed 0 to 10"),
         (String::new(), "friction = \"2 * radiu\"", "no variable `radiu` (did you mean `radius`?)"),

@@ -47,7 +47,7 @@ impl LoadPeaks {
         self.take(mechanism, time);
     }
 
-    /// Takes the loads at `time` after [`Mechanism::actuators`], which adds to the joints' loads each time.
+    /// Takes the loads at `time` after [`Mechanism::actuators`].
     pub(super) fn take(&mut self, mechanism: &mut Mechanism, time: f64) {
         let mut parts = self.parts.iter_mut();
         let mut rise = |loads: [Option<Vec3>; 2]| {
