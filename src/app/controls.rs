@@ -392,10 +392,12 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     tooltip.show(|ui| {
         ui.strong(parameter.label);
         ui.label(value::typeset(parameter.help));
-        if let Some((law, formula)) = equations::formula(key) {
-            ui.label(RichText::new(format!("{law}: {formula}")).small());
+        let stated = equations::law(key, player.wanted());
+        if let Some(stated) = &stated {
+            ui.label(RichText::new(format!("{}: {}", stated.law, stated.formula)).small());
         }
-        let equation = equations::source(parameter.equation);
+        let elsewhere = stated.and_then(|stated| stated.elsewhere).map(str::to_owned);
+        let equation = elsewhere.unwrap_or_else(|| equations::source(parameter.equation));
         if !equation.is_empty() {
             ui.label(RichText::new(equation).small());
         }

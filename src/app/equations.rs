@@ -1,33 +1,89 @@
-//! Where a parameter enters the equations, as its tooltip says it: the law by name, its formula, and the paper's number.
+//! Where a parameter enters the equations, as its tooltip says it: the law by name, its formula, and the paper's number, or the
+//! publication of a law that the paper does not use.
 
-/// Law and formula by the last part of a parameter's key.
-const FORMULAS: [(&str, &str, &str); 9] = [
-    ("clearance", "Stiffness of the contact", HERTZ),
-    ("ball_radius", "Stiffness of the contact", HERTZ),
-    ("youngs_modulus", "Stiffness of the contact", HERTZ),
-    ("poisson_ratio", "Stiffness of the contact", HERTZ),
-    ("friction", "Coulomb friction with dynamic correction", COULOMB),
-    ("slip_speed_low", "Dynamic correction of friction", CORRECTION),
-    ("slip_speed_high", "Dynamic correction of friction", CORRECTION),
-    ("restitution", "Normal force of Lankarani and Nikravesh", NORMAL),
-    ("normal_law", "Normal force of Lankarani and Nikravesh", NORMAL),
-];
+use crate::contact::{FrictionLaw, NormalLaw, Parameters};
+use crate::scene::Scene;
 
 const HERTZ: &str = "K = 4 / (3 (s + s)) · √(R r / (R - r)), s = (1 - ν²) / E, R = r + c";
 const COULOMB: &str = "F = c_f c_d N against the sliding velocity v";
 const CORRECTION: &str = "c_d = 0 up to v0, (v - v0) / (v1 - v0) up to v1, then 1";
-const NORMAL: &str = "N = K d^1.5 (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed";
 
 /// The paper.
 const PAPER: &str = "Sheng & Chen (2024)";
 
-/// Name and formula of the law that the parameter `key` enters, where it is one of the contact's.
-pub fn formula(key: &str) -> Option<(&'static str, &'static str)> {
-    let (group, last) = key.rsplit_once('.')?;
-    if group != "contact" && !group.starts_with("joint.") {
-        return None;
+/// A law as a tooltip states it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stated {
+    /// Name of the law.
+    pub law: &'static str,
+    /// Its formula.
+    pub formula: &'static str,
+    /// Where it is published, if not in the paper.
+    pub elsewhere: Option<&'static str>,
+}
+
+impl Stated {
+    const fn new(law: &'static str, formula: &'static str) -> Self {
+        Self { law, formula, elsewhere: None }
     }
-    FORMULAS.iter().find(|(own, ..)| *own == last).map(|(_, law, formula)| (*law, *formula))
+}
+
+/// The law of `scene` that the parameter `key` enters, where it is one of a contact.
+pub fn law(key: &str, scene: &Scene) -> Option<Stated> {
+    let (group, last) = key.rsplit_once('.')?;
+    let contact = match group.strip_prefix("joint.") {
+        Some(name) => &scene.ball_joints.iter().find(|joint| joint.name == name)?.contact,
+        None if group == "contact" => &scene.contact,
+        None => return None,
+    };
+    law_of(last, contact)
+}
+
+/// The same for the last part of its key.
+fn law_of(last: &str, contact: &Parameters) -> Option<Stated> {
+    let without = contact.friction_law == FrictionLaw::None;
+    Some(match last {
+        "clearance" | "ball_radius" | "youngs_modulus" | "poisson_ratio" => {
+            Stated::new("Stiffness of the contact", HERTZ)
+        }
+        "friction" | "friction_law" | "slip_speed_low" | "slip_speed_high" if without => {
+            Stated::new("No friction", "F = 0")
+        }
+        "friction" | "friction_law" => Stated::new("Coulomb friction with dynamic correction", COULOMB),
+        "slip_speed_low" | "slip_speed_high" => Stated::new("Dynamic correction of friction", CORRECTION),
+        "restitution" | "normal_law" => normal(contact.normal_law),
+        _ => return None,
+    })
+}
+
+/// The damping factors are those of `contact::damping_factor`.
+fn normal(law: NormalLaw) -> Stated {
+    let (law, formula, elsewhere) = match law {
+        NormalLaw::LankaraniNikravesh => (
+            "Lankarani–Nikravesh normal force",
+            "N = K d^1.5 (1 + ¾ (1 - e²) d' / d'0), d: penetration, d'0: approach speed",
+            None,
+        ),
+        NormalLaw::Hertz => {
+            ("Hertz normal force, without damping", "N = K d^1.5, d: penetration", Some("Hertz (1882)"))
+        }
+        NormalLaw::HuntCrossley => (
+            "Hunt–Crossley normal force",
+            "N = K d^1.5 (1 + 1.5 (1 - e) d' / d'0), d: penetration, d'0: approach speed",
+            Some("Hunt & Crossley (1975)"),
+        ),
+        NormalLaw::Flores => (
+            "Normal force of Flores et al.",
+            "N = K d^1.5 (1 + 1.6 (1 - e) / e · d' / d'0), d: penetration, d'0: approach speed",
+            Some("Flores et al. (2011)"),
+        ),
+        NormalLaw::Gonthier => (
+            "Normal force of Gonthier et al.",
+            "N = K d^1.5 (1 + χ d' / d'0), χ (1 + e) = ln((1 + χ) / (1 - e χ)), d: penetration, d'0: approach speed",
+            Some("Gonthier et al. (2004)"),
+        ),
+    };
+    Stated { law, formula, elsewhere }
 }
 
 /// The row of a parameter, `Paper eqs. (9), (10)`, with the paper named: `Sheng & Chen (2024), eqs. 9, 10`.
@@ -57,6 +113,8 @@ pub fn source(equation: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::damping_factor;
+    use crate::scene::{Dimension, Quantity, evaluate};
 
     #[test]
     fn equations_are_named_by_their_paper() {
@@ -71,9 +129,38 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_s_own_parameter_has_the_formula_of_the_scene_s() {
-        assert_eq!(formula("joint.S1.friction"), formula("contact.friction"));
-        assert!(formula("contact.restitution").is_some_and(|(law, _)| law.contains("Lankarani")));
-        assert_eq!(formula("spcmm.frequency"), None);
+    fn a_parameter_enters_the_law_of_its_own_joint() {
+        let changes = [("contact.friction_law", "none"), ("joint.S2.normal_law", "hertz")];
+        let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let scene = Scene::load("spcmm", &changes).expect("built in");
+        assert_eq!(law("joint.S1.restitution", &scene), law("contact.restitution", &scene));
+        assert_eq!(law("joint.S2.restitution", &scene), Some(normal(NormalLaw::Hertz)));
+        assert_eq!(law("contact.friction", &scene).expect("stated").formula, "F = 0");
+        assert_eq!(law("spcmm.frequency", &scene), None);
+    }
+
+    #[test]
+    fn the_normal_force_stated_is_the_one_of_the_law_in_use() {
+        let ce = 0.7;
+        for normal_law in NormalLaw::ALL {
+            let contact = Parameters { normal_law, ..Parameters::default() };
+            let stated = law_of("restitution", &contact).expect("stated");
+            let chi = damping_factor(normal_law, ce);
+            let factor = stated.formula.split_once("(1 + ").and_then(|(_, rest)| rest.split_once("d' / d'0"));
+            let Some((factor, _)) = factor else {
+                assert_eq!(chi, 0.0, "{stated:?}");
+                continue;
+            };
+            if factor.trim() == "χ" {
+                let condition = chi * (1.0 + ce) - ((1.0 + chi) / (1.0 - ce * chi)).ln();
+                assert!(condition.abs() < 1e-12 && stated.formula.contains("χ (1 + e) = ln((1 + χ) / (1 - e χ))"));
+                continue;
+            }
+            // Written as a file's expression.
+            let text = factor.trim().trim_end_matches('·').replace('¾', "0.75").replace("e²", "e^2");
+            let text = text.replace(" (", " * (");
+            let value = evaluate(&text, &[("e", Quantity::new(ce, Dimension::None))]).expect("arithmetic").value();
+            assert!((value - chi).abs() < 1e-12, "{stated:?}: {text} = {value}, not {chi}");
+        }
     }
 }
