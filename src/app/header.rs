@@ -2,7 +2,9 @@
 
 use std::sync::LazyLock;
 
-use eframe::egui::{self, ComboBox, Frame, RichText, TextFormat, TextStyle, ThemePreference, Ui, text::LayoutJob};
+use eframe::egui::{
+    self, Atom, ComboBox, Frame, RichText, TextFormat, TextStyle, ThemePreference, Ui, text::LayoutJob,
+};
 
 use super::App;
 use super::dialogs::Dialog;
@@ -36,14 +38,15 @@ static ABOUT_SCENES: LazyLock<Vec<AboutScene>> = LazyLock::new(|| {
 });
 
 impl AboutScene {
-    /// Its entry in the list: title, and the sentence below it.
-    fn entry(&self, ui: &mut Ui, chosen: bool, width: f32) -> egui::Response {
+    /// Its entry in the list: picture, title, and the sentence below it.
+    fn entry(&self, ui: &mut Ui, picture: Atom<'_>, chosen: bool, width: f32) -> egui::Response {
         let mut words = LayoutJob::default();
         let format = |style: TextStyle, colour| TextFormat::simple(style.resolve(ui.style()), colour);
         words.append(&self.title, 0.0, format(TextStyle::Body, ui.visuals().strong_text_color()));
         words.append("\n", 0.0, format(TextStyle::Small, ui.visuals().text_color()));
         words.append(&self.sentence, 0.0, format(TextStyle::Small, ui.visuals().text_color()));
-        let entry = egui::Button::selectable(chosen, words).wrap().min_size(egui::vec2(width, 0.0));
+        let entry =
+            egui::Button::selectable(chosen, (picture, words)).gap(10.0).wrap().min_size(egui::vec2(width, 0.0));
         let response = ui.add(entry).on_hover_text(self.name);
         let id = response.id;
         let response = response.accessible_name(self.name);
@@ -114,7 +117,7 @@ impl App {
             .width(if compact { 150.0 } else { 170.0 })
             .truncate()
             // All scenes, where the window is high enough for them; otherwise the list scrolls.
-            .height(0.7 * ui.ctx().content_rect().height())
+            .height(0.85 * ui.ctx().content_rect().height())
             .selected_text(&name)
             .show_ui(ui, |ui| {
                 let help = "A link that somebody gave you, the name of a scene, or a file";
@@ -124,8 +127,12 @@ impl App {
                 // Beside a narrow window's edges.
                 let width = SCENES.min(ui.ctx().content_rect().width() - 60.0);
                 ui.set_width(width);
+                // On another canvas than the window's its pictures are not known.
+                let graphics = self.graphics.as_ref().filter(|_| !self.picture.is_drawn());
                 for scene in &*ABOUT_SCENES {
-                    if scene.entry(ui, name == scene.name, width).clicked() {
+                    let load = || Scene::load(scene.name, &[]).ok();
+                    let picture = self.scene_pictures.atom(ui, graphics, scene.name, load);
+                    if scene.entry(ui, picture, name == scene.name, width).clicked() {
                         wanted = Some(scene.name);
                     }
                 }

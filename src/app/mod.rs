@@ -47,6 +47,7 @@ mod reload;
 mod replay;
 #[cfg(not(target_arch = "wasm32"))]
 mod saved;
+mod scene_pictures;
 mod settled;
 mod share;
 mod sound;
@@ -103,6 +104,7 @@ pub use player::Player;
 pub use plots::{Plots, Window};
 use reload::SceneFile;
 pub use replay::{Replay, Verdict};
+use scene_pictures::ScenePictures;
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
 use sound::Sound;
 use timeline::Timeline;
@@ -306,6 +308,7 @@ pub struct App {
     impact_list: impact_list::ImpactList,
     undo: undo::Undo,
     picture: Picture,
+    scene_pictures: ScenePictures,
     /// A film being made.
     film: Option<film::Making>,
     /// How the last one was to be.
@@ -386,6 +389,7 @@ impl App {
             impact_list: impact_list::ImpactList::default(),
             undo: undo::Undo::default(),
             picture: Picture::default(),
+            scene_pictures: ScenePictures::default(),
             film: None,
             film_wanted: None,
             presentation: None,
@@ -457,6 +461,7 @@ impl App {
         self.graphics = state.cloned();
         // What was being drawn is lost.
         self.picture.forget();
+        self.scene_pictures = ScenePictures::default();
         self.cancel_film();
     }
 

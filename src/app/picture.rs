@@ -71,6 +71,11 @@ impl Default for Picture {
 }
 
 impl Picture {
+    /// Whether this pass is drawn off screen.
+    pub fn is_drawn(&self) -> bool {
+        self.drawn.is_some()
+    }
+
     /// Whether the view is drawn without its buttons and hints.
     pub fn is_plain(&self) -> bool {
         self.drawn.is_some_and(|drawn| drawn != Contents::Window)

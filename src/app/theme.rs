@@ -107,6 +107,8 @@ pub fn apply_with(ctx: &egui::Context, contrast: bool) {
         spacing.item_spacing = vec2(8.0, 6.0);
         spacing.button_padding = vec2(10.0, 4.0);
         spacing.combo_width = 120.0;
+        // A list has its own height.
+        spacing.default_area_size.y = 1000.0;
         spacing.tooltip_width = 340.0;
         spacing.menu_margin = Margin::same(8);
         spacing.window_margin = Margin::same(16);

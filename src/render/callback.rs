@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui;
 use eframe::egui_wgpu;
 
-use super::finish::Finish;
+use super::finish::{Finish, PICTURE, picture};
 use super::{RenderTarget, Renderer, wgpu};
 use crate::view::DrawList;
 
@@ -13,6 +13,8 @@ use crate::view::DrawList;
 struct Resources {
     renderer: Renderer,
     finish: Finish,
+    /// For pictures in egui's textures.
+    still: Option<Finish>,
     /// By the numbers of the pictures.
     shown: Vec<Option<Shown>>,
 }
@@ -27,9 +29,25 @@ struct Shown {
 /// Creates the renderer and stores it in egui's callback resources. Call once, when the application starts.
 pub fn install(state: &egui_wgpu::RenderState) {
     let renderer = Renderer::new(&state.device, &state.adapter);
-    let resources =
-        Resources { finish: renderer.finish(&state.device, state.target_format), renderer, shown: Vec::new() };
+    let finish = renderer.finish(&state.device, state.target_format);
+    let resources = Resources { finish, renderer, still: None, shown: Vec::new() };
     state.renderer.write().callback_resources.insert(resources);
+}
+
+/// Draws `list` at `list.size` on a texture of its own, and makes it known to egui; `None` without [`install`].
+/// `egui_wgpu::Renderer::free_texture` lets go of it.
+pub fn draw_still(state: &egui_wgpu::RenderState, list: &DrawList) -> Option<egui::TextureId> {
+    let (device, queue) = (&state.device, &state.queue);
+    let mut renderer = state.renderer.write();
+    let resources: &mut Resources = renderer.callback_resources.get_mut()?;
+    let still = picture(device, list.size).create_view(&Default::default());
+    let target = resources.renderer.target(device, list.size, list.quality.samples);
+    let finish = resources.still.get_or_insert_with(|| resources.renderer.finish(device, PICTURE));
+    let mut encoder = device.create_command_encoder(&Default::default());
+    resources.renderer.draw(device, queue, &mut encoder, &target, list);
+    finish.encode(&mut encoder, &finish.group(device, &target.light), &still);
+    queue.submit([encoder.finish()]);
+    Some(renderer.register_native_texture(device, &still, wgpu::FilterMode::Linear))
 }
 
 /// The 3D viewport as an egui paint callback.

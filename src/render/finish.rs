@@ -1,6 +1,6 @@
 //! The last pass: light becomes the bytes of a picture.
 
-use super::target::Keeping;
+use super::target::{Keeping, extent};
 use super::{shaders, wgpu};
 
 /// Tone-maps, encodes and dithers what was drawn.
@@ -77,4 +77,37 @@ impl Finish {
         pass.set_bind_group(0, group, &[]);
         pass.draw(0..3, 0..1);
     }
+
+    /// To all of `picture`.
+    pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, picture: &wgpu::TextureView) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("finish"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: picture,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
+            })],
+            ..Default::default()
+        });
+        self.draw(&mut pass, group);
+    }
+}
+
+/// Format of a picture. Not an sRGB one: the last pass encodes.
+pub(super) const PICTURE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// What a picture of `size` pixels is drawn on, to be read back or shown.
+pub(super) fn picture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
+    use wgpu::TextureUsages as Usage;
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: extent(size),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: PICTURE,
+        usage: Usage::RENDER_ATTACHMENT | Usage::COPY_SRC | Usage::TEXTURE_BINDING,
+        view_formats: &[],
+    })
 }

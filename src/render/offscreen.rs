@@ -1,6 +1,7 @@
 //! Pictures without a window.
 
-use super::finish::Finish;
+use super::finish::{Finish, PICTURE, picture};
+#[cfg(test)]
 use super::target::extent;
 use super::{Image, Readback, RenderError, RenderTarget, Renderer, check_size, device_error, wgpu};
 use crate::view::DrawList;
@@ -30,9 +31,6 @@ struct Frame {
     picture: wgpu::Texture,
     readback: Readback,
 }
-
-/// Format of a picture. Not an sRGB one: the last pass encodes.
-const PICTURE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Offscreen {
     /// Opens the best adapter: a GPU, otherwise software Vulkan, otherwise GL. `WGPU_BACKEND` restricts the choice.
@@ -230,33 +228,9 @@ impl Offscreen {
     }
 }
 
-fn picture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("picture"),
-        size: extent(size),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: PICTURE,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
-}
-
 /// The last pass, to `picture`.
 fn encode(finish: &Finish, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, picture: &wgpu::Texture) {
-    let view = picture.create_view(&Default::default());
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("finish"),
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: &view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
-        })],
-        ..Default::default()
-    });
-    finish.draw(&mut pass, group);
+    finish.encode(encoder, group, &picture.create_view(&Default::default()));
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ mod pictures;
 mod present;
 mod readings;
 mod reload;
+mod scene_list;
 mod sound;
 mod touch;
 mod undo;
