@@ -1,4 +1,4 @@
-//! The list of keys, the about box, the field that opens a file, the QR code.
+//! The list of keys, the about box, the field that opens a file, the link with its QR code.
 
 use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
@@ -8,7 +8,7 @@ use super::keys::Group;
 use super::load::Load;
 use super::player::Player;
 use crate::analysis::ready::ReadySweep;
-use code::Code;
+use code::SharedLink;
 
 mod code;
 
@@ -41,13 +41,8 @@ pub enum Dialog {
         /// Why they could not be saved.
         error: Option<String>,
     },
-    /// Shows a link as a QR code.
-    Code {
-        /// The whole link.
-        link: String,
-        /// Its code, or why it has none.
-        code: Result<Code, String>,
-    },
+    /// Shows a link as a QR code, and asks for the address that it lacks.
+    Link(SharedLink),
     /// Asks what a film is to be.
     Film {
         /// As chosen so far.
@@ -76,7 +71,7 @@ impl Dialog {
             Self::About => "About Jointplay",
             Self::Open { .. } => "Open a link or a scene",
             Self::Save { .. } => "Save as",
-            Self::Code { .. } => "QR code of the link",
+            Self::Link(_) => "Link to this state and view",
             Self::Film { .. } => "Film",
             Self::Load { .. } => "Change the running scene?",
             Self::Ready { .. } => "Replace the running scene?",
@@ -87,7 +82,8 @@ impl Dialog {
     fn answer(&self) -> Option<(&'static str, Option<Answer>)> {
         let typed = |path: &str| Some(path.trim().to_owned()).filter(|path| !path.is_empty());
         match self {
-            Self::Help | Self::About | Self::Code { .. } => None,
+            Self::Help | Self::About => None,
+            Self::Link(shared) => Some(("Copy", shared.can_be_copied().then_some(Answer::Copy))),
             Self::Open { path, .. } => Some(("Open", typed(path).map(Answer::Open))),
             Self::Save { path, .. } => Some(("Save", typed(path).map(Answer::Save))),
             Self::Film { wanted } => {
@@ -109,6 +105,8 @@ pub enum Answer {
     Open(String),
     /// Save under this path.
     Save(String),
+    /// Copy the link.
+    Copy,
     /// Make the film.
     Film,
     /// Run to the section.
@@ -123,7 +121,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
     // Title, buttons and frame stay visible on a low screen and in a dialog whose text grows.
     let most = (ctx.content_rect().height() - 140.0).max(80.0);
     let width = match dialog {
-        Dialog::Code { code: Ok(_), .. } => most.max(200.0),
+        Dialog::Link(_) => most.clamp(200.0, 720.0),
         Dialog::Help => 1120.0,
         _ => 520.0,
     };
@@ -140,7 +138,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
                 Dialog::About => about(ui, player, renderer),
                 Dialog::Open { path, error } => open(ui, path, error.as_deref()),
                 Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
-                Dialog::Code { link, code } => code::ui(ui, link, code, most),
+                Dialog::Link(shared) => code::ui(ui, shared, most),
                 Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
                 Dialog::Load { changes, .. } => {
                     list(ui, "The sweep was made from a different scene. Running to this section changes:", changes)

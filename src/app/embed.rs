@@ -128,7 +128,7 @@ impl App {
     /// # Errors
     /// Text: there is no page, or the state does not fit in a link.
     pub fn embedding(&self) -> Result<String, String> {
-        let address = self.host.address();
+        let address = self.page_address();
         if address.is_empty() {
             let why = "There is no page to show in a frame: --page or JOINTPLAY_PAGE gives the address of one";
             return Err(why.to_owned());

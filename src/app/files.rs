@@ -94,18 +94,33 @@ impl App {
         (changed || self.scene_file.is_in_file()).then_some(changed)
     }
 
-    /// Copies a link to the present state.
+    /// Address of the page to which links are appended; "" for none.
+    pub(super) fn page_address(&self) -> String {
+        if self.page.is_empty() { self.host.address() } else { self.page.clone() }
+    }
+
+    /// Copies a link to the present state; where there is no address for it, asks for one first.
     pub fn copy_link(&mut self, ctx: &egui::Context) {
+        let address = self.page_address();
+        if address.is_empty() {
+            self.show_link_dialog();
+            return;
+        }
         match self.link().format_short(self.player.wanted()) {
             Ok((fragment, note)) => {
-                let link = format!("{}#{fragment}", self.host.address());
-                if !self.host.shared(&link) {
-                    ctx.copy_text(link);
-                }
-                self.say(note.unwrap_or("Link copied".to_owned()));
+                self.copy(ctx, format!("{address}#{fragment}"));
+                note.into_iter().for_each(|note| self.say(note));
             }
             Err(reason) => self.problem = Some(reason),
         }
+    }
+
+    /// Copies `link`.
+    pub(super) fn copy(&mut self, ctx: &egui::Context, link: String) {
+        if !self.host.shared(&link) {
+            ctx.copy_text(link);
+        }
+        self.say("Link copied".to_owned());
     }
 
     /// Tells the user something, for a few seconds.

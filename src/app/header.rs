@@ -159,8 +159,8 @@ impl App {
     fn link_button(&mut self, ui: &mut Ui) {
         let mut help =
             "Copies a link that opens this scene in this state and view, with every change made on the way".to_owned();
-        if self.host.address().is_empty() {
-            help += ". It has no address in front: --page or JOINTPLAY_PAGE gives it that of a page";
+        if self.page_address().is_empty() {
+            help += ". No page address is set: asks for one first";
         }
         if ui.button("Copy link").on_hover_text(help).clicked() {
             self.copy_link(ui.ctx());

@@ -105,7 +105,7 @@ pub use plots::{Plots, Window};
 use reload::SceneFile;
 pub use replay::{Replay, Verdict};
 use scene_pictures::ScenePictures;
-pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
+pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, NO_PAGE, SceneText, is_page};
 use sound::Sound;
 use timeline::Timeline;
 use viewport::Viewport;
@@ -292,6 +292,8 @@ pub struct App {
     /// Whether the controls are sized for fingers; `None` before the first pass.
     fingers: Option<bool>,
     host: Box<dyn Host>,
+    /// Address of a page that the user has typed, instead of the host's; "" for none.
+    page: String,
     /// Of a scene that came by a link it is none: a link must not make the program read a file.
     scene_file: SceneFile,
     replay: Option<Replay>,
@@ -377,6 +379,7 @@ impl App {
             touched: false,
             fingers: None,
             host: Box::new(NoHost),
+            page: String::new(),
             scene_file: SceneFile::named(options.scene.source.file.clone().filter(|_| options.link.is_none())),
             replay: None,
             load: None,
@@ -948,6 +951,14 @@ impl App {
             Some(Answer::Save(path)) => {
                 if let Dialog::Save { files, .. } = dialog {
                     self.save_as(path, files);
+                }
+            }
+            Some(Answer::Copy) => {
+                if let Dialog::Link(shared) = dialog {
+                    self.copy(ctx, shared.link());
+                    if shared.is_typed() {
+                        self.page = shared.page().to_owned();
+                    }
                 }
             }
             Some(Answer::Film) => {

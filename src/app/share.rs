@@ -164,6 +164,15 @@ pub struct Link {
     pub beside: Texts,
 }
 
+/// What is said of a text that [`is_page`] refuses.
+pub const NO_PAGE: &str = "not an address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. https://example.org/lab/";
+
+/// Whether `text` can be the address of a page, to which links are appended.
+pub fn is_page(text: &str) -> bool {
+    let rest = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
+    rest.is_some_and(|rest| !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace()))
+}
+
 /// Whether `text` is a link in one of the forms of [`Link::parse`], rather than the name of a scene or of a file.
 pub fn is_link(text: &str) -> bool {
     let text = text.trim();
@@ -290,8 +299,7 @@ impl Link {
                     return Err(fault(
                         "kept",
                         "",
-                        "its scene is larger than an address can be, and was kept in the tab of the browser that showed it \
-                         alone; open the scene file here",
+                        "its scene is larger than an address can hold, and is stored only in the browser tab that showed it; open the scene file here",
                     ));
                 }
                 "version" => link.version = Some(value.chars().take(40).collect()),

@@ -111,7 +111,7 @@ pub struct ViewArguments {
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["scene", "changes", "link"])]
     pub lesson: Option<String>,
     /// Address of a page with the laboratory, e.g. `https://example.org/lab/`, to which `Copy link` appends its links
-    /// [default: the environment variable JOINTPLAY_PAGE; without either a link begins with its `#`].
+    /// [default: the environment variable JOINTPLAY_PAGE, of now or else of the build; without any the window asks for it].
     #[arg(long, value_name = "URL")]
     pub page: Option<String>,
 }

@@ -1,36 +1,33 @@
 //! The page that the window's links open.
 
 use super::Failure;
+use crate::app::{NO_PAGE, is_page};
 
-/// Environment variable with the address that links are appended to.
+/// Environment variable with the address that links are appended to: when the program starts, or else when it was built.
 const PAGE: &str = "JOINTPLAY_PAGE";
+/// That of the build.
+const BUILT: Option<&str> = option_env!("JOINTPLAY_PAGE");
 
 /// The address that links are appended to, from `--page` or else from [`PAGE`]; "" for none.
 ///
 /// # Errors
 /// Usage: it is not the address of a page.
 pub fn address(option: Option<&str>) -> Result<String, Failure> {
-    choose(option, std::env::var(PAGE).ok())
+    choose(option, std::env::var(PAGE).ok(), BUILT)
 }
 
-fn choose(option: Option<&str>, variable: Option<String>) -> Result<String, Failure> {
-    let (name, page) = match (option, variable) {
-        (Some(page), _) => ("--page", page.to_owned()),
-        (None, Some(page)) => (PAGE, page),
-        (None, None) => return Ok(String::new()),
+fn choose(option: Option<&str>, variable: Option<String>, built: Option<&str>) -> Result<String, Failure> {
+    let (name, page) = match (option, variable, built) {
+        (Some(page), ..) => ("--page", page.to_owned()),
+        (None, Some(page), _) => (PAGE, page),
+        (None, None, Some(page)) => ("JOINTPLAY_PAGE of the build", page.to_owned()),
+        (None, None, None) => return Ok(String::new()),
     };
     let page = page.trim();
-    let is_address = ["https://", "http://"].iter().any(|scheme| {
-        page.strip_prefix(scheme)
-            .is_some_and(|rest| !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace()))
-    });
-    if page.is_empty() || is_address {
+    if page.is_empty() || is_page(page) {
         return Ok(page.to_owned());
     }
-    Err(Failure::usage(format!(
-        "{name} {page}: not an address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. \
-         https://example.org/lab/"
-    )))
+    Err(Failure::usage(format!("{name} {page}: {NO_PAGE}")))
 }
 
 #[cfg(test)]
@@ -40,10 +37,16 @@ mod tests {
     #[test]
     fn the_option_beats_the_variable_and_what_is_no_address_is_refused() {
         let (lab, other) = ("https://example.org/lab/", "http://localhost:8000");
-        let of = |option, variable: Option<&str>| choose(option, variable.map(str::to_owned));
+        let of = |option, variable: Option<&str>| choose(option, variable.map(str::to_owned), None);
         assert_eq!(of(None, None).expect("none"), "");
         assert_eq!(of(None, Some(other)).expect("an address"), other);
         assert_eq!(of(Some(lab), Some("nonsense")).expect("an address"), lab);
+        let built = |option, variable: Option<&str>| choose(option, variable.map(str::to_owned), Some(lab));
+        assert_eq!(built(None, None).expect("an address"), lab);
+        assert_eq!(built(None, Some(other)).expect("an address"), other);
+        assert_eq!(built(None, Some("")).expect("none"), "");
+        let error = choose(None, None, Some("lab")).expect_err("no address").to_string();
+        assert!(error.contains("JOINTPLAY_PAGE of the build lab: not an address"), "{error}");
         for bad in ["example.org/lab", "https://", "https://a.b/#x", "https://a b/"] {
             let error = of(None, Some(bad)).expect_err("no address");
             assert_eq!(error.code, Failure::USAGE);

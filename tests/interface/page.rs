@@ -1006,21 +1006,77 @@ fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
     }
 }
 
-/// What a click on `Copy link` puts on the clipboard.
+/// The text that was just put on the clipboard.
+fn on_clipboard(harness: &Harness<'_, App>) -> Option<String> {
+    let commands = &harness.output().platform_output.commands;
+    commands.iter().find_map(|command| match command {
+        egui::OutputCommand::CopyText(text) => Some(text.clone()),
+        _ => None,
+    })
+}
+
+/// What a click on `Copy link` puts on the clipboard; where it asks for an address, without one.
 fn copied(harness: &mut Harness<'_, App>) -> String {
     harness.get_by_label("Copy link").click();
-    for _ in 0..3 {
+    for _ in 0..8 {
         harness.step();
-        let commands = &harness.output().platform_output.commands;
-        let text = commands.iter().find_map(|command| match command {
-            egui::OutputCommand::CopyText(text) => Some(text.clone()),
-            _ => None,
-        });
-        if let Some(text) = text {
+        if let Some(text) = on_clipboard(harness) {
             return text;
+        }
+        if let Some(copy) = harness.query_by_label("Copy") {
+            copy.click();
         }
     }
     panic!("nothing was copied");
+}
+
+#[test]
+fn a_link_without_an_address_says_so_before_it_is_copied_and_takes_one() {
+    let (mut harness, _) = window("pendulum", LARGE);
+    harness.state_mut().set_host(Box::new(DesktopHost::default()));
+    let says = |harness: &Harness<'_, App>, words: &str| assert!(label(harness, words), "{words}");
+    harness.get_by_label("Copy link").click();
+    for _ in 0..3 {
+        harness.step();
+        assert_eq!(on_clipboard(&harness), None);
+    }
+    says(&harness, "Without one the link begins with #");
+    says(&harness, "No QR code without an address");
+    let keep = |harness: &mut Harness<'_, App>, name: &str| {
+        if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+            harness.render().expect("drawn").save(std::path::Path::new(&keep).join(name)).expect("writable");
+        }
+    };
+    keep(&mut harness, "link-without-address.png");
+    let code =
+        |harness: &Harness<'_, App>| harness.query_by_role_and_label(Role::Image, "QR code of the link").is_some();
+    let enabled = |harness: &Harness<'_, App>| !harness.get_by_label("Copy").accesskit_node().is_disabled();
+    assert!(!code(&harness) && enabled(&harness));
+    let place = harness.get_by_label("Copy").rect();
+    for (typed, words, can_be_copied) in [
+        ("example.org", "not an address of a page", false),
+        ("http://localhost:8000/", "other devices do not find http://localhost:8000/", true),
+        ("https://example.org/lab/", "https://example.org/lab/ in this state and view", true),
+    ] {
+        type_over(&mut harness, "Address of the page", typed);
+        harness.run_steps(2);
+        says(&harness, words);
+        assert_eq!(enabled(&harness), can_be_copied, "{typed}");
+        assert_eq!(harness.get_by_label("Copy").rect(), place, "{typed}");
+    }
+    assert!(code(&harness));
+    keep(&mut harness, "link-with-address.png");
+    harness.get_by_label("Copy").click();
+    harness.step();
+    let link = on_clipboard(&harness).expect("copied");
+    assert!(link.starts_with("https://example.org/lab/#scene=pendulum"), "{link}");
+    // It is remembered, also for the line for another page.
+    assert_eq!(copied(&mut harness), link);
+    assert!(harness.state().embedding().expect("a line").contains("https://example.org/lab/#"));
+    click(&mut harness, "Save");
+    keep(&mut harness, "save-menu.png");
+    click(&mut harness, "QR code");
+    assert!(code(&harness) && harness.query_by_label("Address of the page").is_none());
 }
 
 #[test]

@@ -1,10 +1,14 @@
-//! The link to the present state as a QR code, for the cameras of the phones in the room.
+//! The link to the present state with the address that it needs, and as a QR code, for the cameras of the phones in the room.
 
-use eframe::egui::{self, Color32, Mesh, Rect, Role, Sense, Shape, Ui, Vec2, WidgetInfo, vec2};
+use eframe::egui::{
+    self, Align, Color32, Label, Layout, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, UiBuilder, Vec2, WidgetInfo,
+    vec2,
+};
 use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
 use super::Dialog;
 use crate::app::App;
+use crate::app::share::{NO_PAGE, is_page};
 
 /// Light modules around a code, which a reader needs.
 const QUIET: i32 = 4;
@@ -57,42 +61,112 @@ fn encode(link: &str) -> Result<Code, String> {
     Ok(Code { size, dark })
 }
 
+/// A link to pass on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SharedLink {
+    /// What follows the address and its `#`.
+    fragment: String,
+    /// Address of the page; "" for none.
+    page: String,
+    /// Whether the user may type another one.
+    typed: bool,
+    /// Its code, or why it has none.
+    code: Result<Code, String>,
+}
+
+impl SharedLink {
+    fn new(fragment: String, page: String) -> Self {
+        let typed = !is_found_by_others(&page);
+        let mut shared = Self { fragment, page, typed, code: Err(String::new()) };
+        shared.encode();
+        shared
+    }
+
+    /// The whole link.
+    pub fn link(&self) -> String {
+        format!("{}#{}", self.page(), self.fragment)
+    }
+
+    /// Address of the page; "" for none.
+    pub fn page(&self) -> &str {
+        self.page.trim()
+    }
+
+    /// Whether its address is one that the user could type.
+    pub fn is_typed(&self) -> bool {
+        self.typed
+    }
+
+    /// Whether its address is one, or none.
+    pub fn can_be_copied(&self) -> bool {
+        !self.typed || self.page().is_empty() || is_page(self.page())
+    }
+
+    fn encode(&mut self) {
+        let page = self.page();
+        self.code = match page {
+            "" => Err("No QR code without an address: a phone could not open it".to_owned()),
+            _ if !self.can_be_copied() => Err(format!("{page}: {NO_PAGE}")),
+            _ if !is_found_by_others(page) => Err(format!("No QR code: other devices do not find {page}")),
+            _ => encode(&self.link()),
+        };
+    }
+}
+
 impl App {
-    /// The entry of the menu, where the page has an address that other devices find.
+    /// The entry of the menu.
     pub(in crate::app) fn code_button(&mut self, ui: &mut Ui) {
-        if !is_found_by_others(&self.host.address()) {
-            return;
-        }
         let help = "The link to this scene in this state and view, to be photographed by a phone";
         if ui.button("QR code").on_hover_text(help).clicked() {
-            match self.link().format_short(self.player.wanted()) {
-                Ok((fragment, note)) => {
-                    let link = format!("{}#{fragment}", self.host.address());
-                    let code = encode(&link);
-                    self.dialog = Some(Dialog::Code { link, code });
-                    note.into_iter().for_each(|note| self.say(note));
-                }
-                Err(reason) => self.problem = Some(reason),
-            }
+            self.show_link_dialog();
             crate::app::layout::close_menu(ui);
+        }
+    }
+
+    /// Shows the link to the present state, and asks for an address where other devices do not find the page.
+    pub(in crate::app) fn show_link_dialog(&mut self) {
+        match self.link().format_short(self.player.wanted()) {
+            Ok((fragment, note)) => {
+                self.dialog = Some(Dialog::Link(SharedLink::new(fragment, self.page_address())));
+                note.into_iter().for_each(|note| self.say(note));
+            }
+            Err(reason) => self.problem = Some(reason),
         }
     }
 }
 
-/// The code as large as `most` allows, points, and the address that it leads to.
-pub(super) fn ui(ui: &mut Ui, link: &str, code: &Result<Code, String>, most: f32) -> bool {
-    match code {
-        Ok(code) => {
-            let address = link.split('#').next().unwrap_or(link);
-            let line = ui.text_style_height(&egui::TextStyle::Body) + ui.spacing().item_spacing.y;
-            draw(ui, code, (most - line).min(ui.available_width()));
-            ui.label(format!("{address} in this state and view"));
-        }
-        Err(reason) => {
-            ui.label(reason);
+/// The address and the code, which is as large as `most` allows, points; returns whether Enter was pressed.
+pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
+    let top = ui.cursor().top();
+    let mut entered = false;
+    if shared.typed {
+        ui.label(
+            "Address of a page with the laboratory. Without one the link begins with #: Jointplay opens it where it is pasted into \
+             its window or given to --link, a browser behind such an address.",
+        );
+        let field = TextEdit::singleline(&mut shared.page).desired_width(f32::INFINITY);
+        let field = ui.add(field.hint_text("https://example.org/lab/")).accessible_name("Address of the page");
+        entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if field.changed() {
+            shared.encode();
         }
     }
-    false
+    let line = ui.text_style_height(&egui::TextStyle::Body) + 2.0 * ui.spacing().item_spacing.y;
+    // As large before it is drawn as afterwards.
+    let side = (most - (ui.cursor().top() - top) - line).min(ui.available_width()).max(1.0);
+    match &shared.code {
+        Ok(code) => draw(ui, code, side),
+        Err(reason) => {
+            let (place, _) = ui.allocate_exact_size(Vec2::splat(side), Sense::hover());
+            ui.painter().rect_filled(place, 6.0, ui.visuals().faint_bg_color);
+            ui.put(place.shrink(16.0), Label::new(reason).wrap());
+        }
+    }
+    ui.label(match shared.page() {
+        "" => "No address: the link begins with #".to_owned(),
+        page => format!("{page} in this state and view"),
+    });
+    entered
 }
 
 /// Dark on light whatever the theme, each module of whole pixels, at most `side` points large.
@@ -100,8 +174,10 @@ fn draw(ui: &mut Ui, code: &Code, side: f32) {
     let pixels = ui.pixels_per_point();
     let across = code.size + 2 * QUIET;
     let module = (side * pixels / across as f32).floor().max(1.0) / pixels;
+    let (room, _) = ui.allocate_exact_size(Vec2::splat(side), Sense::hover());
     let whole = Vec2::splat(across as f32 * module);
-    let (place, response) = ui.allocate_exact_size(whole, Sense::hover());
+    let place = Rect::from_center_size(room.center(), whole);
+    let response = ui.interact(place, ui.scope_id().with("code"), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "QR code of the link"));
     let corner = (place.min * pixels).round() / pixels;
     let mut mesh = Mesh::default();
