@@ -675,6 +675,28 @@ fn after_a_reset_or_a_step_back_no_force_is_on_show_that_is_yet_to_come() {
 }
 
 #[test]
+fn the_tooltip_of_restitution_states_the_law_in_use() {
+    let mut harness = window("spcmm");
+    for (law, formula, from) in [
+        ("lankarani-nikravesh", "(1 + ¾ (1 - e²) d' / d'0)", "Sheng & Chen (2024), eq. 19"),
+        ("gonthier", "χ (1 + e) = ln((1 + χ) / (1 - e χ))", "Gonthier et al. (2004)"),
+    ] {
+        harness.state_mut().player_mut().set("contact.normal_law", law).expect("a law");
+        let slider = harness.get_by_role_and_label(Role::Slider, "Restitution").rect();
+        harness.hover_at(slider.center());
+        harness.run_steps(60);
+        harness.get_by_label_contains(formula);
+        harness.get_by_label(from);
+        if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+            let path = std::path::Path::new(&keep).join(format!("tooltip-{law}.png"));
+            harness.render().expect("drawn").save(path).expect("writable");
+        }
+        harness.hover_at(egui::pos2(800.0, 300.0));
+        harness.run_steps(30);
+    }
+}
+
+#[test]
 fn a_tooltip_of_a_control_leaves_the_picture_alone_and_gives_way_to_a_dialog() {
     let mut harness = window("spcmm");
     let slider = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
