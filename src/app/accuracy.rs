@@ -156,7 +156,7 @@ impl Accuracy {
             let clicked = ui
                 .add_enabled(running || preset.is_some(), button)
                 .on_hover_text(help)
-                .on_disabled_hover_text("Presets are measured; the present method and tolerance are none")
+                .on_disabled_hover_text("Only presets are measured; the present method and tolerance are not one")
                 .clicked();
             if running {
                 let bar = ProgressBar::new(self.progress as f32).show_percentage();
@@ -340,7 +340,7 @@ fn residual(player: &Player) -> AccuracyLine {
     let ledger = player.frame().ledger;
     let share = ledger.map(|ledger| ledger.share());
     let exchanged = ledger.map_or_else(
-        || "Not kept: see Energy ledger under Solver.".to_owned(),
+        || "Not recorded: see Energy ledger under Solver.".to_owned(),
         |ledger| {
             let energy = value::quantity(ledger.exchanged, "J", 3);
             format!("{energy} were exchanged.")

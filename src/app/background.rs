@@ -68,7 +68,7 @@ impl Running for Thread {
                 self.messages = None;
                 // A thread that ends without a final message was cancelled or has failed.
                 let cancelled = self.cancelled.load(Ordering::Relaxed);
-                (!cancelled).then(|| Message::Failed("the computation broke off".to_owned()))
+                (!cancelled).then(|| Message::Failed("the computation stopped unexpectedly".to_owned()))
             }
         }
     }

@@ -248,7 +248,7 @@ fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>)
     if let [first, rest @ ..] = files {
         for file in rest {
             let ending = file.name.strip_prefix(&first.name).unwrap_or(&file.name);
-            ui.label(RichText::new(format!("What made it is saved beside it (…{ending})")).weak());
+            ui.label(RichText::new(format!("Its metadata is saved beside it (…{ending})")).weak());
         }
     }
     path_field(ui, path, "name", error)

@@ -150,7 +150,7 @@ impl ImpactList {
             });
         });
         if record.dropped() > 0 {
-            let words = format!("The first {} impacts are no longer kept", record.dropped());
+            let words = format!("The first {} impacts are no longer stored", record.dropped());
             ui.label(RichText::new(words).small().weak());
         }
         asked

@@ -260,7 +260,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
         (
             "Speed of approach",
             if sight.normal.is_some() { speed(report.penetration_rate) } else { NONE.to_owned() },
-            "Rate at which the ball nears the wall now; negative while it leaves it",
+            "Rate at which the ball approaches the wall now; negative while it recedes",
         ),
         (
             "Sliding",
@@ -290,7 +290,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             of(|impact| value::quantity(impact.separation_speed, "m/s", 4)),
             "Speed of separation when it ended",
         ),
-        ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its deepest indentation"),
+        ("Deepest", of(|impact| value::quantity(impact.deepest, "um", 3)), "Its largest indentation"),
         (
             "Restitution asked",
             impact.map_or(NONE.to_owned(), |impact| given(impact.asked)),
@@ -302,7 +302,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             "Restitution that the normal-force law gives an undisturbed impact",
         ),
         (
-            "Given",
+            "Measured",
             impact.map_or(NONE.to_owned(), |impact| given(impact.achieved())),
             "Speed of separation over speed of approach of the latest impact",
         ),
@@ -318,7 +318,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     let remark = match impact {
         Some(impact) if impact.floored => "It began slower than impact_speed_floor: it rebounds higher than asked",
         Some(impact) if impact.disturbed => {
-            "Another joint touched meanwhile, or a change came: its restitution is not the law's alone"
+            "Another joint was in contact meanwhile, or a parameter changed: the law alone does not set its restitution"
         }
         _ => "",
     };

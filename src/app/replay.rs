@@ -80,7 +80,7 @@ impl Replay {
                         continue;
                     }
                     _ if self.link.steps.is_none() => Verdict::Reached,
-                    _ => Verdict::Failed("the run stopped before it was there".to_owned()),
+                    _ => Verdict::Failed("the run stopped before the instant of the link".to_owned()),
                 });
             }
         }

@@ -70,7 +70,7 @@ fn stream(clicks: Receiver<(Instant, Click)>, failed: Sender<String>) -> Result<
         SampleFormat::I32 => play::<i32>(&device, config, mixer, failed),
         SampleFormat::U8 => play::<u8>(&device, config, mixer, failed),
         SampleFormat::U16 => play::<u16>(&device, config, mixer, failed),
-        other => return Err(format!("the sound device takes {other} alone")),
+        other => return Err(format!("the sound device takes only {other}")),
     }
     .map_err(|error| format!("the sound device cannot be opened: {error}"))
 }

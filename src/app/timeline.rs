@@ -344,7 +344,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     }
     let known = player.contact_history().known_from();
     if time < known {
-        let words = format!("Contacts before {} are no longer kept", value::time(known));
+        let words = format!("Contacts before {} are no longer stored", value::time(known));
         ui.label(words);
     }
     let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half colour: \

@@ -144,7 +144,7 @@ pub struct RunArguments {
     /// impulse and the friction work: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub wear: Option<PathBuf>,
-    /// File for the state at the end, from which --from-state goes on, with the same bits as a run without a break.
+    /// File for the state at the end, from which --from-state resumes, with the same bits as a run without a break.
     #[arg(long, value_name = "FILE")]
     pub save_state: Option<PathBuf>,
     /// Go on from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.

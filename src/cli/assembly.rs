@@ -78,7 +78,7 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
         });
         let askew = assembly.most_turned.filter(|(_, turned)| *turned > NEAR.turned);
         let askew = askew.map(|(joint, turned)| {
-            format!(" {} was {} askew.", cut_joint(scene, joint), format_quantity_digits(turned, "deg", 4))
+            format!(" {} was {} out of line.", cut_joint(scene, joint), format_quantity_digits(turned, "deg", 4))
         });
         let gap: String = open.into_iter().chain(askew).collect();
         warnings.push(format!(

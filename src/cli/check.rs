@@ -42,7 +42,7 @@ fn channels(all: &[Listed]) -> String {
     let name = width(|channel| channel.name.len());
     let column = width(|channel| channel.column.len());
     let mut out = String::new();
-    for (unasked, title) in [(true, "Written without --channels"), (false, "Written if asked for")] {
+    for (unasked, title) in [(true, "Written without --channels"), (false, "Written on request")] {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{title}:");
         for channel in all.iter().filter(|channel| channel.unasked == unasked) {

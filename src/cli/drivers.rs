@@ -23,7 +23,7 @@ pub fn restart_with_runtime_dir() {
     let name = arguments.next().unwrap_or_else(|| program.clone().into());
     let error = Command::new(program).arg0(name).args(arguments).env(FOLDER, Path::new("/nonexistent")).exec();
     // Then continue with the complaints.
-    log::info!("cannot begin again: {error}");
+    log::info!("cannot restart: {error}");
 }
 
 /// Other systems are not known to need it.

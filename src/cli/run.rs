@@ -199,7 +199,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     facts.insert("rows".into(), json!(table.len()));
     if let Some(path) = &arguments.from_state {
         let words = format!("{} s, from {}", significant(from, 9), path.display());
-        summary::line(&mut text, "Went on at", &words);
+        summary::line(&mut text, "Resumed at", &words);
         facts.insert("from_time_s".into(), json!(from));
     }
     let mut verdict = None;

@@ -111,7 +111,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
     if *meta("version") != crate::VERSION || *meta("state_format") != FORMAT {
         return Err(refuse(format!(
             "written by version {} of the program, in format {}; this is version {}, format {FORMAT}, and only the same \
-             version goes on with the same bits",
+             version resumes with the same bits",
             word(meta("version")),
             word(meta("state_format")),
             crate::VERSION,
@@ -120,7 +120,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
     let found = checksum(&content);
     if told != Some(json!(found)) {
         return Err(refuse(format!(
-            "damaged: its content has the checksum {found}, and it says {}",
+            "damaged: its content has the checksum {found}, and it states {}",
             word(&told.unwrap_or_default())
         )));
     }
@@ -138,7 +138,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
 fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
     if meta["scene_text"] != *scene.source.text {
         return Err(format!(
-            "a state of the scene `{}`, whose text is not that of the scene given here, `{}`: a run goes on only in the \
+            "a state of the scene `{}`, whose text is not that of the scene given here, `{}`: a run resumes only in the \
              scene in which it began",
             word(&meta["scene"]),
             scene.name
@@ -149,7 +149,7 @@ fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
     let differs = |name: &&String| beside.get(*name).is_none_or(|now| then[*name] != **now);
     if let Some(name) = names.chain(beside.keys()).find(differs) {
         return Err(format!(
-            "a state of the scene `{}` when its file {} held something else: a run goes on only in the scene in which it began",
+            "a state of the scene `{}` when its file {} held something else: a run resumes only in the scene in which it began",
             scene.name,
             visible_line(name)
         ));
@@ -164,7 +164,7 @@ fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
         if options.is_empty() { "no --set".to_owned() } else { options.join(" ") }
     };
     Err(format!(
-        "saved with {}, and here the scene has {}: a run goes on only with the parameters with which it began",
+        "saved with {}, and here the scene has {}: a run resumes only with the parameters with which it began",
         options(changed),
         options(now)
     ))

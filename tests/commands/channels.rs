@@ -92,7 +92,7 @@ fn a_channel_that_no_scene_has_is_refused_with_the_nearest() {
 fn check_lists_every_channel() {
     let folder = folder();
     let list = jointplay(folder.path(), "check spcmm --channels").expect(0).stdout;
-    let (unasked, asked) = list.split_once("Written if asked for:\n").unwrap();
+    let (unasked, asked) = list.split_once("Written on request:\n").unwrap();
     let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let unasked: Vec<_> = unasked.lines().skip(1).map(words).collect();
     assert_eq!(unasked[0][..3], ["time", "s", "t_s"]);

@@ -78,7 +78,7 @@ fn quick() -> &'static (tempfile::TempDir, Outcome) {
 #[ignore = "half a minute for the report, part of `./test full`"]
 fn full_ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
     let (folder, run) = quick();
-    assert!(run.stderr.contains("going on where report.partial stopped"), "{}", run.stderr);
+    assert!(run.stderr.contains("resuming where report.partial stopped"), "{}", run.stderr);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing but the report is left");
 }
 
@@ -230,7 +230,7 @@ fn interrupt(folder: &Path) {
     let output = child.wait_with_output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{stderr}");
-    assert!(stderr.contains("no report was written") && stderr.contains("goes on from report.partial"), "{stderr}");
+    assert!(stderr.contains("no report was written") && stderr.contains("resumes from report.partial"), "{stderr}");
     assert!(output.stdout.is_empty());
     let left = entries();
     assert!(left.keys().all(|name| name.starts_with("report.partial/")), "{:?}", left.keys());

@@ -240,7 +240,7 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
     // What a crash cut off the last block costs that block alone.
     fs::write(at("a.npz.partial"), &partial[..n - 1]).unwrap();
     let resumed = jointplay(folder.path(), &line("a.npz")).expect(0);
-    assert!(resumed.stderr.contains("going on where"), "{}", resumed.stderr);
+    assert!(resumed.stderr.contains("resuming where"), "{}", resumed.stderr);
     jointplay(folder.path(), &line("b.npz")).expect(0);
     assert!(fs::read(at("a.npz")).unwrap() == fs::read(at("b.npz")).unwrap());
     assert_eq!(names(folder.path()), ["a.npz", "b.npz"]);

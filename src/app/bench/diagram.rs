@@ -124,7 +124,7 @@ impl Diagram {
             ui,
             &format!("{} over {}", up.title(), across.title()),
             "What the sweep found at each value. A click on a point runs the swept scene with that value from its start to that \
-             section, and plays on from there; what that would change besides is asked first.",
+             section, and plays on from there; it asks first if that changes anything else.",
         );
         let dark = ui.visuals().dark_mode;
         let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);

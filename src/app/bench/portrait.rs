@@ -34,7 +34,8 @@ impl Portrait {
                 value::scene_line(player.scene(), &[]),
                 value::number(360.0 * player.watch().phase(), 4)
             );
-            ui.label(RichText::new(words).small()).on_hover_text("What the portrait and the section below are of");
+            ui.label(RichText::new(words).small())
+                .on_hover_text("The run that the portrait and the section below show");
         });
         title(
             ui,

@@ -213,7 +213,7 @@ impl SweepPanel {
     fn swept_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
         let swept = self.swept.as_ref()?;
         reserved(ui, "sweep of", 3, |ui| {
-            ui.label(RichText::new(swept.caption()).small()).on_hover_text("What the diagram below was made of");
+            ui.label(RichText::new(swept.caption()).small()).on_hover_text("Scene and settings of the diagram below");
         });
         let (index, section) = self.diagram.ui(ui, swept, coordinate)?;
         Load::new(
@@ -360,8 +360,7 @@ impl SweepPanel {
                 let bar = ProgressBar::new(done as f32).text(words);
                 ui.add(bar.desired_width(ui.available_width()))
                     .on_hover_text(
-                        "Fraction of the points that are there. While the picture moves, a sweep leaves it time for 20 \
-                         frames a second, if it has them alone: paused, the sweep is faster",
+                        "Fraction of the points that are there. While the picture moves, a sweep leaves it time for 20 frames a second; paused, the sweep is faster",
                     )
                     .accessible_name("Swept so far");
             }

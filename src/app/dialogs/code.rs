@@ -1,9 +1,6 @@
 //! The link to the present state with the address that it needs, and as a QR code, for the cameras of the phones in the room.
 
-use eframe::egui::{
-    self, Align, Color32, Label, Layout, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, UiBuilder, Vec2, WidgetInfo,
-    vec2,
-};
+use eframe::egui::{self, Color32, Label, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, Vec2, WidgetInfo, vec2};
 use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
 use super::Dialog;

@@ -28,7 +28,7 @@ impl Link {
 
 /// The reverse of [`Link::keep`], without the prefix.
 pub(super) fn read(packed: &str) -> Result<Link, LinkError> {
-    let damaged = || fault("", "", "what was kept of it is damaged");
+    let damaged = || fault("", "", "its stored scene is damaged");
     let text = unpack_within("", packed, LARGEST)?;
     let kept: Value = serde_json::from_str(&text).map_err(|_| damaged())?;
     let link = kept["link"].as_str().ok_or_else(damaged)?;

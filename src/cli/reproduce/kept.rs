@@ -77,7 +77,7 @@ impl Kept {
     pub(super) fn remove(self) {
         self.parts.into_iter().for_each(Partial::remove);
         if let Err(error) = remove_empty_folder(&self.folder) {
-            warn(&format!("{} is not needed any more and could not be removed: {error}", self.folder.display()));
+            warn(&format!("{} is no longer needed and could not be removed: {error}", self.folder.display()));
         }
     }
 }

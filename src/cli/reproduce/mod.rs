@@ -42,7 +42,7 @@ fn make(folder: Folder, out: &Path, extent: Extent, threads: usize, quiet: bool)
     let work = Agenda::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
     let mut kept = Kept::open(out, &work)?;
     if kept.is_begun() && !quiet {
-        warn(&format!("going on where {} stopped", kept.folder().display()));
+        warn(&format!("resuming where {} stopped", kept.folder().display()));
     }
     let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
     let bar = progress::bar(!quiet, length.ceil() as u64);
@@ -96,7 +96,7 @@ fn command(report: &Report) -> &'static str {
 fn interrupted(kept: &Kept) -> Failure {
     Failure::new(
         Failure::INTERRUPTED,
-        format!("interrupted; no report was written, and the same command goes on from {}", kept.folder().display()),
+        format!("interrupted; no report was written, and the same command resumes from {}", kept.folder().display()),
     )
 }
 

@@ -62,7 +62,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     };
     let (all, left) = (points(&blocks), points(&todo));
     if left < all && !arguments.quiet {
-        warn(&format!("going on where {} stopped: {} of {all} points are done", partial.path().display(), all - left));
+        warn(&format!("resuming where {} stopped: {} of {all} points are done", partial.path().display(), all - left));
     }
     interrupt::listen();
     let bar = progress::bar(!arguments.quiet, all);
@@ -79,7 +79,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
         return Err(Failure::new(
             Failure::INTERRUPTED,
             format!(
-                "interrupted with {} of {all} points done; the same command goes on from {}",
+                "interrupted with {} of {all} points done; the same command resumes from {}",
                 all - left,
                 partial.path().display()
             ),

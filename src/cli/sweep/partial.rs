@@ -147,7 +147,7 @@ impl Partial {
     /// Removes the file: its content is in the output.
     pub fn remove(self) {
         if let Err(error) = remove_file(&self.path) {
-            warn(&format!("{} is not needed any more and could not be removed: {error}", self.path.display()));
+            warn(&format!("{} is no longer needed and could not be removed: {error}", self.path.display()));
         }
     }
 
