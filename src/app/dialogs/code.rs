@@ -1,6 +1,9 @@
 //! The link to the present state with the address that it needs, and as a QR code, for the cameras of the phones in the room.
 
-use eframe::egui::{self, Color32, Label, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, Vec2, WidgetInfo, vec2};
+use eframe::egui::{
+    self, Color32, Direction, Label, Layout, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, UiBuilder, Vec2, WidgetInfo,
+    vec2,
+};
 use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
 use super::Dialog;
@@ -156,7 +159,9 @@ pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
         Err(reason) => {
             let (place, _) = ui.allocate_exact_size(Vec2::splat(side), Sense::hover());
             ui.painter().rect_filled(place, 6.0, ui.visuals().faint_bg_color);
-            ui.put(place.shrink(16.0), Label::new(reason).wrap());
+            let layout = Layout::centered_and_justified(Direction::TopDown);
+            let inside = UiBuilder::new().max_rect(place.shrink(16.0)).layout(layout);
+            ui.new_child(inside).add(Label::new(reason).wrap());
         }
     }
     ui.label(match shared.page() {
