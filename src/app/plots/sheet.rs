@@ -2,7 +2,7 @@
 
 use eframe::egui::Ui;
 
-use super::{Panel, Plots, time_axis};
+use super::{Panel, Plots, before, time_axis};
 use crate::app::host::SaveFile;
 use crate::app::player::Player;
 use crate::app::{App, layout};
@@ -92,10 +92,7 @@ impl Plots {
         let (from, to) = self.range(player);
         let (time_unit, time_size) = time_axis(to - from);
         let (unit, size) = panel.unit;
-        let mut bins: Vec<Bin> = Vec::new();
-        let mut points = |channel: usize| -> Vec<(f64, f64)> {
-            bins.clear();
-            player.bins(channel, from, to, INSTANTS, &mut bins);
+        let ends = |bins: &[Bin]| -> Vec<(f64, f64)> {
             let ends = |bin: &Bin| {
                 let time = 0.5 * (bin.from + bin.to) / time_size;
                 [bin.least, bin.greatest].map(|value| (time, value / size))
@@ -103,6 +100,12 @@ impl Plots {
             let ends =
                 bins.iter().flat_map(|bin| ends(bin).into_iter().take(1 + usize::from(bin.least != bin.greatest)));
             ends.collect()
+        };
+        let mut bins: Vec<Bin> = Vec::new();
+        let mut points = |channel: usize| {
+            bins.clear();
+            player.bins(channel, from, to, INSTANTS, &mut bins);
+            ends(&bins)
         };
         let line =
             |label: &str, points, colour| Series { label: label.to_owned(), points, colour, line: true, marker: None };
@@ -113,6 +116,16 @@ impl Plots {
                 let closed = level.points.iter().all(|(_, value)| *value <= 0.0);
                 if !closed && !series.iter().any(|other: &Series| other.points == level.points) {
                     series.push(level);
+                }
+            }
+        }
+        if panel.kind != PlotKind::Bands {
+            for kept in self.comparison.shown() {
+                let traces = before(kept, player, panel, &self.hidden, false, (from, to, INSTANTS));
+                for (index, trace) in traces.iter().enumerate() {
+                    let [r, g, b, _] = trace.colour.to_array();
+                    let label = if index == 0 { kept.name() } else { String::new() };
+                    series.push(line(&label, ends(&trace.bins), (r, g, b)));
                 }
             }
         }
