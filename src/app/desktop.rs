@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use eframe::egui;
 
 use super::background::Thread;
+use super::chooser::{Answer, Chooser};
 #[cfg(feature = "sound")]
 use super::click::Click;
 use super::host::{Dropped, Host, OpenedFile, Running, SaveFile};
@@ -25,6 +26,9 @@ pub struct DesktopHost {
     #[cfg(feature = "sound")]
     speaker: Option<Speaker>,
     page: String,
+    chooser: Option<Chooser>,
+    /// The file that may be replaced, as its dialog has asked.
+    replaced: Option<PathBuf>,
 }
 
 impl DesktopHost {
@@ -32,6 +36,22 @@ impl DesktopHost {
     pub fn new(page: String) -> Self {
         Self { page, ..Self::default() }
     }
+
+    /// With the dialogs of the system for files, where it has any.
+    pub fn with_dialogs(self) -> Self {
+        Self { chooser: Some(Chooser::new()), ..self }
+    }
+}
+
+/// Reads a file that was chosen or dropped, unless it is too large.
+fn read(path: &Path, bytes: impl FnOnce() -> Result<Vec<u8>, String>) -> OpenedFile {
+    let name = path.display().to_string();
+    let size = path.metadata().map_or(0, |file| file.len());
+    let content = match largest_file(&name) {
+        most if size > most => Err(too_large()),
+        _ => bytes(),
+    };
+    OpenedFile { name, content }
 }
 
 impl Host for DesktopHost {
@@ -51,8 +71,11 @@ impl Host for DesktopHost {
             error @ FileError::Cannot { .. } => error.to_string(),
         };
         let mut filled = Vec::new();
+        // What made a file goes with it.
+        let replaced = self.replaced.take();
+        let replace = files.first().is_some_and(|first| replaced.as_deref() == Some(Path::new(&first.name)));
         for file in files {
-            let target = OutputFile::claim(Path::new(&file.name), false).map_err(cannot)?;
+            let target = OutputFile::claim(Path::new(&file.name), replace).map_err(cannot)?;
             filled.push(target.fill(|out| out.write_all(&file.bytes)).map_err(cannot)?);
         }
         publish(filled).map_err(cannot)?;
@@ -61,16 +84,32 @@ impl Host for DesktopHost {
     }
 
     fn read_dropped(&mut self, files: Vec<Dropped>) {
-        let read = |file: Dropped| {
-            let name = file.path().display().to_string();
-            let size = file.path().metadata().map_or(0, |file| file.len());
-            let content = match largest_file(&name) {
-                most if size > most => Err(too_large()),
-                _ => file.bytes(),
-            };
-            OpenedFile { name, content }
-        };
+        let read = |file: Dropped| read(file.path(), || file.bytes());
         self.opened.push_back(files.into_iter().map(read).collect());
+    }
+
+    fn pick_file(&mut self) -> bool {
+        self.chooser.as_mut().is_some_and(Chooser::open)
+    }
+
+    fn pick_path(&mut self, name: &str) -> bool {
+        self.chooser.as_mut().is_some_and(|chooser| chooser.save(name))
+    }
+
+    fn picked_path(&mut self, ctx: &egui::Context, frame: &eframe::Frame) -> Option<Option<String>> {
+        match self.chooser.as_mut()?.poll(ctx, frame)? {
+            Answer::Cancelled => Some(None),
+            Answer::Open(path) => {
+                let bytes = || std::fs::read(&path).map_err(|error| error.to_string());
+                self.opened.push_back(vec![read(&path, bytes)]);
+                None
+            }
+            Answer::Save(path) => {
+                let name = path.display().to_string();
+                self.replaced = path.exists().then_some(path);
+                Some(Some(name))
+            }
+        }
     }
 
     fn opened(&mut self) -> Option<Vec<OpenedFile>> {
@@ -125,5 +164,34 @@ impl Host for DesktopHost {
             "this program was built without it. ./run builds it with sound where libasound2-dev and pkg-config are installed"
                 .to_owned(),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_the_dialog_has_asked_about_is_replaced_and_what_goes_with_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("data.csv");
+        let read = || std::fs::read_to_string(&path).expect("there");
+        let files = |text: &str| {
+            [path.clone(), folder.path().join("data.csv.meta.json")].map(|path| SaveFile {
+                name: path.display().to_string(),
+                mime: "text/csv",
+                bytes: text.into(),
+            })
+        };
+        let mut host = DesktopHost::default();
+        host.save(&files("first")).expect("new files");
+        assert!(host.save(&files("second")).expect_err("already there").contains("choose another name"));
+        host.replaced = Some(folder.path().join("other.csv"));
+        assert!(host.save(&files("second")).is_err());
+        assert_eq!(read(), "first");
+        host.replaced = Some(path.clone());
+        host.save(&files("second")).expect("replaced");
+        assert_eq!(read(), "second");
+        assert!(host.save(&files("third")).is_err(), "asked about once");
     }
 }

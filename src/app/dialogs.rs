@@ -62,6 +62,9 @@ pub enum Dialog {
         /// The changes that would be lost, one phrase each.
         lost: Vec<String>,
     },
+    /// Starts as if for the first time.
+    #[cfg(not(target_arch = "wasm32"))]
+    StartAsNew,
 }
 
 impl Dialog {
@@ -75,6 +78,8 @@ impl Dialog {
             Self::Film { .. } => "Film",
             Self::Load { .. } => "Change the running scene?",
             Self::Ready { .. } => "Replace the running scene?",
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::StartAsNew => "Start as new?",
         }
     }
 
@@ -92,6 +97,8 @@ impl Dialog {
             }
             Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
             Self::Ready { .. } => Some(("Replace and sweep", Some(Answer::Sweep))),
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::StartAsNew => Some(("Start as new", Some(Answer::StartAsNew))),
         }
     }
 }
@@ -113,6 +120,9 @@ pub enum Answer {
     Load,
     /// Replace the scene and start the sweep.
     Sweep,
+    /// Forget everything and start as new.
+    #[cfg(not(target_arch = "wasm32"))]
+    StartAsNew,
 }
 
 /// Shows `dialog`.
@@ -146,6 +156,12 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
                 Dialog::Ready { sweep, lost } => {
                     let words = format!("The sweep runs over the scene {}. These changes would be lost:", sweep.scene);
                     list(ui, &words, lost)
+                }
+                #[cfg(not(target_arch = "wasm32"))]
+                Dialog::StartAsNew => {
+                    let words = "Forgets the size of the window and of the type, theme, last scene and recent files, and opens the \
+                                 first scene. The run on show is lost.";
+                    list(ui, words, &[])
                 }
             })
             .inner;

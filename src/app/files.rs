@@ -22,7 +22,7 @@ const ROWS: usize = 1000;
 /// Endings of what is dropped by mistake.
 const PICTURES: [&str; 8] = [".png", ".jpg", ".jpeg", ".gif", ".webp", ".svg", ".mp4", ".webm"];
 /// Media type of scene files.
-const SCENE_TYPE: &str = "application/toml";
+pub(super) const SCENE_TYPE: &str = "application/toml";
 
 impl App {
     /// Gives the application the services of the platform it runs on.
@@ -220,6 +220,13 @@ impl App {
 
     /// Gives files to the host, or asks for a path first.
     pub(super) fn save(&mut self, files: Vec<SaveFile>) {
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(first) = files.first()
+            && self.host.pick_path(&first.name)
+        {
+            self.saving = files;
+            return;
+        }
         if self.host.asks_for_path() {
             self.dialog = Some(Dialog::Save {
                 path: files.first().map_or(String::new(), |f| f.name.clone()),
@@ -233,6 +240,17 @@ impl App {
                     self.notice = Some(Notice::new(done));
                 }
                 Err(reason) => self.problem = Some(reason),
+            }
+        }
+    }
+
+    /// Saves files under the path that was chosen for them.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn receive_path(&mut self, ctx: &egui::Context, frame: &eframe::Frame) {
+        if let Some(chosen) = self.host.picked_path(ctx, frame) {
+            let files = std::mem::take(&mut self.saving);
+            if let Some(path) = chosen.filter(|_| !files.is_empty()) {
+                self.save_as(path, files);
             }
         }
     }
@@ -251,6 +269,8 @@ impl App {
         match self.host.save(&renamed) {
             Ok(done) => {
                 self.note_saved(&files);
+                #[cfg(not(target_arch = "wasm32"))]
+                self.note_recent(&renamed);
                 self.notice = Some(Notice::new(done));
             }
             Err(reason) => {

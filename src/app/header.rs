@@ -70,7 +70,18 @@ impl App {
                 });
                 return;
             }
-            self.open_button(ui);
+            #[cfg(not(target_arch = "wasm32"))]
+            if self.is_remembered() || !ui.ctx().embed_viewports() {
+                layout::menu(ui, "Open", false, |ui| {
+                    self.open_button(ui, "File…");
+                    self.desktop_entries(ui);
+                })
+                .on_hover_text("Open a scene, a recent file or a second window");
+            } else {
+                self.open_button(ui, "Open…");
+            }
+            #[cfg(target_arch = "wasm32")]
+            self.open_button(ui, "Open…");
             let save = |ui: &mut Ui| {
                 self.save_menu(ui);
                 self.code_button(ui);
@@ -148,11 +159,24 @@ impl App {
         }
     }
 
-    fn open_button(&mut self, ui: &mut Ui) {
+    fn open_button(&mut self, ui: &mut Ui, name: &str) {
         let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
-        if ui.button("Open…").on_hover_text(help).clicked() {
+        if ui.button(name).on_hover_text(help).clicked() {
             self.choose_file();
             layout::close_menu(ui);
+        }
+    }
+
+    /// What the menu offers on the desktop.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn desktop_entries(&mut self, ui: &mut Ui) {
+        self.recent_entries(ui);
+        ui.separator();
+        if !ui.ctx().embed_viewports() && self.audience_entry(ui) {
+            layout::close_menu(ui);
+        }
+        if self.is_remembered() {
+            self.new_entry(ui);
         }
     }
 
@@ -205,7 +229,9 @@ impl App {
     /// Everything that does not fit into a small header.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
-        self.open_button(ui);
+        self.open_button(ui, "Open…");
+        #[cfg(not(target_arch = "wasm32"))]
+        self.desktop_entries(ui);
         self.link_button(ui);
         self.code_button(ui);
         self.undo_entries(ui);

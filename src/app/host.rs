@@ -86,6 +86,18 @@ pub trait Host {
         false
     }
 
+    /// Lets the user choose the path of a file to be saved, with `name` suggested; false if the application is to ask for it instead.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn pick_path(&mut self, _name: &str) -> bool {
+        false
+    }
+
+    /// The path that was chosen since, or nothing if the user has cancelled. Dialogs are shown over the window `frame`.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn picked_path(&mut self, _ctx: &egui::Context, _frame: &eframe::Frame) -> Option<Option<String>> {
+        None
+    }
+
     /// Reads files that were dropped at once, now or later.
     fn read_dropped(&mut self, files: Vec<Dropped>);
 

@@ -106,9 +106,15 @@ pub const BINDINGS: [Binding; 41] = [
     bind(Group::Picture, Key::G, Action::IdealGhost, "G", "Ideal ghost: the machine without play, shown or hidden"),
     bind(Group::Picture, Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Group::Window, Key::C, Action::Panel, "C", "Controls shown or hidden"),
-    bind(Group::Window, Key::P, Action::Plots, "P", "Plots shown or hidden"),
+    bind(Group::Window, Key::P, Action::Plots, "P", "Plots shown or hidden; in a presentation the next of them"),
     bind(Group::Window, Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
-    bind(Group::Window, Key::F5, Action::Present, "F5", "Presentation: the picture alone, large type, thick arrows"),
+    bind(
+        Group::Window,
+        Key::F5,
+        Action::Present,
+        "F5",
+        "Presentation: picture and transport, large type, thick arrows",
+    ),
     bind(
         Group::Window,
         Key::PageDown,

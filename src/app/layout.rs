@@ -2,6 +2,8 @@
 
 use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollArea, Ui};
 
+#[cfg(not(target_arch = "wasm32"))]
+use super::audience;
 use super::{App, present, theme, transport};
 
 /// Below this width or height the window is small, points.
@@ -213,6 +215,10 @@ impl App {
             show_controls,
             show_plots,
             show_bench,
+            #[cfg(not(target_arch = "wasm32"))]
+            audience,
+            #[cfg(not(target_arch = "wasm32"))]
+            single_plot,
             ..
         } = self;
         let mut present = false;
@@ -254,7 +260,13 @@ impl App {
             .show_collapsible(ui, show_plots, |ui| {
                 // Otherwise the panel would shrink to what the plots leave of it.
                 ui.take_available_space();
-                plots.header(ui, player);
+                ui.horizontal(|ui| {
+                    plots.header(ui, player);
+                    #[cfg(not(target_arch = "wasm32"))]
+                    if audience.is_some() {
+                        audience::choose_plot(ui, &plots.titles(player), single_plot);
+                    }
+                });
                 if let Some(time) = plots.ui(ui, player).filter(|_| free) {
                     player.go_to(time);
                     viewport.revisit(player);
@@ -438,7 +450,7 @@ impl App {
         self.picture_rect = area;
         let presenting = self.is_presenting() || self.embedded().is_some();
         self.player.place_ghost();
-        let caption = self.caption_plate(ui);
+        let caption = self.caption_plate(ui, self.is_presenting());
         let above = caption.as_ref().map(|(_, plate)| *plate);
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         self.viewport.ui(&mut place, &self.player, plain, above);
@@ -483,7 +495,7 @@ impl App {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
             }
         });
-        self.caption(ui, caption);
+        self.caption(ui, area, caption);
         drop_hint(ui, whole);
         let messages = self.messages(ui, whole.shrink(10.0));
         self.notice_plate(ui, messages);

@@ -5,10 +5,14 @@
 mod accuracy;
 mod announce;
 #[cfg(not(target_arch = "wasm32"))]
+mod audience;
+#[cfg(not(target_arch = "wasm32"))]
 mod background;
 mod bench;
 mod beside;
 mod canvas;
+#[cfg(not(target_arch = "wasm32"))]
+mod chooser;
 mod click;
 mod compare;
 mod controls;
@@ -44,6 +48,8 @@ mod plots;
 mod present;
 mod pull;
 mod reload;
+#[cfg(not(target_arch = "wasm32"))]
+mod remembered;
 mod replay;
 #[cfg(not(target_arch = "wasm32"))]
 mod saved;
@@ -103,6 +109,8 @@ use picture::Picture;
 pub use player::Player;
 pub use plots::{Plots, Window};
 use reload::SceneFile;
+#[cfg(not(target_arch = "wasm32"))]
+pub use remembered::{Remembered, Store};
 pub use replay::{Replay, Verdict};
 use scene_pictures::ScenePictures;
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, NO_PAGE, SceneText, is_page};
@@ -316,6 +324,17 @@ pub struct App {
     /// How the last one was to be.
     film_wanted: Option<film::Wanted>,
     presentation: Option<present::Presentation>,
+    /// Which of the chosen plots is shown alone: in a presentation, and in the window for the class.
+    single_plot: Option<usize>,
+    /// The window for the class.
+    #[cfg(not(target_arch = "wasm32"))]
+    audience: Option<audience::Audience>,
+    /// What the next start is to begin with; without one nothing is remembered.
+    #[cfg(not(target_arch = "wasm32"))]
+    store: Option<Store>,
+    /// Files for which the host asks for a path.
+    #[cfg(not(target_arch = "wasm32"))]
+    saving: Vec<SaveFile>,
     embedded: Option<Embedded>,
     sound: Sound,
     /// The lesson under way.
@@ -396,6 +415,13 @@ impl App {
             film: None,
             film_wanted: None,
             presentation: None,
+            single_plot: None,
+            #[cfg(not(target_arch = "wasm32"))]
+            audience: None,
+            #[cfg(not(target_arch = "wasm32"))]
+            store: None,
+            #[cfg(not(target_arch = "wasm32"))]
+            saving: Vec::new(),
             embedded: options.embedded,
             sound: Sound::default(),
             course: None,
@@ -876,6 +902,7 @@ impl App {
             Action::Present => self.present(ctx, !self.is_presenting()),
             Action::Bench if self.compact => self.fold(Sheet::Bench),
             Action::Bench => self.show_bench = !self.show_bench,
+            Action::Plots if self.is_presenting() => self.turn_plot(),
             Action::Panel if self.compact => self.fold(Sheet::Controls),
             Action::Plots if self.compact => self.fold(Sheet::Plots),
             Action::Panel => self.show_controls = !self.show_controls,
@@ -971,6 +998,8 @@ impl App {
                     self.start_ready(sweep);
                 }
             }
+            #[cfg(not(target_arch = "wasm32"))]
+            Some(Answer::StartAsNew) => self.start_as_new(ctx),
             Some(Answer::Load) => {
                 if let Dialog::Load { load, .. } = dialog {
                     self.go_to_section(*load);
@@ -998,6 +1027,8 @@ impl eframe::App for App {
         for action in keys::pressed(ctx) {
             self.act(ctx, action);
         }
+        #[cfg(not(target_arch = "wasm32"))]
+        self.receive_path(ctx, _frame);
         self.receive_files(ctx);
         self.receive_saved_scene(ctx);
         self.receive_links(ctx);
@@ -1018,10 +1049,21 @@ impl eframe::App for App {
         self.advance_lesson(ctx);
         self.age_verdict(ctx);
         self.announce(ctx);
+        #[cfg(not(target_arch = "wasm32"))]
+        self.remember(ctx);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show(ui);
+        #[cfg(not(target_arch = "wasm32"))]
+        self.audience_ui(ui.ctx());
+    }
+
+    #[cfg(not(target_arch = "wasm32"))]
+    fn on_exit(&mut self) {
+        if let Some(store) = &mut self.store {
+            store.write();
+        }
     }
 
     #[cfg(target_arch = "wasm32")]

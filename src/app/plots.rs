@@ -386,14 +386,35 @@ impl Plots {
         if end < length { (0.0, length) } else { (end - length, end) }
     }
 
+    /// Titles of the chosen plots, in their order.
+    pub fn titles(&self, player: &Player) -> Vec<String> {
+        panels(&self.chosen, &self.picked, player).iter().map(Panel::title).collect()
+    }
+
     /// The chosen plots, side by side if there is room, otherwise stacked. Returns the instant that was clicked, s.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<f64> {
+        self.show(ui, player, None)
+    }
+
+    /// The chosen plot number `index` alone. Returns as [`Self::ui`].
+    pub fn single(&mut self, ui: &mut Ui, player: &Player, index: usize) -> Option<f64> {
+        self.show(ui, player, Some(index))
+    }
+
+    /// The same in a second window: where plots are in the first stays known.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn second(&mut self, ui: &mut Ui, player: &Player, index: usize) {
+        let places = std::mem::take(&mut self.places);
+        self.show(ui, player, Some(index));
+        self.places = places;
+    }
+
+    fn show(&mut self, ui: &mut Ui, player: &Player, single: Option<usize>) -> Option<f64> {
         self.places.clear();
-        let picked = self.picked.clone();
-        let of_quantity = |quantity: &Quantity| Panel::of_quantity(*quantity, player);
-        let mut chosen: Vec<Panel<'_>> = self.chosen.iter().filter_map(of_quantity).collect();
-        for name in &picked {
-            chosen.extend(Panel::of_pick(name, player));
+        let (quantities, picked) = (self.chosen.clone(), self.picked.clone());
+        let mut chosen = panels(&quantities, &picked, player);
+        if let Some(index) = single {
+            chosen = chosen.into_iter().skip(index).take(1).collect();
         }
         if chosen.is_empty() {
             ui.label(RichText::new("No plot chosen").weak());
@@ -726,6 +747,13 @@ fn before(
         trace
     };
     seen.map(trace).collect()
+}
+
+/// Those of the `chosen` quantities and of the channels `picked` by name.
+fn panels<'a>(chosen: &[Quantity], picked: &'a [String], player: &'a Player) -> Vec<Panel<'a>> {
+    let of_quantity = |quantity: &Quantity| Panel::of_quantity(*quantity, player);
+    let of_picks = picked.iter().flat_map(|name| Panel::of_pick(name, player));
+    chosen.iter().filter_map(of_quantity).chain(of_picks).collect()
 }
 
 /// One term of a stack, in the units of the axes.

@@ -1,4 +1,5 @@
-//! Presentation: the picture, large type and thick arrows, for a projector and the last row. It changes nothing of the run.
+//! Presentation: the picture with large type and thick arrows, time, transport and one plot, for a projector and the last row. It
+//! changes nothing of the run.
 
 use std::sync::Arc;
 
@@ -18,10 +19,14 @@ const BADGE: f32 = 15.0;
 const PAD: Vec2 = vec2(12.0, 4.0);
 /// Width that the time takes in the corner of the picture, points.
 const TIME: f32 = 170.0;
-/// Least height of the plots of a lesson, points.
+/// Least height of the plots, points.
 const LEAST_PLOTS: f32 = 130.0;
+/// Least width of a bar with transport and timeline side by side, points.
+const BESIDE: f32 = 700.0;
+/// Width of the buttons at the right end of the bar, points.
+const BUTTONS: f32 = 150.0;
 /// How much thicker arrows are.
-const THICKNESS: f32 = 2.0;
+pub(super) const THICKNESS: f32 = 2.0;
 /// Change of the screen's height that the type follows, as a share of it.
 const FOLLOWED: f32 = 0.02;
 
@@ -35,13 +40,18 @@ pub struct Presentation {
     height: f32,
 }
 
+/// Height of the plots below the picture in what is left of `ui`, points.
+pub(super) fn plots_height(ui: &Ui) -> f32 {
+    (0.36 * ui.available_height()).max(LEAST_PLOTS)
+}
+
 /// Height of the screen, points at zoom 1.
-fn screen_height(ctx: &egui::Context) -> f32 {
+pub(super) fn screen_height(ctx: &egui::Context) -> f32 {
     ctx.content_rect().height() * ctx.zoom_factor()
 }
 
 /// Zoom at which the smallest type is legible from the last row of a screen `height` points high.
-fn legible(height: f32) -> f32 {
+pub(super) fn legible(height: f32) -> f32 {
     (height * LEAST_TEXT / SMALLEST).max(1.0)
 }
 
@@ -75,6 +85,28 @@ impl App {
         self.presentation.is_some()
     }
 
+    /// Zoom of the interface, but for that of a presentation.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn own_zoom(&self, ctx: &egui::Context) -> f32 {
+        self.presentation.as_ref().map_or_else(|| ctx.zoom_factor(), |presentation| presentation.zoom)
+    }
+
+    /// Which of the chosen plots a presentation and the window for the class show, if any.
+    pub fn single_plot(&self) -> Option<usize> {
+        self.single_plot.filter(|index| *index < self.plots.titles(&self.player).len())
+    }
+
+    /// Shows the next of the chosen plots, and none after the last; in a presented lesson all of them, or none.
+    pub(super) fn turn_plot(&mut self) {
+        if self.is_presenting() && self.course().is_some() {
+            self.show_plots = !self.show_plots;
+            return;
+        }
+        let next = self.single_plot().map_or(0, |index| index + 1);
+        self.single_plot = Some(next);
+        self.single_plot = self.single_plot();
+    }
+
     /// Sizes the type for the screen, once its size has changed: on the way to the full screen and back.
     pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
         let Some(presentation) = &mut self.presentation else {
@@ -99,13 +131,35 @@ impl App {
             .frame(bar)
             .show(ui, |ui| {
                 leave = double_tapped(ui);
-                let row = egui::Layout::right_to_left(egui::Align::Center);
-                let size = vec2(ui.available_width(), theme::side(ui, transport::PLAY));
-                ui.allocate_ui_with_layout(size, row, |ui| {
-                    let help = "Back to the window with its panels (F5, Esc, double-tap on this bar)";
-                    leave |= ui.button("Leave").on_hover_text(help).clicked();
+                // A lesson needs the height: there the timeline has what is left of the row.
+                let teaching = self.course().is_some();
+                if !teaching {
+                    ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
+                }
+                let backwards = egui::Layout::right_to_left(egui::Align::Center);
+                let width = ui.available_width();
+                if width < transport::LEAST + BUTTONS {
+                    let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner;
+                    let size = vec2(width, ui.spacing().interact_size.y);
+                    ui.allocate_ui_with_layout(size, backwards, |ui| leave |= self.presentation_buttons(ui));
+                    return asked;
+                }
+                let size = vec2(width, theme::side(ui, transport::PLAY));
+                ui.allocate_ui_with_layout(size, backwards, |ui| {
+                    leave |= self.presentation_buttons(ui);
                     ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                        ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player)).inner
+                        ui.add_enabled_ui(free, |ui| {
+                            if !teaching || width < BESIDE {
+                                return transport::row(ui, &mut self.player);
+                            }
+                            ui.horizontal(|ui| {
+                                let asked = transport::least(ui, &mut self.player);
+                                self.timeline_ui(ui);
+                                asked
+                            })
+                            .inner
+                        })
+                        .inner
                     })
                     .inner
                 })
@@ -113,24 +167,42 @@ impl App {
             })
             .inner;
         self.lesson_beside(ui, bar);
-        self.lesson_plots(ui, bar);
+        self.presented_plots(ui, bar);
         self.central(ui, asked);
         if leave {
             self.present(ui.ctx(), false);
         }
     }
 
-    /// The plots of a lesson that speaks of them.
-    fn lesson_plots(&mut self, ui: &mut Ui, bar: egui::Frame) {
-        if self.course().is_none() || !self.show_plots {
+    /// Those at the right end of the bar, from right to left. Returns whether the presentation is to end.
+    fn presentation_buttons(&mut self, ui: &mut Ui) -> bool {
+        let help = "Back to the window with its panels (F5, Esc, double-tap on this bar)";
+        let leave = ui.button("Leave").on_hover_text(help).clicked();
+        let on = if self.course().is_some() { self.show_plots } else { self.single_plot().is_some() };
+        let help = "The next of the chosen plots, after the last none (key P)";
+        if ui.add(egui::Button::selectable(on, "Plot")).on_hover_text(help).clicked() {
+            self.turn_plot();
+        }
+        leave
+    }
+
+    /// The plot that was turned to; in a lesson that speaks of plots all of them.
+    fn presented_plots(&mut self, ui: &mut Ui, bar: egui::Frame) {
+        let teaching = self.course().is_some();
+        let single = self.single_plot().filter(|_| !teaching);
+        if single.is_none() && !(teaching && self.show_plots) {
             return;
         }
         let free = !self.is_under_way();
-        let height = (0.36 * ui.available_height()).max(LEAST_PLOTS);
+        let height = plots_height(ui);
         let Self { player, plots, viewport, .. } = self;
-        Panel::bottom("plots of the lesson").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
+        Panel::bottom("plots of the presentation").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
             ui.take_available_space();
-            if let Some(time) = plots.ui(ui, player).filter(|_| free) {
+            let asked = match single {
+                Some(index) => plots.single(ui, player, index),
+                None => plots.ui(ui, player),
+            };
+            if let Some(time) = asked.filter(|_| free) {
                 player.go_to(time);
                 viewport.revisit(player);
             }
@@ -150,10 +222,9 @@ impl App {
         Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
     }
 
-    /// The words of the caption and the plate they stand on: the impact under way at an instant that is looked at; in a
-    /// presentation, otherwise, the last one that ended.
-    pub(super) fn caption_plate(&self, ui: &Ui) -> Option<(Arc<Galley>, Rect)> {
-        let presenting = self.is_presenting();
+    /// The words of the caption and the plate they stand on: the impact under way at an instant that is looked at; when
+    /// `presenting`, otherwise, the last one that ended.
+    pub(super) fn caption_plate(&self, ui: &Ui, presenting: bool) -> Option<(Arc<Galley>, Rect)> {
         let area = ui.available_rect_before_wrap();
         let ink = ui.visuals().strong_text_color();
         if !presenting && (!overlay::has_room(area) || self.picture.is_plain()) {
@@ -189,11 +260,12 @@ impl App {
         Some((words, place.expand2(PAD)))
     }
 
-    pub(super) fn caption(&self, ui: &Ui, caption: Option<(Arc<Galley>, Rect)>) {
+    /// Writes that caption over the picture in `area`.
+    pub(super) fn caption(&self, ui: &Ui, area: Rect, caption: Option<(Arc<Galley>, Rect)>) {
         let Some((words, plate)) = caption else {
             return;
         };
-        let painter = ui.painter_at(self.picture_rect);
+        let painter = ui.painter_at(area);
         painter.rect_filled(plate, 6.0, ui.visuals().window_fill.gamma_multiply(0.85));
         let text = words.text().to_owned();
         painter.galley(plate.min + PAD, words, ui.visuals().strong_text_color());

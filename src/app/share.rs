@@ -66,7 +66,7 @@ const LATEST: f64 = 1e6;
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
-const THEMES: [(&str, ThemePreference); 3] =
+pub(super) const THEMES: [(&str, ThemePreference); 3] =
     [("light", ThemePreference::Light), ("dark", ThemePreference::Dark), ("system", ThemePreference::System)];
 
 /// A link that cannot be read: what is wrong and what is allowed.

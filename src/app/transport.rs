@@ -77,6 +77,13 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
     .inner
 }
 
+/// The buttons and the list of time scales alone. Returns as [`ui`].
+pub fn least(ui: &mut Ui, player: &mut Player) -> bool {
+    let asked = buttons(ui, player);
+    scales(ui, player);
+    asked
+}
+
 /// Hint for a settled run, at the right end, where nothing else has to make room for it.
 fn settled(ui: &mut Ui, player: &Player) {
     if !player.is_playing() || !player.has_settled() || ui.available_width() < 180.0 {

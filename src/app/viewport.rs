@@ -68,6 +68,9 @@ pub struct Viewport {
     next: DrawList,
     /// Number of what is shown, another one for every other picture.
     revision: u64,
+    /// The same of the second window: what it shows, and its number.
+    #[cfg(not(target_arch = "wasm32"))]
+    second: (Arc<DrawList>, u64),
     trail: Vec<Vec3>,
     followed: Option<Picked>,
     time: f64,
@@ -86,8 +89,8 @@ pub struct Viewport {
     pace: Option<Pace>,
     /// What it shows, where another picture is beside it.
     pub title: Option<String>,
-    /// Which of the pictures in a window it is.
-    number: usize,
+    /// Where it is shown.
+    place: render::Place,
 }
 
 impl Viewport {
@@ -106,6 +109,8 @@ impl Viewport {
             list: Arc::new(DrawList::default()),
             next: DrawList::default(),
             revision: 0,
+            #[cfg(not(target_arch = "wasm32"))]
+            second: <_>::default(),
             trail: Vec::new(),
             followed: None,
             time: player.pacer.shown(),
@@ -117,13 +122,13 @@ impl Viewport {
             clicked: None,
             pace: None,
             title: None,
-            number: 0,
+            place: render::Place::Window,
         }
     }
 
     /// A second viewport, for another run beside the first.
     pub fn beside(player: &Player) -> Self {
-        Self { number: 1, ..Self::new(player, ViewOptions::default()) }
+        Self { place: render::Place::Beside, ..Self::new(player, ViewOptions::default()) }
     }
 
     /// Looks from where `other` looks.
@@ -339,8 +344,13 @@ impl Viewport {
 
     /// The camera for a picture of `aspect`, width by height.
     fn framed(&self, aspect: f32) -> Camera {
+        self.framed_as(self.frozen, aspect)
+    }
+
+    /// The same with everything in it that is in a view of aspect `shape`.
+    fn framed_as(&self, shape: Option<f32>, aspect: f32) -> Camera {
         let mut camera = self.camera;
-        if let Some(shape) = self.frozen.filter(|shape| *shape > aspect) {
+        if let Some(shape) = shape.filter(|shape| *shape > aspect) {
             let half = (camera.field_of_view / 2.0).tan() * shape / aspect;
             camera.field_of_view = 2.0 * half.atan();
         }
@@ -367,7 +377,7 @@ impl Viewport {
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: Option<Rect>) {
         let (rect, response) =
             ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::click_and_drag());
-        let name = if self.number == 0 { "3D view" } else { "3D view before the change" };
+        let name = if self.place == render::Place::Window { "3D view" } else { "3D view before the change" };
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
         let size = screen.size;
@@ -412,22 +422,10 @@ impl Viewport {
         let painter = ui.painter_at(rect);
         let revision = follows.then_some(self.revision);
         let list = self.list.clone();
-        painter.add(render::Viewport::revised(rect, list, revision, self.number));
+        painter.add(render::Viewport::revised(rect, list, revision, self.place));
         // Of what was drawn, which may have fewer pixels than are shown.
         let Screen { scale, .. } = screen.drawn_with(self.list.quality);
-        let following = self.followed.and_then(|picked| name_of(player, picked));
-        let overlay = Overlay {
-            time: Some(player.pacer.shown()),
-            notes: self
-                .title
-                .clone()
-                .into_iter()
-                .chain(following.map(|name| format!("following {name}")))
-                .chain(said)
-                .collect(),
-            legend: true,
-            labels: true,
-        };
+        let overlay = self.overlay(player, said);
         let theme = self.options.theme;
         overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above);
         if let Some(hit) = hovered {
@@ -438,6 +436,41 @@ impl Viewport {
             card.popup = card.popup.align(align);
             card.show(|ui| describe(ui, player, hit.what));
         }
+    }
+
+    /// What is written over the picture; `said`: about ghosts.
+    fn overlay(&self, player: &Player, said: Vec<String>) -> Overlay {
+        let following = self.followed.and_then(|picked| name_of(player, picked));
+        let following = following.map(|name| format!("following {name}"));
+        Overlay {
+            time: Some(player.pacer.shown()),
+            notes: self.title.clone().into_iter().chain(following).chain(said).collect(),
+            legend: true,
+            labels: true,
+        }
+    }
+
+    /// The view of the latest [`Self::ui`] in a second window, over all of `ui`, with arrows of another `thickness`. It takes no input.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn second_ui(&mut self, ui: &mut Ui, player: &Player, thickness: f32, above: Option<Rect>) {
+        let (rect, _) = ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::hover());
+        let screen = Screen::new(rect, ui.ctx().pixels_per_point());
+        let aspect = |[width, height]: [u32; 2]| width as f32 / height.max(1) as f32;
+        let shape = self.frozen.unwrap_or(aspect(self.list.size));
+        let camera = self.framed_as(Some(shape), aspect(screen.size));
+        let own = std::mem::replace(&mut self.options.arrows.thickness, thickness);
+        let quality = self.list.quality;
+        let said = self.list_next(player, &camera, &screen, quality);
+        self.options.arrows.thickness = own;
+        let (list, revision) = &mut self.second;
+        if self.next != **list {
+            show_next(list, &mut self.next, revision);
+        }
+        let painter = ui.painter_at(rect);
+        painter.add(render::Viewport::revised(rect, list.clone(), Some(*revision), render::Place::Second));
+        let Screen { scale, .. } = screen.drawn_with(quality);
+        let overlay = self.overlay(player, said);
+        overlay::paint(&painter, rect, scale, &self.second.0, self.options.theme, &overlay, above);
     }
 
     /// Describes what `screen` shows with `quality` in `self.next`; returns what is said about ghosts.
@@ -486,10 +519,7 @@ impl Viewport {
     }
 
     fn show_next(&mut self) {
-        static PICTURES: AtomicU64 = AtomicU64::new(0);
-        self.revision = PICTURES.fetch_add(1, Ordering::Relaxed);
-        // egui has dropped the clone of the previous frame: nothing is copied.
-        std::mem::swap(Arc::make_mut(&mut self.list), &mut self.next);
+        show_next(&mut self.list, &mut self.next, &mut self.revision);
     }
 
     fn drag(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) {
@@ -737,6 +767,14 @@ impl Viewport {
         }
         self.trail.push(to_f32(&(body.position + body.rotation * probe)));
     }
+}
+
+/// Shows `next` in place of `list`, as another picture.
+fn show_next(list: &mut Arc<DrawList>, next: &mut DrawList, revision: &mut u64) {
+    static PICTURES: AtomicU64 = AtomicU64::new(0);
+    *revision = PICTURES.fetch_add(1, Ordering::Relaxed);
+    // egui has dropped the clone of the previous frame: nothing is copied.
+    std::mem::swap(Arc::make_mut(list), next);
 }
 
 /// Where the picture is in the window.

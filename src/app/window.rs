@@ -3,7 +3,8 @@
 use eframe::egui;
 use eframe::egui_wgpu;
 
-use super::{App, AppOptions, DesktopHost, Player};
+use super::remembered::FIRST_SIZE;
+use super::{App, AppOptions, DesktopHost, Player, Store};
 use crate::render;
 use crate::scene::SceneError;
 
@@ -21,30 +22,62 @@ pub enum WindowError {
     Window(String),
 }
 
-/// Opens the window and returns when it is closed. Links copied in it are appended to the address `page`.
+/// Opens the window and returns when it is closed. Without `options` it begins with what the `store` remembers. Links copied in it are
+/// appended to the address `page`.
 ///
 /// # Errors
 /// A scene that cannot start, no graphics adapter, no display.
-pub fn run_native(mut options: AppOptions, page: String) -> Result<(), WindowError> {
-    let native = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Jointplay")
-            .with_app_id("jointplay")
-            .with_inner_size([1280.0, 800.0])
-            .with_min_inner_size([360.0, 480.0]),
-        ..Default::default()
-    };
+pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store>) -> Result<(), WindowError> {
+    let remembered = store.as_ref().map(|store| store.remembered().clone()).unwrap_or_default();
+    let mut viewport = egui::ViewportBuilder::default()
+        .with_title("Jointplay")
+        .with_app_id("jointplay")
+        .with_inner_size(remembered.size.unwrap_or(FIRST_SIZE))
+        .with_maximized(remembered.maximized)
+        .with_min_inner_size([360.0, 480.0]);
+    if let Some(position) = remembered.position {
+        viewport = viewport.with_position(position);
+    }
+    let native = eframe::NativeOptions { viewport, ..Default::default() };
+    let begin = || store.as_ref().map_or_else(AppOptions::first, Store::begin);
+    let mut options = options.unwrap_or_else(begin);
     options.embedded = None;
     // A scene error must keep its type and not become one of the window.
     Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
         let mut app = App::new(cc, options)?;
-        app.set_host(Box::new(DesktopHost::new(page)));
+        app.set_host(Box::new(DesktopHost::new(page).with_dialogs()));
         app.follow_frame_rate();
+        bring_back(cc);
+        if let Some(store) = store {
+            app.remember_in(&cc.egui_ctx, store);
+        }
         Ok(Box::new(app))
     });
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {
         eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => render::NoAdapter.into(),
         other => WindowError::Window(other.to_string()),
     })
+}
+
+/// Moves a window that lies beside all screens, as one of them is gone, to the first that is left.
+fn bring_back(cc: &eframe::CreationContext<'_>) {
+    let Some(window) = cc.winit_window() else {
+        return;
+    };
+    // Some platforms tell nobody where a window is.
+    let Ok(place) = window.outer_position() else {
+        return;
+    };
+    let middle = place.x + window.outer_size().width as i32 / 2;
+    let mut screens = window.available_monitors().peekable();
+    let first = screens.peek().map(|screen| screen.position());
+    let inside = |start: i32, length: u32, at: i32| at >= start && at < start + length as i32;
+    let seen = screens.any(|screen| {
+        let (corner, size) = (screen.position(), screen.size());
+        inside(corner.x, size.width, middle) && inside(corner.y, size.height, place.y.max(corner.y))
+    });
+    if let Some(corner) = first.filter(|_| !seen) {
+        window.set_outer_position(corner);
+    }
 }

@@ -98,7 +98,7 @@ pub struct CheckArguments {
 #[derive(Debug, Args)]
 pub struct ViewArguments {
     /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved
-    /// [default: spcmm, driven so fast that its joints rattle at every turn].
+    /// [default: the last one; at first spcmm, driven so fast that its joints rattle at every turn].
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
@@ -114,6 +114,9 @@ pub struct ViewArguments {
     /// [default: the environment variable JOINTPLAY_PAGE, of now or else of the build; without any the window asks for it].
     #[arg(long, value_name = "URL")]
     pub page: Option<String>,
+    /// Start as new: forget window size, theme, type size, last scene and recent files, which are otherwise remembered.
+    #[arg(long)]
+    pub fresh: bool,
 }
 
 /// `run`.
@@ -497,7 +500,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 impl Default for ViewArguments {
     /// As if no command were given.
     fn default() -> Self {
-        Self { scene: None, changes: Vec::new(), link: None, lesson: None, page: None }
+        Self { scene: None, changes: Vec::new(), link: None, lesson: None, page: None, fresh: false }
     }
 }
 

@@ -104,19 +104,23 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 
 #[cfg(feature = "gui")]
 fn view(arguments: &ViewArguments) -> Result<(), Failure> {
-    use crate::app::{AppOptions, Lesson, WindowError, run_native};
+    use crate::app::{AppOptions, Lesson, Store, WindowError, run_native};
     drivers::restart_with_runtime_dir();
     let page = page::address(arguments.page.as_deref())?;
     let options = match (&arguments.link, &arguments.lesson) {
-        (Some(link), _) => AppOptions::from_link(link).map_err(Failure::usage)?,
-        (_, Some(lesson)) => AppOptions::of_lesson(Lesson::load(lesson)?, 0),
-        (None, None) if arguments.scene.is_none() && arguments.changes.is_empty() => AppOptions::first(),
+        (Some(link), _) => Some(AppOptions::from_link(link).map_err(Failure::usage)?),
+        (_, Some(lesson)) => Some(AppOptions::of_lesson(Lesson::load(lesson)?, 0)),
+        (None, None) if arguments.scene.is_none() && arguments.changes.is_empty() => None,
         (None, None) => {
             let scene = arguments.scene.as_deref().unwrap_or(DEFAULT_SCENE.as_ref());
-            AppOptions::new(Scene::load(scene, &arguments.changes)?)
+            Some(AppOptions::new(Scene::load(scene, &arguments.changes)?))
         }
     };
-    run_native(options, page).map_err(|error| {
+    let mut store = Store::of_user();
+    if let Some(store) = store.as_mut().filter(|_| arguments.fresh) {
+        store.forget();
+    }
+    run_native(options, page, store).map_err(|error| {
         let code = match error {
             WindowError::Start(_) => Failure::USAGE,
             WindowError::NoAdapter(_) => Failure::NO_ADAPTER,

@@ -15,8 +15,19 @@ struct Resources {
     finish: Finish,
     /// For pictures in egui's textures.
     still: Option<Finish>,
-    /// By the numbers of the pictures.
-    shown: Vec<Option<Shown>>,
+    /// One for each [`Place`].
+    shown: [Option<Shown>; 3],
+}
+
+/// Where one of the pictures that share the graphics is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// In the window.
+    Window,
+    /// Beside the first in the window.
+    Beside,
+    /// In a second window.
+    Second,
 }
 
 /// What is drawn to, and which picture it holds.
@@ -30,7 +41,7 @@ struct Shown {
 pub fn install(state: &egui_wgpu::RenderState) {
     let renderer = Renderer::new(&state.device, &state.adapter);
     let finish = renderer.finish(&state.device, state.target_format);
-    let resources = Resources { finish, renderer, still: None, shown: Vec::new() };
+    let resources = Resources { finish, renderer, still: None, shown: [None, None, None] };
     state.renderer.write().callback_resources.insert(resources);
 }
 
@@ -60,38 +71,34 @@ pub fn draw_still(state: &egui_wgpu::RenderState, list: &DrawList) -> Option<egu
 pub struct Viewport {
     list: Arc<DrawList>,
     revision: Option<u64>,
-    number: usize,
+    place: Place,
 }
 
 impl Viewport {
     /// Shape for `egui::Painter::add`: draws `list` at `list.size` and shows it in `rect`.
     pub fn shape(rect: egui::Rect, list: Arc<DrawList>) -> egui::Shape {
-        Self::revised(rect, list, None, 0)
+        Self::revised(rect, list, None, Place::Window)
     }
 
-    /// The same for picture `number` of the window, from 0; where the one before had this `revision`, too, it is the same one and only
-    /// shown again.
-    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>, number: usize) -> egui::Shape {
-        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision, number }).into()
+    /// The same; where the picture before in this `place` had this `revision`, too, it is the same one and only shown again.
+    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>, place: Place) -> egui::Shape {
+        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision, place }).into()
     }
 }
 
 impl Resources {
-    /// What `list` is drawn to as picture `number`.
-    fn target_for(&mut self, device: &wgpu::Device, list: &DrawList, number: usize) -> (&mut Renderer, &mut Shown) {
+    /// What `list` is drawn to in `place`.
+    fn target_for(&mut self, device: &wgpu::Device, list: &DrawList, place: Place) -> (&mut Renderer, &mut Shown) {
         // A window can briefly be 0 pixels wide, or wider than the largest texture.
         let limit = device.limits().max_texture_dimension_2d;
         let size = list.size.map(|n| n.clamp(1, limit));
         let fits = |shown: &Shown| shown.target.fits(list, size);
-        if self.shown.len() <= number {
-            self.shown.resize_with(number + 1, || None);
-        }
-        let place = &mut self.shown[number];
-        let shown = place.take().filter(fits).unwrap_or_else(|| {
+        let before = &mut self.shown[place as usize];
+        let shown = before.take().filter(fits).unwrap_or_else(|| {
             let target = self.renderer.target(device, size, list.quality.samples);
             Shown { group: self.finish.group(device, &target.light), target, revision: None }
         });
-        (&mut self.renderer, place.insert(shown))
+        (&mut self.renderer, before.insert(shown))
     }
 }
 
@@ -108,7 +115,7 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get_mut::<Resources>() else {
             return Vec::new();
         };
-        let (renderer, shown) = resources.target_for(device, &self.list, self.number);
+        let (renderer, shown) = resources.target_for(device, &self.list, self.place);
         let before = std::mem::replace(&mut shown.revision, self.revision);
         if before.is_none() || before != self.revision {
             // The first picture comes as early as it can.
@@ -132,7 +139,7 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get::<Resources>() else {
             return;
         };
-        if let Some(Some(shown)) = resources.shown.get(self.number) {
+        if let Some(shown) = &resources.shown[self.place as usize] {
             resources.finish.draw(pass, &shown.group);
         }
     }

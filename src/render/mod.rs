@@ -21,7 +21,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use callback::{Viewport, draw_still, install};
+pub use callback::{Place, Viewport, draw_still, install};
 pub use eframe::egui_wgpu::wgpu;
 pub use image::{Image, RenderError};
 #[cfg(not(target_arch = "wasm32"))]

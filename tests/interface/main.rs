@@ -7,6 +7,7 @@ mod common;
 mod bench_window;
 mod clicks;
 mod compare;
+mod desktop;
 mod embed;
 mod film;
 mod frames;

@@ -1,12 +1,12 @@
 //! Presentation: what the last row sees.
 
-use eframe::egui::{self, Key, PointerButton, TextStyle, vec2};
+use eframe::egui::{self, Key, PointerButton, Shape, TextStyle, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::App;
 use jointplay::simulate::Simulation;
 
 use crate::hands::{compare_window, plain};
-use crate::window::sized;
+use crate::window::{click, shown, sized};
 
 const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);
 
@@ -75,6 +75,71 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
         assert_eq!(harness.ctx.zoom_factor(), 1.0);
         harness.get_by_label("View options");
         assert_eq!(state(&harness), before);
+    }
+}
+
+/// The smallest type of the texts on the screen, as a share of its height.
+fn smallest(harness: &Harness<'_, App>) -> f32 {
+    fn sizes(shape: &Shape, least: &mut f32) {
+        match shape {
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| sizes(shape, least)),
+            Shape::Text(text) => {
+                let sections = text.galley.job.sections.iter();
+                *least = sections.fold(*least, |least, section| least.min(section.format.font_id.size));
+            }
+            _ => {}
+        }
+    }
+    let mut least = f32::INFINITY;
+    harness.output().shapes.iter().for_each(|part| sizes(&part.shape, &mut least));
+    least / harness.ctx.content_rect().height()
+}
+
+#[test]
+fn a_presentation_goes_through_time_by_a_drag_and_from_impact_to_impact_and_shows_one_plot_at_a_time() {
+    for screen in [SCREEN, vec2(1920.0, 1080.0)] {
+        let mut harness = sized("spcmm", screen.into(), egui::Theme::Light);
+        harness.state_mut().player_mut().run_to(40e-3);
+        harness.run();
+        f5(&mut harness, screen);
+        let strip = harness.get_by_role_and_label(Role::Slider, "Timeline, s").rect();
+        let at = |share: f32| egui::pos2(strip.left() + share * strip.width(), strip.center().y);
+        harness.drag_at(at(0.9));
+        harness.step();
+        for share in [0.8, 0.6, 0.5] {
+            harness.hover_at(at(share));
+            harness.step();
+        }
+        harness.drop_at(at(0.5));
+        harness.run();
+        assert!((shown(&harness) - 20e-3).abs() < 0.2e-3, "{}", shown(&harness));
+        click(&mut harness, "Next impact");
+        let next = shown(&harness);
+        assert!(next > 20e-3);
+        click(&mut harness, "Previous impact");
+        assert!(shown(&harness) < next);
+        let before = shown(&harness);
+        click(&mut harness, "Step");
+        assert!(shown(&harness) > before);
+
+        let titles = ["Normal force, N", "Eccentricity, mm"];
+        let on_show = |harness: &Harness<'_, App>| titles.map(|title| harness.query_by_label(title).is_some());
+        assert_eq!(on_show(&harness), [false, false]);
+        for expected in [[true, false], [false, true], [false, false]] {
+            harness.key_press(Key::P);
+            harness.run();
+            assert_eq!(on_show(&harness), expected);
+            let share = smallest(&harness);
+            assert!(share >= 1.0 / 40.0 - 1e-6, "{share}");
+        }
+        click(&mut harness, "Plot");
+        assert_eq!(on_show(&harness), [true, false], "the button does it, too");
+        // The plots of the window are as they were.
+        harness.key_press(Key::F5);
+        harness.step();
+        harness.set_size(screen);
+        harness.run();
+        assert_eq!(on_show(&harness), [true, true]);
     }
 }
 

@@ -1,0 +1,155 @@
+//! The window for the class: what a presentation shows, in a second window, while the controls stay in the first. It takes no input
+//! but keys and a double-click, and changes nothing of the run.
+
+use eframe::egui::{
+    self, CentralPanel, ComboBox, Panel, PointerButton, Ui, ViewportBuilder, ViewportCommand, ViewportId, vec2,
+};
+
+use super::keys::Action;
+use super::{App, keys, present, theme};
+
+/// Size with which it opens, points at zoom 1.
+const SIZE: egui::Vec2 = vec2(1280.0, 720.0);
+
+/// The window as it was at its latest frame.
+pub struct Audience {
+    /// Its height, points at zoom 1.
+    height: f32,
+    fills_screen: bool,
+}
+
+/// What a frame of it has found.
+struct Seen {
+    height: f32,
+    closed: bool,
+    tapped: bool,
+    keys: Vec<Action>,
+}
+
+/// Its name among the windows.
+fn id() -> ViewportId {
+    ViewportId::from_hash_of("window for the class")
+}
+
+/// Chooses which plot it shows, of those with these `titles`.
+pub fn choose_plot(ui: &mut Ui, titles: &[String], chosen: &mut Option<usize>) {
+    ui.label("For the class");
+    let title = |index: Option<usize>| index.and_then(|index| titles.get(index)).map_or("None", |title| title);
+    ComboBox::from_id_salt("plot for the class")
+        .width(110.0)
+        .selected_text(title(*chosen))
+        .show_ui(ui, |ui| {
+            for index in [None].into_iter().chain((0..titles.len()).map(Some)) {
+                ui.selectable_value(chosen, index, title(index));
+            }
+        })
+        .response
+        .on_hover_text("The plot in the window for the class (key P there)")
+        .accessible_name("For the class");
+}
+
+impl App {
+    /// Opens or closes the window for the class.
+    pub fn show_audience(&mut self, on: bool) {
+        self.audience = on.then_some(Audience { height: SIZE.y, fills_screen: false });
+    }
+
+    /// Whether it is open.
+    pub fn has_audience(&self) -> bool {
+        self.audience.is_some()
+    }
+
+    /// The menu entry, where the platform has several windows. Returns whether it was clicked.
+    pub(super) fn audience_entry(&mut self, ui: &mut Ui) -> bool {
+        let help = "A second window for the projector: picture, time, impact and one plot in large type. A double-click on it, or \
+                    F5, fills its screen";
+        let entry = egui::Button::selectable(self.has_audience(), "Window for the class");
+        let clicked = ui.add(entry).on_hover_text(help).clicked();
+        if clicked {
+            self.show_audience(!self.has_audience());
+        }
+        clicked
+    }
+
+    /// Shows the window, if it is open.
+    pub(super) fn audience_ui(&mut self, ctx: &egui::Context) {
+        let Some(audience) = &self.audience else {
+            return;
+        };
+        let zoom = present::legible(audience.height);
+        // In points of the zoom at which it opens; another size would resize the window.
+        let size = SIZE / present::legible(SIZE.y);
+        let builder = ViewportBuilder::default()
+            .with_title("Jointplay: window for the class")
+            .with_app_id("jointplay")
+            .with_inner_size(size)
+            .with_min_inner_size(size / 4.0);
+        // egui has one zoom for all windows. This one is drawn at once, with a zoom of its own, which no key changes.
+        let own = ctx.options(|options| (options.zoom_factor, options.zoom_with_keyboard));
+        ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = (zoom, false));
+        let seen = ctx.show_viewport_immediate(id(), builder, |ui, _| self.audience_contents(ui));
+        ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = own);
+        let Some(audience) = &mut self.audience else {
+            return;
+        };
+        if audience.height != seen.height {
+            audience.height = seen.height;
+            ctx.request_repaint();
+        }
+        for key in seen.keys {
+            match key {
+                Action::Present => self.fill_class_screen(ctx),
+                Action::Plots => self.turn_plot(),
+                // Leaves the whole screen, as in the first window.
+                Action::Close if self.audience.as_ref().is_some_and(|audience| audience.fills_screen) => {
+                    self.fill_class_screen(ctx);
+                }
+                Action::Close => {}
+                other => self.act(ctx, other),
+            }
+        }
+        if seen.tapped {
+            self.fill_class_screen(ctx);
+        }
+        if seen.closed {
+            self.show_audience(false);
+        }
+    }
+
+    fn fill_class_screen(&mut self, ctx: &egui::Context) {
+        if let Some(audience) = &mut self.audience {
+            audience.fills_screen = !audience.fills_screen;
+            ctx.send_viewport_cmd_to(id(), ViewportCommand::Fullscreen(audience.fills_screen));
+        }
+    }
+
+    /// All that is in it.
+    fn audience_contents(&mut self, ui: &mut Ui) -> Seen {
+        let ctx = ui.ctx().clone();
+        let seen = ctx.input(|input| {
+            let tapped = input.pointer.button_double_clicked(PointerButton::Primary);
+            (input.viewport().close_requested(), tapped)
+        });
+        let seen =
+            Seen { height: present::screen_height(&ctx), closed: seen.0, tapped: seen.1, keys: keys::pressed(&ctx) };
+        ui.visuals_mut().disabled_alpha = 1.0;
+        ui.disable();
+        if let Some(index) = self.single_plot() {
+            let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
+            let height = present::plots_height(ui);
+            let Self { player, plots, .. } = self;
+            Panel::bottom("plot for the class").frame(bar).resizable(false).exact_size(height).show(ui, |ui| {
+                ui.take_available_space();
+                plots.second(ui, player, index);
+            });
+        }
+        CentralPanel::no_frame().show(ui, |ui| {
+            let area = ui.available_rect_before_wrap();
+            let caption = self.caption_plate(ui, true);
+            let above = caption.as_ref().map(|(_, plate)| *plate);
+            self.viewport.second_ui(ui, &self.player, present::THICKNESS, above);
+            self.caption(ui, area, caption);
+        });
+        seen
+    }
+}

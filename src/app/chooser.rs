@@ -1,0 +1,134 @@
+//! The system's own dialogs for files. They run beside the window, which goes on.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::{Arc, OnceLock};
+
+use eframe::egui;
+use rfd::{AsyncFileDialog, FileHandle};
+
+/// What a dialog asks for.
+enum Question {
+    Open,
+    /// The file that is suggested.
+    Save(String),
+}
+
+/// What was chosen in a dialog.
+pub enum Answer {
+    /// A file to open.
+    Open(PathBuf),
+    /// Where a file is to be saved; the dialog has asked whether it may be replaced.
+    Save(PathBuf),
+    /// Nothing.
+    Cancelled,
+}
+
+/// The dialogs of the system, one at a time.
+pub struct Chooser {
+    /// Whether there are any; not known at first.
+    available: Arc<OnceLock<bool>>,
+    question: Option<Question>,
+    answer: Option<Receiver<Answer>>,
+}
+
+impl Chooser {
+    /// Finds out, beside the window, whether the system has dialogs.
+    pub fn new() -> Self {
+        let available = Arc::new(OnceLock::new());
+        let found = available.clone();
+        std::thread::spawn(move || {
+            // Nobody else sets it.
+            let _ = found.set(has_dialogs());
+        });
+        Self { available, question: None, answer: None }
+    }
+
+    /// Asks for a file to open; false where there is no dialog, or none is known of yet.
+    pub fn open(&mut self) -> bool {
+        self.ask(Question::Open)
+    }
+
+    /// Asks where to save a file, with `name` suggested; false as by [`Self::open`].
+    pub fn save(&mut self, name: &str) -> bool {
+        self.ask(Question::Save(name.to_owned()))
+    }
+
+    fn ask(&mut self, question: Question) -> bool {
+        let has = self.available.get() == Some(&true);
+        if has && self.answer.is_none() {
+            self.question = Some(question);
+        }
+        has
+    }
+
+    /// Shows the dialog asked for, over the window `frame`; returns what was chosen in the one before.
+    pub fn poll(&mut self, ctx: &egui::Context, frame: &eframe::Frame) -> Option<Answer> {
+        if let Some(question) = self.question.take() {
+            self.show(question, ctx, frame);
+        }
+        let answer = match self.answer.as_ref()?.try_recv() {
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => Answer::Cancelled,
+            Ok(answer) => answer,
+        };
+        self.answer = None;
+        Some(answer)
+    }
+
+    fn show(&mut self, question: Question, ctx: &egui::Context, frame: &eframe::Frame) {
+        let mut dialog = AsyncFileDialog::new().set_parent(frame);
+        // As names without folders are understood.
+        if let Ok(folder) = std::env::current_dir() {
+            dialog = dialog.set_directory(folder);
+        }
+        let (send, receive) = channel();
+        let ctx = ctx.clone();
+        let tell = move |chosen: Option<FileHandle>, answer: fn(PathBuf) -> Answer| {
+            let chosen = chosen.map(|file| file.path().to_owned());
+            // The window may have been closed.
+            let _ = send.send(chosen.map_or(Answer::Cancelled, answer));
+            ctx.request_repaint();
+        };
+        // Some systems want the dialog from the thread of the window; its answer is waited for on another.
+        match question {
+            Question::Open => {
+                let chosen = dialog.set_title("Open a scene").add_filter("Scenes", &["toml"]).pick_file();
+                std::thread::spawn(move || tell(pollster::block_on(chosen), Answer::Open));
+            }
+            Question::Save(name) => {
+                let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending).to_owned();
+                let chosen =
+                    dialog.set_title("Save as").set_file_name(name).add_filter(&*ending, &[&ending]).save_file();
+                std::thread::spawn(move || tell(pollster::block_on(chosen), Answer::Save));
+            }
+        }
+        self.answer = Some(receive);
+    }
+}
+
+/// Whether the system has dialogs for files: where the desktop portal answers for them, or `zenity` is installed.
+#[cfg(all(unix, not(target_os = "macos")))]
+fn has_dialogs() -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    pollster::block_on(has_portal()).is_ok() || std::env::split_paths(&path).any(|at| at.join("zenity").is_file())
+}
+
+/// Whether the system has dialogs for files.
+#[cfg(not(all(unix, not(target_os = "macos"))))]
+fn has_dialogs() -> bool {
+    true
+}
+
+/// Asks the portal for the version of its file chooser. A portal without a desktop behind it has none.
+#[cfg(all(unix, not(target_os = "macos")))]
+async fn has_portal() -> zbus::Result<()> {
+    /// How long the portal may take to start, s.
+    const PATIENCE: u64 = 5;
+    let bus = zbus::connection::Builder::session()?;
+    let bus = bus.method_timeout(std::time::Duration::from_secs(PATIENCE)).build().await?;
+    let (portal, object) = ("org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop");
+    let asked = ("org.freedesktop.portal.FileChooser", "version");
+    bus.call_method(Some(portal), object, Some("org.freedesktop.DBus.Properties"), "Get", &asked).await?;
+    Ok(())
+}

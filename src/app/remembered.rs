@@ -1,0 +1,353 @@
+//! What the desktop window begins with the next time: its size, theme, type size, scene, and recent files. A window of a test and a
+//! headless frame have no [`Store`]: they neither read nor write one.
+
+use std::path::{Path, PathBuf};
+
+use eframe::egui::{self, RichText, ThemePreference, Ui};
+use serde::{Deserialize, Serialize};
+
+use super::dialogs::Dialog;
+use super::files::SCENE_TYPE;
+use super::host::SaveFile;
+use super::share::THEMES;
+use super::{App, AppOptions, layout, opening};
+use crate::files::{FileError, OutputFile, create_folders};
+use crate::scene::{DEFAULT_SCENE, Scene, built_in_text};
+use crate::simulate::Simulation;
+
+/// Most recent files that are listed.
+const MOST_RECENT: usize = 8;
+/// Least time between two writes while the window changes, s.
+const PAUSE: f64 = 5.0;
+/// Sizes of a window and zooms of its type that are believed, points and factor.
+const SIZES: std::ops::RangeInclusive<f32> = 200.0..=20_000.0;
+const ZOOMS: std::ops::RangeInclusive<f32> = 0.2..=5.0;
+/// Size with which the window opens for the first time, points.
+pub(super) const FIRST_SIZE: [f32; 2] = [1280.0, 800.0];
+
+/// What is remembered.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Remembered {
+    /// Size inside the frame of the window, points at zoom 1.
+    pub size: Option<[f32; 2]>,
+    /// Upper left corner of the frame, points at zoom 1; not known on every platform.
+    pub position: Option<[f32; 2]>,
+    /// Whether the window fills the screen, with its frame.
+    pub maximized: bool,
+    /// `light`, `dark` or `system`.
+    pub theme: Option<String>,
+    /// Zoom of the interface.
+    pub zoom: Option<f32>,
+    /// File or name of the last scene; `None` for what a visitor meets.
+    pub scene: Option<String>,
+    /// Scene files that were opened or saved, the latest first.
+    pub recent: Vec<String>,
+}
+
+impl Remembered {
+    /// Without what no window can have.
+    fn believed(mut self) -> Self {
+        self.size = self.size.filter(|size| size.iter().all(|length| SIZES.contains(length)));
+        self.position = self.position.filter(|place| place.iter().all(|place| place.abs() <= *SIZES.end()));
+        self.zoom = self.zoom.filter(|zoom| ZOOMS.contains(zoom));
+        self.recent.truncate(MOST_RECENT);
+        self
+    }
+
+    fn theme(&self) -> Option<ThemePreference> {
+        let wanted = self.theme.as_deref()?;
+        THEMES.iter().find(|(name, _)| *name == wanted).map(|(_, theme)| *theme)
+    }
+
+    /// Lists `file` first.
+    fn add_recent(&mut self, file: String) {
+        self.recent.retain(|other| *other != file);
+        self.recent.insert(0, file);
+        self.recent.truncate(MOST_RECENT);
+    }
+}
+
+/// The file in which it is kept.
+pub struct Store {
+    path: PathBuf,
+    /// As it is now, and as it stands in the file.
+    now: Remembered,
+    written: Remembered,
+    /// When it may be written again, s of viewing.
+    due: f64,
+    /// Zoom of the frame before.
+    scale: f32,
+}
+
+impl Store {
+    /// The one of this user; `None` where users have no folder for such files.
+    pub fn of_user() -> Option<Self> {
+        let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+        let data = if cfg!(windows) {
+            folder("APPDATA")
+        } else if cfg!(target_os = "macos") {
+            folder("HOME").map(|home| home.join("Library").join("Application Support"))
+        } else {
+            folder("XDG_DATA_HOME").or_else(|| folder("HOME").map(|home| home.join(".local").join("share")))
+        };
+        Some(Self::at(data?.join("jointplay").join("window.json")))
+    }
+
+    /// The one in the file `path`. What cannot be read is as good as missing.
+    pub fn at(path: PathBuf) -> Self {
+        let read = || -> Option<Remembered> { serde_json::from_slice(&std::fs::read(&path).ok()?).ok() };
+        let now = read().unwrap_or_default().believed();
+        Self { path, written: now.clone(), now, due: f64::NEG_INFINITY, scale: 0.0 }
+    }
+
+    /// What it holds.
+    pub fn remembered(&self) -> &Remembered {
+        &self.now
+    }
+
+    /// Forgets everything.
+    pub fn forget(&mut self) {
+        self.now = Remembered::default();
+        self.write();
+    }
+
+    /// What a window begins with that was asked for nothing: the last scene. One that is gone or broken is named in the message, and
+    /// the first scene opened.
+    pub fn begin(&self) -> AppOptions {
+        let Some(name) = &self.now.scene else {
+            return AppOptions::first();
+        };
+        let load = || Scene::load(name, &[]).map_err(|error| error.to_string());
+        let opened = is_there(name).and_then(|()| load());
+        let started = opened.and_then(|scene| match Simulation::new(&scene) {
+            Ok(_) => Ok(AppOptions::new(scene)),
+            Err(error) => Err(error.located(&scene).to_string()),
+        });
+        started.unwrap_or_else(|reason| AppOptions {
+            problem: Some(format!("Cannot open the last scene: {reason}")),
+            ..AppOptions::first()
+        })
+    }
+
+    /// Writes it to the file, if something has changed. A failure is no reason to disturb anybody: it is only logged.
+    pub fn write(&mut self) {
+        if self.now == self.written {
+            return;
+        }
+        let written = || -> Result<(), FileError> {
+            let text = serde_json::to_string_pretty(&self.now).map_err(|error| FileError::cannot(&self.path, error))?;
+            if let Some(folder) = self.path.parent() {
+                create_folders(folder).map_err(|error| FileError::cannot(folder, error))?;
+            }
+            OutputFile::claim(&self.path, true)?.write(|out| std::io::Write::write_all(out, text.as_bytes()))
+        };
+        if let Err(error) = written() {
+            log::warn!("the window will not be remembered: {error}");
+        }
+        self.written = self.now.clone();
+    }
+}
+
+impl App {
+    /// Begins with theme and type size of `store`, unless something else was asked for, and keeps it up to date from now on.
+    pub fn remember_in(&mut self, ctx: &egui::Context, store: Store) {
+        let theme = ctx.options(|options| options.theme_preference);
+        if let Some(wanted) = store.now.theme().filter(|_| theme == ThemePreference::System) {
+            ctx.set_theme(wanted);
+        }
+        if let Some(zoom) = store.now.zoom {
+            ctx.set_zoom_factor(zoom);
+        }
+        self.store = Some(store);
+    }
+
+    /// Notes how the window is.
+    pub(super) fn remember(&mut self, ctx: &egui::Context) {
+        let (scale, zoom) = (ctx.zoom_factor(), self.own_zoom(ctx));
+        let whole_screen = self.is_presenting();
+        let file = self.scene_file.name().map(|name| absolute(Path::new(name)));
+        let scene = self.player.wanted();
+        let built_in = built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text);
+        let teaching = self.course.is_some();
+        let Some(store) = &mut self.store else {
+            return;
+        };
+        let before = (store.now.scene.clone(), store.now.recent.len());
+        let now = &mut store.now;
+        // In the frame in which the zoom changes the window is still measured by the one before.
+        let settled = std::mem::replace(&mut store.scale, scale) == scale;
+        ctx.input(|input| {
+            let window = input.viewport();
+            let is = |state: Option<bool>| state == Some(true);
+            now.maximized = is(window.maximized);
+            if !settled || now.maximized || whole_screen || is(window.fullscreen) || is(window.minimized) {
+                return;
+            }
+            if let Some(inner) = window.inner_rect {
+                now.size = Some((inner.size() * scale).round().into());
+            }
+            if let Some(outer) = window.outer_rect {
+                now.position = Some((outer.min.to_vec2() * scale).round().into());
+            }
+        });
+        let theme = ctx.options(|options| options.theme_preference);
+        now.theme = THEMES.iter().find(|(_, named)| *named == theme).map(|(name, _)| (*name).to_owned());
+        now.zoom = Some(zoom);
+        if let Some(file) = file.filter(|_| !teaching) {
+            if now.scene.as_ref() != Some(&file) {
+                now.add_recent(file.clone());
+                now.scene = Some(file);
+            }
+        } else if built_in && !teaching {
+            let first = scene.name == DEFAULT_SCENE && opening::is_rattling(scene);
+            now.scene = (!first).then(|| scene.name.clone());
+        }
+        let time = ctx.input(|input| input.time);
+        if store.now != store.written
+            && (before != (store.now.scene.clone(), store.now.recent.len()) || time >= store.due)
+        {
+            store.write();
+            store.due = time + PAUSE;
+        }
+    }
+
+    /// Lists the scene among saved `files` as recent.
+    pub(super) fn note_recent(&mut self, files: &[SaveFile]) {
+        if let Some(store) = &mut self.store {
+            for file in files.iter().filter(|file| file.mime == SCENE_TYPE) {
+                store.now.add_recent(absolute(Path::new(&file.name)));
+            }
+        }
+    }
+
+    /// Whether the window is remembered.
+    pub(super) fn is_remembered(&self) -> bool {
+        self.store.is_some()
+    }
+
+    /// Menu entries: the recent files.
+    pub(super) fn recent_entries(&mut self, ui: &mut Ui) {
+        let recent = self.store.as_ref().map_or(&[][..], |store| &store.now.recent);
+        let mut chosen = None;
+        if !recent.is_empty() {
+            ui.label(RichText::new("Recent files").small().weak());
+        }
+        for file in recent {
+            let name = Path::new(file).file_name().map_or(file.into(), |name| name.to_string_lossy());
+            if ui.button(name).on_hover_text(file).clicked() {
+                chosen = Some(file.clone());
+            }
+        }
+        if let Some(file) = chosen {
+            self.problem = is_there(&file).and_then(|()| self.open(&file)).err();
+            layout::close_menu(ui);
+        }
+    }
+
+    /// Menu entry: starts as new.
+    pub(super) fn new_entry(&mut self, ui: &mut Ui) {
+        let help = "As if for the first time: forgets window size, theme, type size, last scene and recent files";
+        if ui.button("Start as new…").on_hover_text(help).clicked() {
+            self.dialog = Some(Dialog::StartAsNew);
+            layout::close_menu(ui);
+        }
+    }
+
+    /// Starts as if for the first time, and forgets what was.
+    pub(super) fn start_as_new(&mut self, ctx: &egui::Context) {
+        self.present(ctx, false);
+        let options = AppOptions { clock: self.player.clock, ..AppOptions::first() };
+        let mut new = match Self::with_context(ctx, self.graphics.as_ref(), options) {
+            Ok(new) => new,
+            Err(error) => {
+                self.problem = Some(error.to_string());
+                return;
+            }
+        };
+        new.host = std::mem::replace(&mut self.host, Box::new(super::NoHost));
+        new.store = self.store.take();
+        new.follow_frame_rate();
+        *self = new;
+        if let Some(store) = &mut self.store {
+            store.forget();
+        }
+        ctx.set_zoom_factor(1.0);
+        ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
+        // In points of the zoom that is still in force when this arrives.
+        let size = egui::Vec2::from(FIRST_SIZE) / ctx.zoom_factor();
+        ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
+    }
+}
+
+/// Whether the scene `name` may be there: a file that was can be gone.
+fn is_there(name: &str) -> Result<(), String> {
+    let path = Path::new(name);
+    if path.is_absolute() && !path.exists() { Err(format!("{name} is no longer there")) } else { Ok(()) }
+}
+
+/// A path that means the same wherever the program is started.
+fn absolute(path: &Path) -> String {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again_and_what_is_broken_or_out_of_range_is_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("deep").join("window.json");
+        let mut store = Store::at(path.clone());
+        assert_eq!(*store.remembered(), Remembered::default());
+        store.write();
+        assert!(!path.exists(), "nothing to write");
+        store.now.size = Some([900.0, 700.5]);
+        store.now.scene = Some("pendulum".to_owned());
+        for index in 0..10 {
+            store.now.add_recent(format!("/scenes/{index}.toml"));
+        }
+        store.now.add_recent("/scenes/5.toml".to_owned());
+        store.write();
+        let again = Store::at(path.clone());
+        assert_eq!(*again.remembered(), *store.remembered());
+        assert_eq!(again.remembered().recent.len(), MOST_RECENT);
+        assert_eq!(again.remembered().recent[..2], ["/scenes/5.toml", "/scenes/9.toml"]);
+        store.forget();
+        assert_eq!(*Store::at(path.clone()).remembered(), Remembered::default());
+
+        std::fs::write(&path, r#"{"size": [1e9, 3.0], "zoom": 0.0, "theme": "dark", "later": 1}"#).expect("writable");
+        let remembered = Store::at(path.clone()).now;
+        assert_eq!((remembered.size, remembered.zoom), (None, None));
+        assert_eq!(remembered.theme(), Some(ThemePreference::Dark));
+        std::fs::write(&path, "{").expect("writable");
+        assert_eq!(*Store::at(path).remembered(), Remembered::default());
+    }
+
+    #[test]
+    fn a_remembered_scene_is_opened_and_one_that_is_gone_is_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut store = Store::at(folder.path().join("window.json"));
+        let opens = |store: &Store| {
+            let options = store.begin();
+            (options.scene.name.clone(), opening::is_rattling(&options.scene), options.problem)
+        };
+        assert_eq!(opens(&store), (DEFAULT_SCENE.to_owned(), true, None));
+        store.now.scene = Some("pendulum".to_owned());
+        assert_eq!(opens(&store), ("pendulum".to_owned(), false, None));
+        let file = folder.path().join("mine.toml");
+        store.now.scene = Some(absolute(&file));
+        for text in [None, Some("no scene")] {
+            if let Some(text) = text {
+                std::fs::write(&file, text).expect("writable");
+            }
+            let (name, rattles, problem) = opens(&store);
+            assert!(name == DEFAULT_SCENE && rattles);
+            let problem = problem.expect("a message");
+            assert!(problem.contains("mine.toml"), "{problem}");
+        }
+        std::fs::write(&file, built_in_text("chain").expect("built in")).expect("writable");
+        assert_eq!(opens(&store).2, None);
+    }
+}
