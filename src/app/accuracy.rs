@@ -276,7 +276,7 @@ fn capacity(player: &Player) -> AccuracyLine {
 
 /// The latest impact: where it was, how finely it was resolved, and its restitution.
 fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
-    let impact = player.simulation().impacts().next_back();
+    let impact = player.impact_record().latest(None, player.pacer.shown()).next();
     let row = |label, value: Option<String>, doubtful, help: String| AccuracyLine {
         label,
         value: value.unwrap_or_else(|| NONE.to_owned()),
@@ -298,7 +298,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             "Latest impact",
             Some(what),
             false,
-            "Ball joint of the latest impact that is over. Disturbed: another joint was in contact meanwhile, or the parameters of the \
+            "Ball joint of the latest impact whose end is known. Disturbed: another joint was in contact meanwhile, or the parameters of the \
              contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
              floor, so it rebounds higher than asked. Soft: weight and drives did more than a hundredth of its energy as work \
              while it lasted. Undisturbed: none of these."

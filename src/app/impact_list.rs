@@ -9,7 +9,7 @@ use super::host::SaveFile;
 use super::player::Player;
 use super::{App, value};
 use crate::analysis::impact_row;
-use crate::simulate::Impact;
+use crate::simulate::{ContactState, Impact};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;
@@ -72,7 +72,7 @@ fn law(impact: &Impact) -> String {
 fn cells(player: &Player, number: u64, impact: &Impact) -> [String; COLUMNS.len()] {
     [
         number.to_string(),
-        joint(player, impact),
+        joint(player, impact.joint),
         value::time(impact.start),
         duration(impact.end - impact.start),
         value::quantity(impact.peak, "N", 3),
@@ -83,9 +83,9 @@ fn cells(player: &Player, number: u64, impact: &Impact) -> [String; COLUMNS.len(
     ]
 }
 
-fn joint(player: &Player, impact: &Impact) -> String {
+fn joint(player: &Player, joint: usize) -> String {
     let joints = &player.scene().ball_joints;
-    joints.get(impact.joint).map_or_else(String::new, |joint| joint.name.clone())
+    joints.get(joint).map_or_else(String::new, |joint| joint.name.clone())
 }
 
 /// A row of cells in the widths of the columns.
@@ -125,7 +125,7 @@ impl ImpactList {
             let place = ScrollArea::vertical().id_salt("impacts").auto_shrink([false, true]).max_height(ROWS * ROW);
             place.show_rows(ui, ROW, count, |ui, rows| {
                 let seen = record.until(known).rev().skip(rows.start).take(rows.len());
-                for (number, impact) in seen {
+                for (number, own, impact) in seen {
                     let words = cells(player, number, impact);
                     let later = impact.end > shown;
                     let top = ui.cursor().min;
@@ -136,8 +136,8 @@ impl ImpactList {
                     }
                     let all = format!("Impact {}", words.join(", "));
                     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, true, &all));
-                    if response.on_hover_text("Go to its instant").clicked() {
-                        asked = Some(impact.start);
+                    if response.on_hover_text("Go to its peak").clicked() {
+                        asked = Some(own.top.time);
                     }
                     row(ui, |ui, index| {
                         let mut text = RichText::new(&words[index]).small();
@@ -202,7 +202,7 @@ impl App {
         }
         if let Some(time) = asked {
             self.player.go_to(time);
-            self.viewport.arrive(&self.player);
+            self.viewport.revisit(&self.player);
         }
     }
 
@@ -215,17 +215,21 @@ impl App {
         let shown = player.pacer.shown();
         let record = player.impact_record();
         let followed = self.viewport.focus().and_then(|joint| record.under_way(Some(joint), shown));
-        let (number, impact) = followed.or_else(|| record.under_way(None, shown))?;
-        let speed = |speed| millimetres(speed);
-        Some(format!(
-            "Impact {number}, {}: {}, peak {}, {}, {} to {} mm/s",
-            joint(player, impact),
-            value::time(impact.start),
-            value::quantity(impact.peak, "N", 3),
-            duration(impact.end - impact.start),
-            speed(impact.approach_speed),
-            speed(impact.separation_speed)
-        ))
+        let (number, own) = followed.or_else(|| record.under_way(None, shown))?;
+        let report = player.frame().joints.get(own.joint)?;
+        let begins = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
+        let peak = value::quantity(own.top.force.norm(), "N", 3);
+        Some(match own.finished() {
+            Some(impact) => format!(
+                "{begins}, peak {peak}, {}, {} to {} mm/s",
+                duration(impact.end - impact.start),
+                millimetres(impact.approach_speed),
+                millimetres(impact.separation_speed)
+            ),
+            // A change may have taken the wall away.
+            None if report.state == ContactState::Free => return None,
+            None => format!("{begins}, peak {peak}, stays in contact"),
+        })
     }
 
     /// Saves the impacts of the run up to the instant shown.
@@ -234,7 +238,7 @@ impl App {
         let mut text = impact_row::COLUMNS.join(",");
         text.push('\n');
         let mut rows = 0;
-        for (_, impact) in player.impact_record().until(player.pacer.shown()) {
+        for (_, _, impact) in player.impact_record().until(player.pacer.shown()) {
             rows += 1;
             let values = impact_row::row(impact).map(|value| value.to_string());
             // Writing to a String cannot fail.

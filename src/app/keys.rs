@@ -71,7 +71,7 @@ pub const BINDINGS: [Binding; 41] = [
         Key::Comma,
         Action::Impact { forward: false },
         ", and .",
-        "Previous and next impact of the ball joint that is followed, or else of any",
+        "Peak of the previous and of the next impact of the ball joint that is followed, or else of any",
     ),
     bind(Group::Run, Key::Period, Action::Impact { forward: true }, "", ""),
     bind(Group::Run, Key::J, Action::Backwards, "J", "Play backwards"),

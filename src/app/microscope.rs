@@ -277,7 +277,10 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     let impact = sight.impact;
     let of = |read: fn(&crate::simulate::Impact) -> String| impact.as_ref().map_or(NONE.to_owned(), read);
     let now = player.pacer.shown();
-    let ago = impact.map_or(NONE.to_owned(), |impact| format!("{} ago", value::time(now - impact.end)));
+    let ago = impact.map_or(NONE.to_owned(), |impact| match now - impact.end {
+        ago if ago < 0.0 => "under way".to_owned(),
+        ago => format!("{} ago", value::time(ago)),
+    });
     let latest = [
         ("Latest impact", ago, "When its contact ended"),
         (

@@ -860,7 +860,7 @@ impl App {
             Action::Backwards if player.is_playing_backwards() => player.set_playing(false),
             Action::Backwards => player.play_backwards(),
             Action::Impact { forward } => {
-                player.go_to_contact(self.viewport.focus(), forward);
+                player.go_to_impact(self.viewport.focus(), forward);
                 self.viewport.revisit(&self.player);
             }
             Action::Home | Action::End => {

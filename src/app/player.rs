@@ -1,6 +1,5 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
-pub mod blows;
 pub mod contact_history;
 pub mod impact_record;
 mod keyframes;
@@ -22,11 +21,10 @@ use crate::simulate::{
     ChangeError, Channels, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
     StartError, Stopped, Wear,
 };
-use blows::Blows;
 use contact_history::ContactHistory;
 use impact_record::ImpactRecord;
 use keyframes::Keyframes;
-use travel::ContactSearch;
+use travel::ImpactSearch;
 pub use travel::{AbandonedFuture, Flag};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
@@ -67,7 +65,6 @@ pub struct Player {
     /// Record, in full detail, of the past stretch that was last retraced.
     near: Option<Box<History>>,
     contact_history: ContactHistory,
-    blows: Blows,
     impact_record: ImpactRecord,
     recorded: Frame,
     /// Time up to which the latest steps were recorded, s.
@@ -81,7 +78,7 @@ pub struct Player {
     most_steps: u64,
     /// The future abandoned when the run branched from its past.
     left: Option<Box<AbandonedFuture>>,
-    sought: Option<ContactSearch>,
+    sought: Option<ImpactSearch>,
     /// What was done since the start.
     log: Log,
     /// Changes of parameters since they were last taken.
@@ -164,7 +161,6 @@ impl Player {
             history: record_of(scene, &channels),
             near: None,
             contact_history: ContactHistory::default(),
-            blows: Blows::default(),
             impact_record: ImpactRecord::default(),
             channels,
             picks: Vec::new(),
@@ -319,11 +315,6 @@ impl Player {
     /// Largest forces since the previous frame, per ball joint.
     pub fn peaks(&self) -> &[Peak] {
         &self.peaks
-    }
-
-    /// The hardest force of every contact of the run.
-    pub fn blows(&self) -> &Blows {
-        &self.blows
     }
 
     /// Which channels are recorded.
@@ -822,7 +813,7 @@ impl Player {
             Ok(()) => {
                 self.unchanged = None;
                 self.simulation.take_peaks(&mut self.coming);
-                self.impact_record.record(&mut self.simulation);
+                self.impact_record.record(&mut self.simulation, &self.coming);
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
@@ -949,7 +940,6 @@ impl Player {
                 continue;
             }
             self.coming[joint] = Peak::default();
-            self.blows.record(joint, &peak, self.simulation.time());
             if peak.normal > 0.0
                 && let Some(channel) = self.channels.normal_force(joint)
             {
@@ -1011,6 +1001,7 @@ impl Player {
         self.simulation.keep_wear();
         // Forces at the start belong to the first frame: there has been no impact yet.
         self.simulation.take_peaks(&mut self.coming);
+        self.impact_record.begin(&self.coming);
         self.forget_peaks();
         self.record(self.simulation.time());
         self.keep();

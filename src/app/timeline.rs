@@ -55,9 +55,9 @@ impl Timeline {
             let of = of.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
             let past = player.pacer.shown() > 0.0;
             ui.add_enabled_ui(past, |ui| {
-                let help = format!("To the previous impact of {of} (key ,)");
+                let help = format!("To the peak of the previous impact of {of} (key ,)");
                 if icon_button(ui, Icon::Before, "Previous impact", &help, side, false).clicked() {
-                    player.go_to_contact(focus, false);
+                    player.go_to_impact(focus, false);
                     moved = true;
                 }
                 let help = "Play backwards to the start (key J)";
@@ -74,9 +74,9 @@ impl Timeline {
                 }
             });
             ui.add_enabled_ui(player.stopped().is_none() || player.has_future(), |ui| {
-                let help = format!("To the next impact of {of} (key .)");
+                let help = format!("To the peak of the next impact of {of} (key .)");
                 if icon_button(ui, Icon::After, "Next impact", &help, side, false).clicked() {
-                    player.go_to_contact(focus, true);
+                    player.go_to_impact(focus, true);
                     moved = true;
                 }
             });

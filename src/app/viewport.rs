@@ -184,9 +184,14 @@ impl Viewport {
     /// As [`Self::arrive`] where the run was before: the blows shortly before that instant are shown as when it was reached by playing.
     pub fn revisit(&mut self, player: &Player) {
         self.arrive(player);
-        let fade = SEEN * player.pacer.scale();
-        let blows = player.blows().between(self.time - fade, self.time);
-        let blows = blows.map(|blow| (blow.joint, crate::view::to_f32(&blow.force), blow.time));
+        self.recall(player);
+    }
+
+    /// Shows the blows shortly before the displayed instant as when it was reached by playing.
+    fn recall(&mut self, player: &Player) {
+        let (shown, fade) = (player.pacer.shown(), SEEN * player.pacer.scale());
+        let peaks = player.impact_record().peaks(shown - fade, shown);
+        let blows = peaks.map(|(joint, top)| (joint, crate::view::to_f32(&top.force), top.time));
         self.marks.recall(player.frame(), blows, fade);
     }
 
@@ -210,8 +215,9 @@ impl Viewport {
         self.marks.update(player.frame(), player.peaks(), fade);
         if shown != self.time || player.is_playing() {
             if shown < self.time {
-                // What comes after the displayed instant has not happened yet.
+                // What comes after the displayed instant has not happened yet, but what came before it has.
                 self.trail.clear();
+                self.recall(player);
             }
             self.time = shown;
             self.extend_trail(player);

@@ -4,22 +4,37 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::Scene;
-use jointplay::simulate::{Impact, Simulation};
+use jointplay::simulate::{Impact, Peak, Simulation};
 
 use crate::page::open;
 use crate::window::{click, shown, sized};
 
 /// The impacts of a run of the same scene until `time`, s, in the order in which they began.
 fn of_run(app: &App, time: f64) -> Vec<Impact> {
+    peaks_of_run(app, time).into_iter().map(|(impact, _)| impact).collect()
+}
+
+/// The same, with the instant at which the force of each was largest, s.
+pub fn peaks_of_run(app: &App, time: f64) -> Vec<(Impact, f64)> {
     let mut simulation = Simulation::new(app.player().scene()).expect("starts");
-    let mut impacts = Vec::new();
+    let (mut impacts, mut latest, mut peaks) = (Vec::new(), Vec::new(), Vec::<(usize, Peak)>::new());
     while simulation.time() < time {
         simulation.step().expect("runs");
         simulation.take_impacts(&mut impacts);
+        simulation.take_peaks(&mut latest);
+        peaks.extend(latest.iter().copied().enumerate());
     }
     impacts.retain(|impact| impact.end <= time);
     impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
-    impacts
+    let instant = |impact: &Impact| {
+        let of_it = peaks
+            .iter()
+            .filter(|(joint, peak)| *joint == impact.joint && (impact.start..=impact.end).contains(&peak.time));
+        let largest = of_it.max_by(|a, b| a.1.normal.total_cmp(&b.1.normal)).expect("a force");
+        assert_eq!(largest.1.normal, impact.peak);
+        largest.1.time
+    };
+    impacts.iter().map(|impact| (*impact, instant(impact))).collect()
 }
 
 /// The numbers in a text, in order.
@@ -33,7 +48,7 @@ fn near(found: f64, expected: f64) -> bool {
 }
 
 #[test]
-fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_instant() {
+fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_peak() {
     let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
     harness.state_mut().player_mut().run_to(40e-3);
     harness.run();
@@ -66,10 +81,10 @@ fn the_list_has_the_impacts_of_the_run_and_a_row_goes_to_its_instant() {
         assert_eq!(words.contains("disturbed"), impact.disturbed, "{words}");
     }
     assert_eq!(harness.state().player().simulation().state_hash(), before);
-    let last = impacts.last().expect("some");
+    let (_, peak) = *peaks_of_run(harness.state(), 40e-3).last().expect("some");
     harness.get_by_label_contains(&format!("Impact {}, ", impacts.len())).click();
     harness.run();
-    assert!((shown(&harness) - last.start).abs() < 1e-9);
+    assert_eq!(shown(&harness), peak);
     // It is under way now.
     let badge = harness.state().impact_badge().expect("a badge");
     assert!(badge.starts_with(&format!("Impact {}, ", impacts.len())), "{badge}");
@@ -92,7 +107,11 @@ fn the_badge_at_an_impact_says_what_the_run_recorded() {
         harness.run();
         let badge = harness.state().impact_badge().expect("stands at an impact");
         harness.get_by_label(&badge);
-        let impact = of_run(harness.state(), 9e-3)[0];
+        let (impact, peak) = peaks_of_run(harness.state(), 9e-3)[0];
+        // The force is there: as an arrow, in the plot and in words.
+        assert_eq!(shown(&harness), peak);
+        let force = harness.state().player().frame().joints[0].normal_force.norm();
+        assert!(near(force, impact.peak), "{force} N, {} N", impact.peak);
         assert!(badge.starts_with("Impact 1, S1: 7.80"), "{badge}");
         let found = numbers(badge.split_once(": ").expect("numbers").1);
         let expected = [

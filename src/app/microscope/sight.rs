@@ -24,7 +24,7 @@ pub struct Sight {
     pub sliding: Option<Vec3>,
     /// Geometry of the contact; `None` in an ideal joint.
     pub patch: Option<Patch>,
-    /// The latest impact that has ended.
+    /// The latest impact whose end is known.
     pub impact: Option<Impact>,
     /// Start of the path shown, s.
     pub since: f64,
@@ -77,11 +77,9 @@ impl Sight {
             let read = law.friction_reads(&normal, &velocity, &ball_spin, &socket_spin);
             law.sliding(&gap, &read)
         });
-        // What the run has computed beyond the displayed instant is not shown.
-        let mut over =
-            player.simulation().impacts().rev().filter(|impact| impact.joint == joint && impact.end <= shown);
-        let impact = over.next().copied();
-        let first = over.nth(IMPACTS - 2);
+        let mut begun = player.impact_record().latest(Some(joint), shown);
+        let impact = begun.next().copied();
+        let first = begun.nth(IMPACTS - 2);
         let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
         let (radius, clearance) = (spec.contact.ball_radius, report.clearance);
         let patch = (!ideal && clearance > 0.0).then(|| Patch {

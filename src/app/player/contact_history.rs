@@ -99,25 +99,6 @@ impl ContactHistory {
             .filter(move |time| *time >= from)
             .take_while(move |time| *time <= to)
     }
-
-    /// The instant nearest to `time`, s, after or before it, at which a ball came into contact; of one joint or of any.
-    pub fn next_contact(&self, joint: Option<usize>, time: f64, forward: bool) -> Option<f64> {
-        let chosen = |index: &usize| joint.is_none_or(|joint| joint == *index);
-        let joints = (0..self.joints.len()).filter(chosen);
-        let found = joints.filter_map(|index| {
-            if forward {
-                self.touches(index, time, f64::INFINITY).find(|at| *at > time)
-            } else {
-                let states = &self.joints[index];
-                let end = states.partition_point(|(at, _)| *at < time);
-                let pairs = states[..end].windows(2).rev();
-                let touch =
-                    pairs.into_iter().find(|pair| pair[0].1 == ContactState::Free && pair[1].1 != ContactState::Free);
-                touch.map(|pair| pair[1].0)
-            }
-        });
-        if forward { found.min_by(f64::total_cmp) } else { found.max_by(f64::total_cmp) }
-    }
 }
 
 #[cfg(test)]
@@ -153,24 +134,18 @@ mod tests {
     }
 
     #[test]
-    fn touches_are_found_both_ways_and_a_second_time_changes_nothing() {
+    fn touches_are_found_and_a_second_time_changes_nothing() {
         let mut history = history();
         for _ in 0..2 {
             let touches: Vec<f64> = history.touches(0, 0.0, 9.0).collect();
             assert_eq!(touches, [2.0, 5.0]);
-            assert_eq!(history.next_contact(Some(0), 2.0, true), Some(5.0));
-            assert_eq!(history.next_contact(None, 0.5, true), Some(2.0));
-            assert_eq!(history.next_contact(None, 5.0, true), None);
-            assert_eq!(history.next_contact(None, 5.0, false), Some(2.0));
-            assert_eq!(history.next_contact(None, 5.1, false), Some(5.0));
-            assert_eq!(history.next_contact(None, 2.0, false), None);
             history.record(&frame(1.0, ContactState::Creep));
         }
         history.cut(2.5);
-        assert_eq!(history.next_contact(None, 2.0, true), None);
+        assert_eq!(history.touches(0, 2.1, 9.0).next(), None);
         history.record(&frame(3.0, ContactState::Free));
         history.record(&frame(4.0, ContactState::Creep));
-        assert_eq!(history.next_contact(None, 2.0, true), Some(4.0));
+        assert_eq!(history.touches(0, 2.1, 9.0).next(), Some(4.0));
     }
 
     #[test]

@@ -1,5 +1,5 @@
 use super::*;
-use crate::simulate::{ContactState, Quantity};
+use crate::simulate::Quantity;
 
 fn player(scene: &str) -> Player {
     let scene = Scene::load(scene, &[]).expect("built in");
@@ -557,40 +557,132 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
     assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
 }
 
-#[test]
-fn impacts_are_found_one_after_another() {
-    let mut player = player("spcmm");
-    player.run_to(60e-3);
-    player.go_to(0.0);
-    let mut times = Vec::new();
-    loop {
-        player.go_to_contact(None, true);
-        if player.is_seeking() {
-            break;
-        }
-        let states = player.frame().joints.iter().map(|joint| joint.state);
-        assert!(states.into_iter().any(|state| state != ContactState::Free));
-        times.push(player.pacer.shown());
+/// Ball joint, beginning and instant of the largest force of every impact of a run by itself up to `to`, s, in the order of these
+/// instants.
+fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
+    let mut alone = Simulation::new(player.scene()).expect("starts");
+    let (mut peaks, mut steps, mut impacts) = (Vec::new(), Vec::new(), Vec::new());
+    while alone.time() < to {
+        alone.step().expect("runs");
+        alone.take_peaks(&mut peaks);
+        steps.extend(peaks.iter().copied().enumerate());
+        alone.take_impacts(&mut impacts);
     }
-    assert!(times.len() >= 6 && times.is_sorted(), "{times:?}");
+    let top = |impact: &crate::simulate::Impact| {
+        let within =
+            |(joint, peak): &&(usize, Peak)| *joint == impact.joint && (impact.start..=impact.end).contains(&peak.time);
+        let (_, top) = steps.iter().filter(within).max_by(|a, b| a.1.normal.total_cmp(&b.1.normal)).expect("a force");
+        assert_eq!(top.normal, impact.peak);
+        (impact.joint, impact.start, top.time)
+    };
+    let mut tops: Vec<_> = impacts.iter().map(top).collect();
+    tops.sort_by(|a, b| a.2.total_cmp(&b.2));
+    tops
+}
+
+#[test]
+fn next_and_previous_impact_arrive_at_its_peak() {
+    let mut player = player("spcmm");
+    let tops = peaks_of_run(&player, 80e-3);
+    let known = 60e-3;
+    player.run_to(known);
+    player.go_to(0.0);
+    let reached = player.reached();
+    // Later ones are still under way.
+    let before: Vec<_> = tops.iter().filter(|top| top.2 <= reached - 10e-3).collect();
+    assert!(before.len() >= 6);
     // The first impact of the paper's mechanism.
-    assert!((times[0] - 7.8e-3).abs() < 0.1e-3, "{times:?}");
+    assert!((before[0].2 - 7.86e-3).abs() < 0.05e-3, "{before:?}");
+    for (joint, start, time) in &before {
+        player.go_to_impact(None, true);
+        assert!(!player.is_seeking());
+        assert_eq!(player.pacer.shown(), *time);
+        one_clock(&player);
+        let (_, impact) = player.impact_record().under_way(None, *time).expect("an impact");
+        assert_eq!((impact.joint, impact.start), (*joint, *start));
+        // The arrow of the picture is as long as the peak.
+        let force = player.frame().joints[*joint].normal_force.norm();
+        assert!((force / impact.top.force.norm() - 1.0).abs() < 1e-3, "{force} at {time}");
+    }
     // One that has not happened yet is run to, without looking at what lies between.
+    player.go_to(reached);
+    player.go_to_impact(None, true);
+    assert!(player.is_seeking());
     while player.is_seeking() {
         player.advance(1.0 / 60.0);
     }
-    let next = player.pacer.shown();
-    assert!(next > 60e-3 && !player.is_playing());
-    let history = player.contact_history();
-    assert_eq!(history.next_contact(None, 60e-3, true), Some(next));
+    let next = tops.iter().find(|top| top.2 > reached).expect("goes on");
+    assert_eq!(player.pacer.shown(), next.2);
+    assert!(!player.is_playing());
     one_clock(&player);
-    for time in times.iter().rev() {
-        player.go_to_contact(None, false);
+    player.go_to(before[before.len() - 1].2 + 1e-9);
+    for (_, _, time) in before.iter().rev() {
+        player.go_to_impact(None, false);
         assert_eq!(player.pacer.shown(), *time);
     }
-    player.go_to_contact(Some(1), true);
-    let of_one: Vec<f64> = player.contact_history().touches(1, 0.0, 1.0).collect();
-    assert_eq!(player.pacer.shown(), of_one[0]);
+    player.go_to_impact(None, false);
+    assert_eq!(player.pacer.shown(), 0.0);
+    player.go_to_impact(Some(1), true);
+    let of_one = tops.iter().find(|top| top.0 == 1).expect("hit");
+    assert_eq!(player.pacer.shown(), of_one.2);
+}
+
+#[test]
+fn an_impact_under_way_is_run_to_its_peak() {
+    let mut player = player("spcmm");
+    let tops = peaks_of_run(&player, 20e-3);
+    let first = tops[0];
+    // In the middle of its rise, seen from there and from the start.
+    let rising = 0.5 * (first.1 + first.2);
+    player.run_to(rising);
+    player.go_to_impact(Some(first.0), false);
+    assert_eq!(player.pacer.shown(), 0.0, "there is no peak yet");
+    for from in [0.0, rising] {
+        let mut player = self::player("spcmm");
+        player.run_to(rising);
+        player.go_to(from);
+        player.go_to_impact(Some(first.0), true);
+        while player.is_seeking() {
+            player.advance(1.0 / 60.0);
+        }
+        assert_eq!(player.pacer.shown(), first.2);
+    }
+    // Past the peak, but not past the impact.
+    let mut player = self::player("spcmm");
+    player.run_to(first.2 + 10e-6);
+    player.go_to_impact(Some(first.0), false);
+    assert_eq!(player.pacer.shown(), first.2);
+    // From another future, after a change in the middle of it.
+    player.set("contact.friction", "0.3").expect("in range");
+    player.go_to_impact(Some(first.0), true);
+    while player.is_seeking() {
+        player.advance(1.0 / 60.0);
+    }
+    let number = player.impact_record().under_way(Some(first.0), player.pacer.shown()).map(|(number, _)| number);
+    let before = tops.iter().filter(|top| top.2 < player.pacer.shown()).count() as u64;
+    assert!(number.is_some_and(|number| number > 1), "{number:?}, {before}");
+}
+
+#[test]
+fn a_run_without_further_impacts_is_not_sought_for_ever() {
+    let mut player = player("spcmm");
+    player.run_to(0.4);
+    let latest = player.impact_record().previous_peak(None, 0.4).expect("hit");
+    player.go_to_impact(None, true);
+    let mut frames = 0;
+    while player.is_seeking() {
+        player.advance(1.0 / 60.0);
+        frames += 1;
+        assert!(frames < 20_000);
+    }
+    let shown = player.pacer.shown();
+    assert!(shown >= 5.4 - 1e-9 || player.impact_record().next_peak(None, latest, true).is_some(), "{shown}");
+    one_clock(&player);
+    // The balls rest on their walls: their last impacts go on.
+    let (_, resting) = player.impact_record().under_way(None, shown).expect("in contact");
+    assert!(resting.finished().is_none() && resting.top.time < 0.1);
+    player.go_to_impact(None, false);
+    assert_eq!(player.pacer.shown(), latest);
 }
 
 #[test]

@@ -13,18 +13,17 @@ use crate::simulate::{Bin, History, Pull};
 /// Most steps retaken before a past instant, so that the plots show in detail what led to it.
 const LEAD: u64 = 512;
 
-/// How long after its beginning the end of the impact that is sought is waited for, s.
-const LONGEST_IMPACT: f64 = 10e-3;
-
-/// How far ahead the next contact is sought, s.
+/// How far ahead the next impact is sought, s.
 const FARTHEST: f64 = 5.0;
 
-/// A contact that the run is heading for.
+/// An impact that the run is heading for.
 #[derive(Clone, Copy)]
-pub(super) struct ContactSearch {
+pub(super) struct ImpactSearch {
     /// In this ball joint, or in any.
     joint: Option<usize>,
-    /// Time at which the search is given up, s.
+    /// Its peak comes after this instant, s.
+    from: f64,
+    /// Time at which the search ends, s.
     until: f64,
 }
 
@@ -85,14 +84,9 @@ impl Player {
         &self.contact_history
     }
 
-    /// The finished impacts of the run.
+    /// The impacts of the run.
     pub fn impact_record(&self) -> &ImpactRecord {
         &self.impact_record
-    }
-
-    /// Whether the impact that began at `time`, s, has ended, or lasts so long that its end is not waited for.
-    fn is_impact_over(&self, joint: Option<usize>, time: f64) -> bool {
-        self.simulation.time() > time + LONGEST_IMPACT || self.impact_record.under_way(joint, time).is_some()
     }
 
     /// What was done to the run, its future included; of a pull only the beginning and the end.
@@ -148,39 +142,40 @@ impl Player {
         self.travel(time);
     }
 
-    /// Goes to the next or previous instant at which the ball of joint `joint` (of any joint) came into contact, or to the
-    /// start. If the next one has not happened yet, the run continues to it, frame by frame.
-    pub fn go_to_contact(&mut self, joint: Option<usize>, forward: bool) {
+    /// Goes to the peak of the next impact of ball joint `joint` (of any joint), or of the one before, or to the start. If that peak
+    /// is not known yet, the run continues to it, frame by frame.
+    pub fn go_to_impact(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();
-        let found = self.contact_history.next_contact(joint, shown, forward);
+        if !forward {
+            let found = self.impact_record.previous_peak(joint, shown);
+            return self.go_to(found.unwrap_or(0.0));
+        }
+        let found = self.impact_record.next_peak(joint, shown, false);
         match found.filter(|time| *time <= self.reached) {
             Some(time) => self.go_to(time),
-            None if !forward => self.go_to(0.0),
             None => {
                 self.go_to(self.reached);
                 let until = self.reached + FARTHEST;
-                self.sought = Some(ContactSearch { joint, until });
+                self.sought = Some(ImpactSearch { joint, from: shown, until });
             }
         }
     }
 
-    /// Whether the run is heading for the next contact.
+    /// Whether the run is heading for the next impact.
     pub fn is_seeking(&self) -> bool {
         self.sought.is_some()
     }
 
-    /// Continues towards the sought contact within the budget of a frame.
-    pub(super) fn seek(&mut self, sought: ContactSearch) {
+    /// Continues towards the sought impact within the budget of a frame.
+    pub(super) fn seek(&mut self, sought: ImpactSearch) {
         self.go_on();
-        let from = self.pacer.shown();
         let start = (self.clock)();
         let found = loop {
-            let found = self.contact_history.next_contact(sought.joint, from, true);
             let over = self.simulation.time() > sought.until || self.stopped.is_some();
             // Its numbers are shown with it, so it has to be over.
-            let found = found.filter(|time| over || self.is_impact_over(sought.joint, *time));
+            let found = self.impact_record.next_peak(sought.joint, sought.from, over);
             if found.is_some() || over || !self.pacer.may_step((self.clock)() - start) {
-                break found.map_or(over.then_some(f64::INFINITY), Some);
+                break found.or(over.then_some(f64::INFINITY));
             }
             self.step();
             self.record_until(self.simulation.time());
@@ -373,8 +368,7 @@ impl Player {
             self.history.rewind(mark);
         }
         self.contact_history.cut(start);
-        self.blows.cut(start);
-        self.impact_record.cut(start_steps);
+        self.impact_record.cut(start, start_steps);
         self.watch.cut(start);
         self.keyframes.cut(start_steps);
         self.near = None;
@@ -420,8 +414,6 @@ impl Player {
         self.left = None;
         self.sought = None;
         self.contact_history.begin(0.0);
-        self.blows.clear();
-        self.impact_record.begin();
         self.event_times.clear();
         (self.applied, self.most_steps) = (0, 0);
         (self.reached, self.recorded_to) = (0.0, 0.0);
