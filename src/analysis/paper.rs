@@ -240,7 +240,7 @@ pub enum Shows {
     Exponents(Series),
     /// A grid over clearance and friction.
     Map,
-    /// Probe error against clearance.
+    /// Tip error against clearance.
     Probe,
 }
 

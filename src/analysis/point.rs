@@ -7,7 +7,7 @@ use super::section::{Schedule, SectionRun};
 use crate::scene::{Scene, Solver, Value};
 use crate::simulate::{Effect, Peak};
 
-/// Largest number of samples per period for the means and the probe error.
+/// Largest number of samples per period for the means and the tip error.
 const SAMPLES: f64 = 400.0;
 /// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: at a tolerance of 1e-6 10 nm
 /// in a machine with balls of 10 mm. So small that the two part only where one grazes, and well above what two runs differ by that
@@ -283,7 +283,7 @@ struct Means {
     /// Integral of the normal force per ball joint, N s, and its value at the latest sample.
     normal: Vec<f64>,
     normal_now: Vec<f64>,
-    /// Integral of the squared probe error, m^2 s, and its magnitude at the latest sample.
+    /// Integral of the squared tip error, m^2 s, and its magnitude at the latest sample.
     probe_square: f64,
     probe_now: Option<f64>,
     probe_largest: f64,

@@ -90,7 +90,7 @@ pub struct SweptPoint {
     pub sections: Vec<[f64; COORDINATES]>,
     /// Largest normal force in any joint over the kept periods, N.
     pub peak: Option<f64>,
-    /// Largest and root-mean-square error of the probe over the kept periods, m.
+    /// Largest and root-mean-square tip error over the kept periods, m.
     pub probe: Option<(f64, f64)>,
     /// Reasons not to trust it: bit k for one of the kind k of [`crate::simulate::Doubt::KINDS`].
     pub doubts: u32,

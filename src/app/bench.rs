@@ -68,6 +68,14 @@ impl Bench {
         self.sweep.diagram().place(index, section)
     }
 
+    /// The distance of the twin run alone, if there is one.
+    pub(super) fn twin_ui(ui: &mut Ui, player: &Player) {
+        if let Some(twin) = player.twin() {
+            let title = ui.text_style_height(&eframe::egui::TextStyle::Small) + 2.0 * ui.spacing().item_spacing.y;
+            divergence::distance(ui, player, twin, ui.available_height() - title);
+        }
+    }
+
     /// The whole bench; returns what was asked of the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
         ui.horizontal_wrapped(|ui| {

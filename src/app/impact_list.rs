@@ -214,8 +214,10 @@ impl App {
         }
         let shown = player.pacer.shown();
         let record = player.impact_record();
-        let followed = self.viewport.focus().and_then(|joint| record.under_way(Some(joint), shown));
-        let (number, own) = followed.or_else(|| record.under_way(None, shown))?;
+        // Of the ball joint that is followed, as long as that touches.
+        let touches =
+            |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactState::Free);
+        let (number, own) = record.under_way(self.viewport.focus().filter(touches), shown)?;
         let report = player.frame().joints.get(own.joint)?;
         let begins = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
         let peak = value::quantity(own.top.force.norm(), "N", 3);

@@ -340,8 +340,11 @@ impl App {
         let begin = if anew { lesson.beginning(last) } else { last };
         for step in &lesson.steps[begin..=last] {
             if !step.begins && step.link != super::Link::default() {
+                // The view stays with its ball joint.
+                let followed = self.viewport.followed().filter(|_| step.link.camera.is_none());
                 self.set_look(&step.link);
                 self.show_link(step.link.clone());
+                self.viewport.follow(followed);
             }
         }
         // The camera is where the latest of them wants it.
@@ -404,7 +407,7 @@ impl App {
             (course.reached, course.fresh) = (true, true);
             if self.player.is_playing() {
                 self.player.go_to(until);
-                self.viewport.arrive(&self.player);
+                self.viewport.revisit(&self.player);
             }
             ctx.request_repaint();
         }
@@ -415,8 +418,7 @@ impl App {
         let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
         let joints = &self.player.scene().ball_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
-        let labels: Vec<String> = wanted.iter().filter(|name| joint(name).is_none()).cloned().collect();
-        let places = Spots::places(ui.ctx(), &labels);
+        let places = Spots::places(ui.ctx(), &self.pointed_controls());
         let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
         let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("rings"));
         let painter = ui.ctx().layer_painter(layer);
@@ -434,13 +436,14 @@ impl App {
 
     /// Whether all that the step points at is in sight.
     pub fn points_out(&self, ctx: &egui::Context) -> bool {
-        let Some(course) = self.course() else {
-            return true;
-        };
-        let wanted = &course.now().highlight;
-        let joints = &self.player.scene().ball_joints;
-        let is_joint = |name: &&String| joints.iter().any(|joint| joint.name == **name);
-        let labels: Vec<String> = wanted.iter().filter(|name| !is_joint(name)).cloned().collect();
+        let labels = self.pointed_controls();
         Spots::places(ctx, &labels).len() == labels.len()
+    }
+
+    /// Names of the controls that the step points at.
+    fn pointed_controls(&self) -> Vec<String> {
+        let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
+        let joints = &self.player.scene().ball_joints;
+        wanted.iter().filter(|name| joints.iter().all(|joint| joint.name != **name)).cloned().collect()
     }
 }

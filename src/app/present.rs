@@ -168,6 +168,7 @@ impl App {
             .inner;
         self.lesson_beside(ui, bar);
         self.presented_plots(ui, bar);
+        self.lesson_twin(ui, bar);
         self.central(ui, asked);
         if leave {
             self.present(ui.ctx(), false);
@@ -229,18 +230,19 @@ impl App {
             return None;
         }
         let text = self.impact_badge().or_else(|| self.last_impact().filter(|_| presenting))?;
-        let lay = |size| {
-            let font = FontId::proportional(size);
-            ui.painter().layout_no_wrap(text.clone(), font, ink)
-        };
         let mut inside = area.shrink(12.0);
         if !presenting {
             // Below the buttons and the time.
             inside.min.y += overlay::plate(2)[1].max(ui.spacing().interact_size.y + 8.0);
         }
         let full = if presenting { CAPTION } else { BADGE };
-        let mut words = lay(full);
         let room = inside.width() - 2.0 * PAD.x;
+        let lay = |size: f32| {
+            // What is too long even in the smallest type has a second line.
+            let width = if size > SMALLEST { f32::INFINITY } else { room };
+            ui.painter().layout(text.clone(), FontId::proportional(size), ink, width)
+        };
+        let mut words = lay(full);
         if words.size().x > room {
             words = lay((full * room / words.size().x).max(SMALLEST));
         }

@@ -193,7 +193,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     begun.describe(&mut facts, &mut text);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
-        summary::line(&mut text, "No probe error", &format!("the ideal mechanism {fault}"));
+        summary::line(&mut text, "No tip error", &format!("the ideal mechanism {fault}"));
     }
     facts.insert("probe_fault".into(), json!(fault.map(|fault| fault.to_string())));
     facts.insert("rows".into(), json!(table.len()));

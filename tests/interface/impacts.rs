@@ -190,3 +190,27 @@ fn the_plots_on_show_are_saved_as_page_drawing_and_picture() {
         }
     }
 }
+
+#[test]
+fn played_backwards_the_picture_marks_the_peaks_that_came_before() {
+    let mut harness = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    harness.state_mut().player_mut().run_to(30e-3);
+    harness.state_mut().player_mut().pacer.set_scale(0.005);
+    harness.run();
+    let peaks = peaks_of_run(harness.state(), 31e-3);
+    harness.key_press(Key::J);
+    harness.step();
+    let mut marked = std::collections::BTreeSet::new();
+    while shown(&harness) > 7e-3 {
+        let now = shown(&harness);
+        for (joint, force, age) in harness.state().peak_marks() {
+            let own = |(impact, peak): &&(Impact, f64)| impact.joint == joint && (peak - (now - age)).abs() < 1e-9;
+            let (impact, peak) = peaks.iter().find(own).unwrap_or_else(|| panic!("none at {} s", now - age));
+            assert!(*peak <= now && near(f64::from(force), impact.peak), "{force} N at {now} s");
+            marked.insert((joint, impact.start.to_bits()));
+        }
+        harness.step();
+        assert!(harness.state().player().is_playing_backwards());
+    }
+    assert!(marked.len() > 6, "{}", marked.len());
+}

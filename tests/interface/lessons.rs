@@ -14,7 +14,7 @@ use crate::page;
 use crate::window::sized;
 
 const WIDE: [f32; 2] = [1280.0, 720.0];
-const PHONE: [f32; 2] = [390.0, 844.0];
+pub const PHONE: [f32; 2] = [390.0, 844.0];
 
 /// Time between two frames, s, as long as one may be that is caught up with: a lesson is long.
 const DT: f32 = 0.25;
@@ -23,7 +23,7 @@ const DT: f32 = 0.25;
 const FRAMES: usize = 4000;
 
 /// The window in a lesson, set for step `step`, counted from 0.
-fn taught(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
+pub fn taught(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
     let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{error}"));
     in_lesson(lesson, step, size)
 }
@@ -67,13 +67,13 @@ fn step(harness: &Harness<'_, App>) -> usize {
     harness.state().course().expect("a lesson").step()
 }
 
-fn press(harness: &mut Harness<'_, App>, key: Key) {
+pub fn press(harness: &mut Harness<'_, App>, key: Key) {
     harness.key_press(key);
     settle(harness);
 }
 
 /// Plays to the end of the step, if it has one, and says whether.
-fn play(harness: &mut Harness<'_, App>) -> bool {
+pub fn play(harness: &mut Harness<'_, App>) -> bool {
     let Some(until) = harness.state().course().expect("a lesson").until() else {
         return false;
     };
@@ -92,7 +92,7 @@ fn play(harness: &mut Harness<'_, App>) -> bool {
 }
 
 /// The labels on show that say so.
-fn says(harness: &Harness<'_, App>, words: &str) -> bool {
+pub fn says(harness: &Harness<'_, App>, words: &str) -> bool {
     harness.query_all_by_label_contains(words).next().is_some()
 }
 
@@ -346,7 +346,7 @@ fn a_scene_that_was_opened_during_a_lesson_stays_when_that_ends() {
 }
 
 /// Presses F5, and gives the window the points that are left at its new zoom.
-fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
+pub fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
     harness.key_press(Key::F5);
     harness.step();
     let zoom = harness.ctx.zoom_factor();

@@ -5,6 +5,7 @@
 mod common;
 
 mod bench_window;
+mod claims;
 mod clicks;
 mod compare;
 mod desktop;

@@ -35,7 +35,7 @@ pub const COLUMNS: [Column; 15] = [
     column("S3_normal_N", "contact force", "N", 1.0),
     column("x_deviation_m", "x less ideal", "mm", 1e-3),
     column("beta_deviation_rad", "beta less ideal", "mrad", 1e-3),
-    column("probe_error_m", "probe error", "µm", 1e-6),
+    column("probe_error_m", "tip error", "µm", 1e-6),
     column("constraint_drift", "largest violation so far", "", 1.0),
     column("sample", "at the paper's output step", "", 1.0),
 ];

@@ -8,6 +8,7 @@ use super::portrait::title;
 use crate::app::curve::Path;
 use crate::app::layout::reserved;
 use crate::app::player::Player;
+use crate::app::twin::Twin;
 use crate::app::{plots, theme, value};
 
 const HEIGHT: f32 = 170.0;
@@ -40,6 +41,29 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
     let Some(twin) = player.twin() else {
         return;
     };
+    distance(ui, player, twin, HEIGHT);
+    let exponent = match twin.exponent() {
+        Ok(exponent) => {
+            let [value, error] = [exponent.value, 2.0 * exponent.standard_error].map(|x| value::number(x, 3));
+            format!("Exponent {value} ± {error} 1/s")
+        }
+        Err((more, interval)) => format!("Exponent — 1/s, known in {} s", value::number(more as f64 * interval, 3)),
+    };
+    ui.label(exponent).on_hover_text(
+        "Largest Lyapunov exponent of the run since the twin began, ± two standard errors: the mean rate at which the distance of \
+         a neighbouring motion grows, which is brought back again and again, as in a sweep. Above 0 the motion is chaotic, below \
+         0 neighbours approach. The first impacts alone tell nothing of it, so it takes 25 periods of what drives the machine, of \
+         0.1 s where nothing does",
+    );
+    reserved(ui, "twin says", 2, |ui| {
+        if let Some(why) = twin.ended() {
+            theme::warning(ui, format!("The twin run {why}"));
+        }
+    });
+}
+
+/// The plot of its distance, `height` points high.
+pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
     let dark = ui.visuals().dark_mode;
     // The twin has reached the end of the latest step; the displayed instant lies within it.
     let shown = player.pacer.shown();
@@ -59,7 +83,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
     let points: Vec<PlotPoint> =
         distances.iter().map(|[time, distance]| PlotPoint::new(time / size, distance.log10())).collect();
     let ink = ui.visuals().weak_text_color();
-    plane(ui, "divergence", &across, &up, HEIGHT)
+    plane(ui, "divergence", &across, &up, height)
         .y_grid_spacer(|input| decades(input.bounds))
         .custom_y_axes(vec![
             egui_plot::AxisHints::new_y()
@@ -71,24 +95,6 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         .show(ui, |plot| {
             plot.add(Path::line("Distance", &points, theme::series(5, dark), 1.4));
         });
-    let exponent = match twin.exponent() {
-        Ok(exponent) => {
-            let [value, error] = [exponent.value, 2.0 * exponent.standard_error].map(|x| value::number(x, 3));
-            format!("Exponent {value} ± {error} 1/s")
-        }
-        Err((more, interval)) => format!("Exponent — 1/s, known in {} s", value::number(more as f64 * interval, 3)),
-    };
-    ui.label(exponent).on_hover_text(
-        "Largest Lyapunov exponent of the run since the twin began, ± two standard errors: the mean rate at which the distance of \
-         a neighbouring motion grows, which is brought back again and again, as in a sweep. Above 0 the motion is chaotic, below \
-         0 neighbours approach. The first impacts alone tell nothing of it, so it takes 25 periods of what drives the machine, of \
-         0.1 s where nothing does",
-    );
-    reserved(ui, "twin says", 2, |ui| {
-        if let Some(why) = twin.ended() {
-            theme::warning(ui, format!("The twin run {why}"));
-        }
-    });
 }
 
 /// Marks at whole powers of ten, spaced so that there are few.

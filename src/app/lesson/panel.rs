@@ -1,12 +1,15 @@
 //! The panel of a lesson: its text, its question, and the buttons that turn its pages.
 
 use eframe::egui::{
-    self, Button, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui, text::LayoutJob,
+    self, Button, FontFamily, Layout, Panel, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui,
+    text::LayoutJob,
 };
 
 use super::names::Names;
+use super::spots::Spots;
 use super::text::{self, Block, Face};
 use super::{Course, lesson_titles};
+use crate::app::bench::Bench;
 use crate::app::{App, layout, theme};
 
 /// Height of a choice where only the mouse reaches it, points.
@@ -34,6 +37,7 @@ impl App {
 
     /// The whole panel.
     pub(in crate::app) fn lesson_ui(&mut self, ui: &mut Ui) {
+        let elsewhere = self.only_in_window(ui.ctx());
         let Some(course) = &mut self.course else {
             return;
         };
@@ -54,7 +58,11 @@ impl App {
                             ui.spacing_mut().interact_size.y = LOW;
                             ui.spacing_mut().icon_width = LOW - 8.0;
                         }
-                        course.page(ui, own)
+                        let set = course.page(ui, own);
+                        if let Some(elsewhere) = &elsewhere {
+                            ui.label(RichText::new(elsewhere).weak());
+                        }
+                        set
                     });
                     if set.inner { Asked::Set } else { asked }
                 })
@@ -67,6 +75,31 @@ impl App {
             Asked::Set => self.set_step(),
             Asked::Leave => self.leave_lesson(),
         }
+    }
+}
+
+impl App {
+    /// The distance of the twin under the picture of a presentation, where the lesson speaks of the bench.
+    pub(in crate::app) fn lesson_twin(&mut self, ui: &mut Ui, bar: egui::Frame) {
+        if self.course().is_none() || !self.show_bench || self.player.twin().is_none() {
+            return;
+        }
+        let height = 0.42 * ui.available_height();
+        Panel::bottom("twin of the lesson")
+            .frame(bar)
+            .resizable(false)
+            .exact_size(height)
+            .show(ui, |ui| Bench::twin_ui(ui, &self.player));
+    }
+
+    /// What the step points at but the presentation does not show.
+    fn only_in_window(&self, ctx: &egui::Context) -> Option<String> {
+        self.presentation.as_ref()?;
+        let labels = self.pointed_controls();
+        let places = Spots::places(ctx, &labels);
+        let missing: Vec<String> =
+            labels.into_iter().filter(|name| places.iter().all(|(own, _)| own != name)).collect();
+        (!missing.is_empty()).then(|| format!("In the window (F5): {}", missing.join(", ")))
     }
 }
 

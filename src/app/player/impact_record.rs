@@ -197,12 +197,16 @@ impl ImpactRecord {
         begun.filter_map(RecordedImpact::finished)
     }
 
-    /// The impact under way at `time`, s, once its peak is known: of ball joint `joint`, or of any; of several the one that has its
+    /// The impact under way at `time`, s, once its peak is known, but no ball that rests: of ball joint `joint`, or of any; of several the one that has its
     /// peak then, or else the one that began last.
     pub fn under_way(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {
         let touching = || {
             let own = self.numbered().rev().filter(move |(_, impact)| is_of(joint, impact));
-            own.filter(move |(_, impact)| impact.begun(time) && impact.end >= time && !self.is_open(impact))
+            let touches = move |impact: &RecordedImpact| match impact.end {
+                end if end.is_infinite() => time <= impact.start + LONGEST_IMPACT,
+                end => time <= end,
+            };
+            own.filter(move |(_, impact)| impact.begun(time) && touches(impact) && !self.is_open(impact))
         };
         touching().find(|(_, impact)| impact.top.time == time).or_else(|| touching().next())
     }
@@ -359,7 +363,8 @@ mod tests {
             record.record_joint(0, &peak(k, if k == 30 { 9.0 } else { 4.0 }, None), None);
         }
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
-        let (_, lasting) = record.under_way(None, 35e-3).expect("it touches");
+        assert!(record.under_way(None, 35e-3).is_none(), "it rests");
+        let (_, lasting) = record.under_way(None, 9e-3).expect("it touches");
         assert!(lasting.finished().is_none() && lasting.top.force.x == 8.0);
         (record.steps, record.latest_step) = (40, [39e-3, 40e-3]);
         let impact = Impact { start: 1e-3, end: 40e-3, peak: 9.0, ..Impact::default() };

@@ -37,7 +37,7 @@ pub enum NoRow {
 }
 
 impl Table {
-    /// An empty table with the columns of `scene`; `first` shows whether it has a probe error and a ledger.
+    /// An empty table with the columns of `scene`; `first` shows whether it has a tip error and a ledger.
     pub fn new(scene: &Scene, first: &Frame) -> Self {
         Self::of_columns(run_columns(scene, first))
     }
@@ -125,7 +125,7 @@ impl Table {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
                 return Err(NoRow::NotFinite { column: column.clone(), value, time: frame.time });
             }
-            // After the ideal mechanism has come to its end there is no probe error.
+            // After the ideal mechanism has come to its end there is no tip error.
             self.values.push(value.unwrap_or(f64::NAN));
         }
         Ok(self.rows.push(&self.values)?)

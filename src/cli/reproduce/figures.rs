@@ -321,7 +321,7 @@ fn map(found: &Findings) -> Vec<Chart> {
     vec![
         heat("Regime", regimes.clone(), Axis::default(), names.collect()),
         size("Peak contact force of any joint", hardest.collect(), axis("", "N")),
-        size("Largest probe error, settled", data.values("probe_error_max_um"), axis("", "µm")),
+        size("Largest tip error, settled", data.values("probe_error_max_um"), axis("", "µm")),
         size("Time in which a disturbance falls to 1/e", memory.collect(), logarithmic("", "s")),
     ]
 }

@@ -153,7 +153,7 @@ impl Channels {
 }
 
 /// Columns of the rows of `run` in order, each with its name and where it is read; `first` shows whether the scene has a
-/// probe error and a ledger, and what its elements report.
+/// tip error and a ledger, and what its elements report.
 pub fn run_columns(scene: &Scene, first: &Frame) -> (Vec<String>, Vec<Reading>) {
     let (mut names, mut readings) = (Vec::new(), Vec::new());
     let in_run = |signal: &Signal| signal.run;
