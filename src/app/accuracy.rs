@@ -276,7 +276,7 @@ fn capacity(player: &Player) -> AccuracyLine {
 
 /// The latest impact: where it was, how finely it was resolved, and its restitution.
 fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
-    let impact = player.impact_record().latest(None, player.pacer.shown()).next();
+    let impact = player.impact_record().last_ended(player.pacer.shown(), f64::INFINITY);
     let row = |label, value: Option<String>, doubtful, help: String| AccuracyLine {
         label,
         value: value.unwrap_or_else(|| NONE.to_owned()),

@@ -214,7 +214,7 @@ impl App {
     pub fn last_impact(&self) -> Option<String> {
         let player = &self.player;
         let shown = player.pacer.shown();
-        let impact = player.impact_record().latest(None, shown).find(|impact| impact.end <= shown)?;
+        let impact = player.impact_record().last_ended(shown, shown)?;
         let name = &player.scene().ball_joints[impact.joint].name;
         let force = value::quantity(impact.peak, "N", 3);
         let lasted = (impact.end - impact.start) * 1e3;

@@ -12,6 +12,9 @@ const KEPT: usize = 20_000;
 /// on its wall, the peak is that of this time.
 pub const LONGEST_IMPACT: f64 = 10e-3;
 
+/// Among so many of the latest impacts the last to end is sought.
+const RECENT: usize = 64;
+
 /// Instants of a record and of an impact differ by this, relative.
 const ROUNDING: f64 = 1e-12;
 
@@ -195,6 +198,12 @@ impl ImpactRecord {
     pub fn latest(&self, joint: Option<usize>, time: f64) -> impl Iterator<Item = &Impact> {
         let begun = self.all.iter().rev().filter(move |impact| impact.begun(time) && is_of(joint, impact));
         begun.filter_map(RecordedImpact::finished)
+    }
+
+    /// Of the latest impacts that had begun by `time`, s, the one that ended last, but not after `end`, s.
+    pub fn last_ended(&self, time: f64, end: f64) -> Option<&Impact> {
+        let ended = self.latest(None, time).filter(|impact| impact.end <= end);
+        ended.take(RECENT).max_by(|a, b| a.end.total_cmp(&b.end))
     }
 
     /// The impact under way at `time`, s, once its peak is known, but no ball that rests: of ball joint `joint`, or of any; of several the one that has its
