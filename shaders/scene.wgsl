@@ -271,8 +271,9 @@ fn mark(in: Surface) -> vec3<f32> {
 // Halo of a joint that was hit: a ring outside its socket, which hides nothing of the contact.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), towards_eye(in.world)), 0.0);
-    // The socket's outline lies where this sphere, of 1.7 times its radius, has `facing` = 0.81.
-    let ring = smoothstep(0.1, 0.65, facing) * (1.0 - smoothstep(0.7, 0.79, facing));
+    // `facing` in units of what it is on the outline of the socket, whose radius is `surface.y` times that of this sphere.
+    let out = facing / sqrt(1.0 - in.surface.y * in.surface.y);
+    let ring = smoothstep(0.12, 0.8, out) * (1.0 - smoothstep(0.865, 0.975, out));
     return given(in.colour.rgb, in.clip, 0.85 * in.colour.a * ring);
 }
 

@@ -82,7 +82,7 @@ impl App {
         picture.title = Some(format!("before: {}", kept.name()));
         viewport.title = Some(format!("now: {}", kept.named_in(player)));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
-        picture.ui(&mut place, kept.run(), plain, None);
+        picture.ui(&mut place, kept.run(), plain, &[]);
         viewport.look_as(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {

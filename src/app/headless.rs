@@ -6,6 +6,7 @@ use eframe::egui_wgpu::{self, RenderState, RendererOptions, WgpuConfiguration, W
 use std::sync::Arc;
 
 use super::canvas::Canvas;
+use super::labels::Places;
 use super::overlay::{self, Overlay};
 use super::{App, AppOptions, theme};
 use crate::render::{self, Image, NoAdapter, RenderError, wgpu};
@@ -15,6 +16,8 @@ use crate::view::{DrawList, Theme};
 /// An egui context and a device without a window.
 pub struct Headless {
     canvas: Canvas,
+    /// Where the labels of the latest picture stand: those of the next stay there.
+    places: Places,
 }
 
 impl Headless {
@@ -31,7 +34,7 @@ impl Headless {
             log::info!("no graphics adapter: {error}");
             NoAdapter
         })?;
-        Ok(Self { canvas: Canvas::new(state) })
+        Ok(Self { canvas: Canvas::new(state), places: Places::default() })
     }
 
     /// Name of the adapter.
@@ -83,7 +86,7 @@ impl Headless {
             let rect = ui.max_rect();
             let painter = ui.painter_at(rect);
             painter.add(render::Viewport::shape(rect, list.clone()));
-            overlay::paint(&painter, rect, scale, list, theme, overlay, None);
+            overlay::paint(&painter, rect, scale, list, theme, overlay, &[], &mut self.places);
         })?;
         self.canvas.paint(output, list.size, scale).wait()
     }

@@ -14,6 +14,9 @@ const SLIM: f32 = 250.0;
 /// Width of the panel of a lesson beside the picture, points.
 const LESSON: f32 = 340.0;
 
+/// Where the height of the messages is kept.
+const MESSAGES: &str = "height of the messages";
+
 /// Arrangement of the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Arrangement {
@@ -451,9 +454,27 @@ impl App {
         let presenting = self.is_presenting() || self.embedded().is_some();
         self.player.place_ghost();
         let caption = self.caption_plate(ui, self.is_presenting());
-        let above = caption.as_ref().map(|(_, plate)| *plate);
+        let mut above: Vec<_> = caption.iter().map(|(_, plate)| *plate).collect();
+        let inner = area.shrink(10.0);
+        let narrow = area.width() < 520.0;
+        let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
+        // Beside the microscope of a phone the time needs all of the upper edge.
+        let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
+        if !plain && !presenting {
+            let names = ["View options", "Isometric", "Front", "Side", "Top", "Fit"];
+            let buttons = names[..if narrow { 1 } else { names.len() }].iter().map(|name| {
+                let font = egui::TextStyle::Button.resolve(ui.style());
+                let words = ui.painter().layout_no_wrap((*name).to_owned(), font, egui::Color32::BLACK);
+                words.size().x + 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x
+            });
+            let size = egui::vec2(buttons.sum(), row.y);
+            above.push(edge.align_size_within_rect(size, inner));
+        }
+        if !plain && self.has_messages() {
+            above.push(inner.with_min_y(self.messages_place(ui, inner).top()));
+        }
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
-        self.viewport.ui(&mut place, &self.player, plain, above);
+        self.viewport.ui(&mut place, &self.player, plain, &above);
         ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.viewport.take_clicked() {
             self.focus(joint);
@@ -470,11 +491,6 @@ impl App {
             // A saved picture has no buttons in it.
             return false;
         }
-        let inner = area.shrink(10.0);
-        let narrow = area.width() < 520.0;
-        let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
-        // Beside the microscope of a phone the time needs all of the upper edge.
-        let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let buttons = egui::UiBuilder::new().max_rect(edge.align_size_within_rect(row, inner)).layout(backwards);
         ui.scope_builder(buttons, |ui| {
@@ -503,10 +519,18 @@ impl App {
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player)).inner
     }
 
+    /// Where the messages over the lower edge of `area` are.
+    fn messages_place(&self, ui: &Ui, area: egui::Rect) -> egui::Rect {
+        // As high as in the frame before; at first a line with a button.
+        let height = ui.data(|data| data.get_temp(Id::unique(MESSAGES)));
+        let height = height.unwrap_or(ui.spacing().interact_size.y + 16.0);
+        Align2::CENTER_BOTTOM.align_size_within_rect(egui::vec2(area.width().min(640.0), height), area)
+    }
+
     /// Messages over the lower edge of the picture: they come and go by themselves, and move nothing. Returns the part of
     /// `area` left free.
     fn messages(&mut self, ui: &mut Ui, area: egui::Rect) -> egui::Rect {
-        let id = Id::unique("height of the messages");
+        let id = Id::unique(MESSAGES);
         if !self.has_messages() {
             ui.data_mut(|data| data.remove_temp::<f32>(id));
             return area;
@@ -520,10 +544,7 @@ impl App {
         } else {
             (area.height() - row - 8.0).max(60.0)
         };
-        // As high as in the frame before; at first a line with a button.
-        let height = ui.data(|data| data.get_temp(id)).unwrap_or(row + 16.0);
-        let size = egui::vec2(area.width().min(640.0), height);
-        let place = Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
+        let place = self.messages_place(ui, area);
         let shown = ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
             ScrollArea::vertical()
                 .id_salt("messages")
@@ -532,7 +553,7 @@ impl App {
                 .show(ui, |ui| self.strips(ui));
         });
         let now = shown.response.rect.height();
-        if now != height {
+        if now != place.height() {
             ui.data_mut(|data| data.insert_temp(id, now));
             ui.ctx().request_repaint();
         }

@@ -1,12 +1,14 @@
 //! What the interface paints over a picture: labels, the legend of the arrows, the time. Used by the viewport and
 //! by headless frames.
 
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
+use eframe::egui::epaint::RectShape;
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
+use super::labels::{self, Places};
 use super::value;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};
-use crate::view::{Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme, WearMap, WearScale};
+use crate::view::{ARROW_LENGTH, Colour, DrawList, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
@@ -35,6 +37,9 @@ pub(super) fn text(
     painter.text(at, anchor, text, font, ink)
 }
 
+/// Longest axis of the legend, as a share of the picture's width.
+const LONGEST_AXIS: f32 = 0.4;
+
 /// Least edge of a picture that has room for more than the time, points.
 pub(super) const SMALL: f32 = 200.0;
 
@@ -42,30 +47,6 @@ pub(super) const SMALL: f32 = 200.0;
 pub fn has_room(rect: Rect) -> bool {
     rect.size().min_elem() >= SMALL
 }
-
-/// Plates in a picture beyond which further ones are left out, names without room after which no more are tried, and how far
-/// one gives way to others, points: further away it would seem to belong to something else.
-const MOST_PLATES: usize = 256;
-const MOST_MISSED: usize = 256;
-const FURTHEST: f32 = 72.0;
-/// Distance of a plate from what it names beyond which a line leads there, points.
-const LED: f32 = 14.0;
-
-/// A place for a plate of `size` that is `anchor`ed `beside` a point, over none of `plates` and in `rect`: there, on another side
-/// of the point, or above and below, the nearest first.
-fn clear_of(plates: &[Rect], rect: Rect, at: Pos2, (anchor, beside): (Align2, Vec2), size: Vec2) -> Option<Rect> {
-    let first = anchor.anchor_size(at + beside, size).expand2(PAD);
-    let mirrored = first.translate(vec2(2.0 * (at.x - first.center().x), 0.0));
-    let row = first.height() + 1.0;
-    let rows = (FURTHEST / row) as i32;
-    let steps = (0..=rows).flat_map(|k| [-k, k].into_iter().skip(usize::from(k == 0)));
-    let places = steps.flat_map(|k| [first, mirrored].map(|p| p.translate(vec2(0.0, k as f32 * row))));
-    let free = |place: &Rect| !plates.iter().any(|plate| plate.intersects(*place));
-    places.filter(|place| rect.contains_rect(*place)).find(free)
-}
-
-/// Room about the words of a plate, points.
-const PAD: Vec2 = vec2(4.0, 1.0);
 
 /// What is written over a picture.
 #[derive(Clone, Debug, Default)]
@@ -81,7 +62,8 @@ pub struct Overlay {
 }
 
 /// Writes over the picture of `list` in `rect`; `scale` is pixels per point. Names keep clear of the rest and of what is painted
-/// `above` all this.
+/// `above` all this, and stay at the `places` of the picture before where those are still good.
+#[expect(clippy::too_many_arguments, reason = "one call for a whole picture")]
 pub fn paint(
     painter: &Painter,
     rect: Rect,
@@ -89,9 +71,13 @@ pub fn paint(
     list: &DrawList,
     theme: Theme,
     overlay: &Overlay,
-    above: Option<Rect>,
+    above: &[Rect],
+    places: &mut Places,
 ) {
-    let mut taken: Vec<Rect> = above.into_iter().collect();
+    let mut taken = above.to_vec();
+    if !list.overlay.is_empty() {
+        taken.push(triad(rect));
+    }
     if let Some(scale) = &list.wear_scale {
         taken.extend(wear_scale(painter, rect, scale, theme));
     }
@@ -104,53 +90,7 @@ pub fn paint(
         taken.push(time(painter, rect, at, notes, theme));
     }
     if overlay.labels {
-        labels(painter, rect, scale, list, taken);
-    }
-}
-
-/// Names of joints and axes at their places, over none of what is `taken`.
-fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList, taken: Vec<Rect>) {
-    if !has_room(rect) {
-        return;
-    }
-    let halo = colour(list.background.bottom);
-    let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
-    let most = taken.len() + MOST_PLATES;
-    let (mut names, mut missed) = (taken, 0);
-    let mut peaks = list.labels.iter().filter(is_peak);
-    // Peaks come and go, so they give way to the names.
-    let mut labels = list.labels.iter().filter(|label| !is_peak(label));
-    while let Some(label) = labels.next().or_else(|| peaks.next()) {
-        let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
-        let plate = match label.kind {
-            LabelKind::Joint(_) => Some((13.0, Align2::LEFT_BOTTOM, vec2(10.0, -8.0))),
-            LabelKind::Peak(_) | LabelKind::Outside => Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0))),
-            LabelKind::Error => Some((12.0, Align2::CENTER_TOP, vec2(0.0, 10.0))),
-            LabelKind::Axis | LabelKind::Gravity => None,
-        };
-        if let Some((size, anchor, beside)) = plate {
-            if names.len() == most || missed == MOST_MISSED || !rect.contains(at) {
-                continue;
-            }
-            // On a plate of its own: it often lies over a dark part.
-            let font = FontId::proportional(size);
-            let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
-            let Some(plate) = clear_of(&names, rect, at, (anchor, beside), words.size()) else {
-                missed += 1;
-                continue;
-            };
-            let (opacity, ink) = (label.colour.0[3], colour(label.colour));
-            let end = plate.clamp(at);
-            if end.distance(at) > LED {
-                painter.line_segment([at, end], Stroke::new(1.0, ink.gamma_multiply(0.7)));
-            }
-            names.push(plate);
-            painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * opacity));
-            painter.galley(plate.min + PAD, words, ink);
-            continue;
-        }
-        let ink = colour(label.colour);
-        text(painter, at, Align2::CENTER_CENTER, &label.text, 12.0, ink, halo);
+        labels::paint(painter, rect, scale, list, taken, places);
     }
 }
 
@@ -183,10 +123,38 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
 
 /// Approximate width and height of the time with one note per joint, whatever the notes say; points.
 pub fn plate(joints: usize) -> [f32; 2] {
-    const LONGEST: f32 = 230.0;
+    const LONGEST: [f32; 2] = [150.0, 230.0];
     const LINE: f32 = 16.0;
     // Time and magnification come first.
-    [MARGIN + LONGEST + 8.0, MARGIN + 38.0 + LINE * joints as f32 + 8.0]
+    let longest = LONGEST[usize::from(joints > 0)];
+    [MARGIN + longest + 8.0, MARGIN + 38.0 + LINE * joints as f32 + 8.0]
+}
+
+/// About where axes and gravity are drawn.
+fn triad(rect: Rect) -> Rect {
+    // Gravity is beside the axes where there is room: `SceneView::push_triad`.
+    let width = if rect.width() < 300.0 { 118.0 } else { 164.0 };
+    Align2::LEFT_BOTTOM.align_size_within_rect(vec2(width, 118.0), rect)
+}
+
+/// About where time with one note per joint, axes and legend stand in a picture in `rect`.
+pub fn plates(rect: Rect, joints: usize, options: &ViewOptions) -> Vec<Rect> {
+    let large = has_room(rect);
+    let [width, height] = if large { plate(joints) } else { [130.0, 36.0] };
+    let mut plates = vec![Align2::LEFT_TOP.align_size_within_rect(vec2(width, height), rect)];
+    if options.triad && large {
+        plates.push(triad(rect));
+    }
+    if (options.arrows.normal || options.arrows.friction) && large {
+        let [least, rows] = match options.arrows.scaling {
+            Scaling::Linear => [112.0, 88.0],
+            Scaling::Logarithmic => [190.0, 88.0],
+        };
+        let axis = (ARROW_LENGTH * rect.height()).min(LONGEST_AXIS * rect.width()) + 24.0;
+        let size = vec2(axis.max(least) + MARGIN + 6.0, rows + MARGIN);
+        plates.push(Align2::RIGHT_BOTTOM.align_size_within_rect(size, rect));
+    }
+    plates
 }
 
 /// One line per ball joint: its forces as the step reported them.
@@ -216,12 +184,13 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
-    let longest = rect.width() * 0.4;
+    let longest = rect.width() * LONGEST_AXIS;
     // Close up, the reference arrow may be wider than the view: show the part that fits.
     let shown = full.min(longest);
     // Room for half a number beyond the last mark.
     let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
     let axis = corner.y - 18.0;
+    let back = painter.add(Shape::Noop);
     let left = corner.x - shown;
     painter.line_segment([pos2(left, axis), pos2(corner.x, axis)], Stroke::new(1.5, ink));
     let mut all = Rect::from_min_max(pos2(left, axis), corner + vec2(12.0, 0.0));
@@ -276,7 +245,9 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
         all |= Rect::from_min_max(tail - vec2(0.0, 4.5), placed.max);
         at.y = placed.min.y - 1.0;
     }
-    all
+    let plate = all.expand2(vec2(6.0, 3.0)).intersect(rect);
+    painter.set(back, RectShape::filled(plate, 6.0, halo.gamma_multiply(0.75)));
+    plate
 }
 
 /// What a wear map shows, and its unit.
@@ -351,8 +322,9 @@ pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::labels::{FURTHEST, LED, MOST_PLATES};
     use crate::app::theme;
-    use crate::view::{PeakMarks, SceneView, Shot, ViewOptions};
+    use crate::view::{Label, LabelKind, PeakMarks, SceneView, Shot, ViewOptions};
     use eframe::egui::{Context, LayerId, RawInput};
     use glam::Vec3;
 
@@ -378,7 +350,7 @@ mod tests {
 
     /// What is painted for the labels of `list`.
     fn shapes_of(list: &DrawList, rect: Rect) -> Vec<Shape> {
-        shapes(rect, |painter| labels(painter, rect, 1.0, list, Vec::new()))
+        shapes(rect, |painter| labels::paint(painter, rect, 1.0, list, Vec::new(), &mut Places::default()))
     }
 
     fn shapes(rect: Rect, paint: impl Fn(&Painter)) -> Vec<Shape> {
@@ -470,7 +442,8 @@ mod tests {
         let overlay = Overlay { time: Some(0.0), legend: true, labels: true, ..Overlay::default() };
         let texts = |overlay: &Overlay| {
             let shapes = shapes(rect, |painter| {
-                paint(painter, rect, 1.0, &list, Theme::Light, overlay, Some(caption));
+                let mut places = Places::default();
+                paint(painter, rect, 1.0, &list, Theme::Light, overlay, &[caption], &mut places);
             });
             let texts = shapes.into_iter().filter_map(|shape| match shape {
                 Shape::Text(text) => Some((text.galley.text().to_owned(), text.visual_bounding_rect())),

@@ -9,6 +9,7 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
+use super::labels::Places;
 use super::overlay::{self, Overlay};
 use super::pace::{Pace, Seen};
 use super::player::Player;
@@ -58,11 +59,17 @@ pub struct Viewport {
     /// Where the camera is moving to; `None` once it is there.
     goal: Option<Camera>,
     fit_pending: bool,
-    /// Width over height of the picture that was last fitted.
+    /// Width over height of the picture that was last fitted, or of a wider one in which the camera has been moved since: a narrower
+    /// one shows as much across.
     fitted: f32,
+    /// Everything has been fitted into the picture and the camera not been moved since: another shape is fitted anew.
+    fits: bool,
     /// While a picture is drawn off screen: width over height of the view on the screen.
     frozen: Option<f32>,
     marks: PeakMarks,
+    places: Places,
+    #[cfg(not(target_arch = "wasm32"))]
+    second_places: Places,
     /// What is shown; the one before, and room for the next.
     list: Arc<DrawList>,
     next: DrawList,
@@ -102,10 +109,14 @@ impl Viewport {
             goal: None,
             fit_pending: true,
             fitted: 1.0,
+            fits: true,
             frozen: None,
             view,
             options,
             marks: PeakMarks::new(),
+            places: Places::default(),
+            #[cfg(not(target_arch = "wasm32"))]
+            second_places: Places::default(),
             list: Arc::new(DrawList::default()),
             next: DrawList::default(),
             revision: 0,
@@ -165,6 +176,7 @@ impl Viewport {
         self.camera.distance = pose.distance;
         self.camera.target = Vec3::from_array(pose.target);
         (self.goal, self.fit_pending, self.moved) = (None, false, pose.fitted.is_none());
+        self.fits = !self.moved;
         self.fitted = pose.fitted.unwrap_or(self.fitted);
     }
 
@@ -283,7 +295,7 @@ impl Viewport {
     /// Moves to `goal`, and follows ball joint `joint` from now on.
     fn glide(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
-        (self.fit_pending, self.moved) = (false, true);
+        (self.fit_pending, self.fits, self.moved) = (false, false, true);
         let picked = Picked::Joint(joint);
         self.follow(Some(picked));
         let anchor = self.view.anchor(player.frame(), picked);
@@ -348,7 +360,8 @@ impl Viewport {
         self.frozen = aspect;
     }
 
-    /// The camera for a picture of `aspect`, width by height.
+    /// The camera for a picture of `aspect`, width by height: none shows less across than where it was placed, and one off screen no
+    /// less than the view on the screen.
     fn framed(&self, aspect: f32) -> Camera {
         self.framed_as(self.frozen, aspect)
     }
@@ -356,18 +369,30 @@ impl Viewport {
     /// The same with everything in it that is in a view of aspect `shape`.
     fn framed_as(&self, shape: Option<f32>, aspect: f32) -> Camera {
         let mut camera = self.camera;
-        if let Some(shape) = shape.filter(|shape| *shape > aspect) {
-            let half = (camera.field_of_view / 2.0).tan() * shape / aspect;
+        let shape = shape.unwrap_or(aspect);
+        let wider = self.fitted.max(shape) / shape.min(aspect);
+        if wider > 1.0 {
+            let half = (camera.field_of_view / 2.0).tan() * wider;
             camera.field_of_view = 2.0 * half.atan();
         }
         camera
     }
 
+    /// Moves the camera by hand in a picture of `size`.
+    fn by_hand(&mut self, size: [u32; 2], act: impl FnOnce(&mut Camera)) {
+        let aspect = size[0] as f32 / size[1] as f32;
+        let framed = self.framed(aspect).field_of_view;
+        let field_of_view = std::mem::replace(&mut self.camera.field_of_view, framed);
+        act(&mut self.camera);
+        self.camera.field_of_view = field_of_view;
+        self.fitted = self.fitted.max(aspect);
+        (self.goal, self.fits, self.moved) = (None, false, true);
+    }
+
     /// Where a point of the scene, m, is drawn, points, in a picture over `rect`; `None` behind the camera.
     pub fn place(&self, point: &Exact, rect: Rect) -> Option<Pos2> {
-        let Screen { size, .. } = Screen::new(rect, 1.0);
-        let camera = self.framed(size[0] as f32 / size[1] as f32);
-        let pixel = camera.project(to_f32(point), size)?;
+        let screen = Screen::new(rect, 1.0);
+        let pixel = self.framed(screen.aspect()).project(to_f32(point), screen.size)?;
         Some(rect.min + vec2(pixel.x, pixel.y))
     }
 
@@ -379,8 +404,8 @@ impl Viewport {
     }
 
     /// The picture with its overlays, over all of `ui`; a `plain` one shows nothing about what is under the cursor.
-    /// Names keep clear of what is painted `above` it.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: Option<Rect>) {
+    /// Names, and the machine where it is fitted, keep clear of what is painted `above` it.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: &[Rect]) {
         let (rect, response) =
             ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::click_and_drag());
         let name = if self.place == render::Place::Window { "3D view" } else { "3D view before the change" };
@@ -389,16 +414,19 @@ impl Viewport {
         let size = screen.size;
         self.options.theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
 
-        let aspect = size[0] as f32 / size[1] as f32;
+        let aspect = screen.aspect();
         // Folding the sheet or turning a phone would leave half of the mechanism outside.
-        let reshaped = !(0.8..=1.25).contains(&(aspect / self.fitted));
-        if self.frozen.is_none() && (self.fit_pending || (reshaped && !self.moved)) {
+        let reshaped = !(0.99..=1.01).contains(&(aspect / self.fitted));
+        if self.frozen.is_none() && (self.fit_pending || (reshaped && self.fits)) {
             self.fit_pending = false;
-            self.fitted = aspect;
+            (self.fitted, self.fits) = (aspect, true);
             // The first picture of a scene does not move into place.
             let first = self.list.size == [0, 0];
             let mut goal = self.goal.unwrap_or(self.camera);
-            self.view.fit(&mut goal, player.scene(), player.frame(), &self.options, size);
+            let plates = overlay::plates(rect, 0, &self.options).into_iter().chain(above.iter().copied());
+            let corners = |plate: Rect| [plate.min, plate.max].map(|corner| screen.pixel(corner));
+            let plates: Vec<_> = plates.map(corners).collect();
+            self.view.fit_around(&mut goal, player.scene(), player.frame(), &self.options, size, &plates);
             if first {
                 (self.camera, self.goal) = (goal, None);
             } else {
@@ -433,7 +461,7 @@ impl Viewport {
         let Screen { scale, .. } = screen.drawn_with(self.list.quality);
         let overlay = self.overlay(player, said);
         let theme = self.options.theme;
-        overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above);
+        overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above, &mut self.places);
         if let Some(hit) = hovered {
             // Away from the nearer edge: the transport below stays free.
             let low = response.hover_pos().is_some_and(|pos| pos.y > rect.center().y);
@@ -476,7 +504,8 @@ impl Viewport {
         painter.add(render::Viewport::revised(rect, list.clone(), Some(*revision), render::Place::Second));
         let Screen { scale, .. } = screen.drawn_with(quality);
         let overlay = self.overlay(player, said);
-        overlay::paint(&painter, rect, scale, &self.second.0, self.options.theme, &overlay, above);
+        let (list, theme) = (&self.second.0, self.options.theme);
+        overlay::paint(&painter, rect, scale, list, theme, &overlay, above.as_slice(), &mut self.second_places);
     }
 
     /// Describes what `screen` shows with `quality` in `self.next`; returns what is said about ghosts.
@@ -536,10 +565,8 @@ impl Viewport {
             && (self.pinched || rect.contains(fingers.center_pos))
         {
             self.pinched = true;
-            self.moved = true;
-            self.goal = None;
             let shift = fingers.translation_delta * scale;
-            self.camera.pan(Vec2::new(shift.x, shift.y), size);
+            self.by_hand(size, |camera| camera.pan(Vec2::new(shift.x, shift.y), size));
             self.zoom(player, fingers.zoom_delta, fingers.center_pos, screen);
         }
         if self.pinched {
@@ -555,13 +582,9 @@ impl Viewport {
             || response.dragged_by(PointerButton::Middle)
             || (shift && response.dragged_by(PointerButton::Primary));
         if pans {
-            self.goal = None;
-            self.moved = true;
-            self.camera.pan(delta, size);
+            self.by_hand(size, |camera| camera.pan(delta, size));
         } else if response.dragged_by(PointerButton::Primary) {
-            self.goal = None;
-            self.moved = true;
-            self.camera.orbit(delta);
+            self.by_hand(size, |camera| camera.orbit(delta));
         }
         if let Some(pos) = response.hover_pos() {
             self.zoom(player, zoom::factor(ui), pos, screen);
@@ -574,11 +597,13 @@ impl Viewport {
         let taken =
             if finger { self.finger_stays(ui, response) } else { response.drag_started_by(PointerButton::Primary) };
         if let Some(origin) = origin.filter(|_| taken) {
-            let shot = shot!(self, player, &self.camera, screen);
+            let camera = self.framed(screen.aspect());
+            let shot = shot!(self, player, &camera, screen);
             let hit = self.view.pick(&shot, screen.pixel(origin));
             self.grip = hit.and_then(|hit| Grip::new(player, hit));
             self.grip_changed |= self.grip.is_some();
         }
+        let camera = self.framed(screen.aspect());
         let Some(grip) = &mut self.grip else {
             return false;
         };
@@ -593,7 +618,7 @@ impl Viewport {
                 let moved = ui.input(|i| i.pointer.delta()) * screen.scale;
                 if moved != egui::Vec2::ZERO || taken {
                     let moved = Vec2::new(moved.x, moved.y);
-                    grip.drag(&self.camera, screen.pixel(pos), moved, screen.size, shift);
+                    grip.drag(&camera, screen.pixel(pos), moved, screen.size, shift);
                     self.grip_changed = true;
                 }
             }
@@ -632,9 +657,8 @@ impl Viewport {
         if factor == 1.0 {
             return;
         }
-        self.goal = None;
-        self.moved = true;
-        let shot = shot!(self, player, &self.camera, screen);
+        let camera = self.framed(screen.aspect());
+        let shot = shot!(self, player, &camera, screen);
         let hit = self.view.pick(&shot, screen.pixel(pos));
         let bounds = self.view.bounds();
         // Over the background the zoom is about the whole machine, and neither end of its range loses it.
@@ -645,9 +669,11 @@ impl Viewport {
             Some(_) => false,
             None => from < bounds.radius,
         };
-        if !lost {
-            self.camera.zoom_about(factor, point, screen.size);
-        }
+        self.by_hand(screen.size, |camera| {
+            if !lost {
+                camera.zoom_about(factor, point, screen.size);
+            }
+        });
     }
 
     /// Buttons for points of view, each added in turn; `backwards` where the layout runs from right to left.
@@ -800,6 +826,11 @@ impl Screen {
         Self { rect, size: [pixels(rect.width()), pixels(rect.height())], scale }
     }
 
+    /// Width over height.
+    fn aspect(&self) -> f32 {
+        self.size[0] as f32 / self.size[1] as f32
+    }
+
     /// The same with the pixels that `quality` draws.
     fn drawn_with(&self, quality: Quality) -> Self {
         Self::new(self.rect, self.scale * quality.sharpness)
@@ -874,7 +905,7 @@ mod tests {
         let draw = |viewport: &mut Viewport| {
             let ctx = egui::Context::default();
             theme::apply(&ctx);
-            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| viewport.ui(ui, &player, true, None));
+            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| viewport.ui(ui, &player, true, &[]));
             // No texture is made of it.
             output.textures_delta.clear();
         };

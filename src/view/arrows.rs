@@ -11,7 +11,7 @@ use super::{
 use crate::scene::{ElementLook, format_quantity_digits};
 
 /// Reference length of arrows, as a fraction of the picture height.
-pub(super) const ARROW_LENGTH: f32 = 0.22;
+pub const ARROW_LENGTH: f32 = 0.22;
 /// Longest arrow, in reference lengths.
 const LONGEST_ARROW: f32 = 2.5;
 /// Radius of the thickest shaft, as a fraction of the picture height.

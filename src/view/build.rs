@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::{Mat3, Quat, Vec3, Vec4};
+use glam::{Mat3, Quat, Vec2, Vec3, Vec4};
 use parry3d::query::Ray;
 
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::attachments::{Style, push_bushing, push_motor, push_stop};
 use super::cast::{cast, room};
 use super::coil::push_coil;
+use super::cover::{Cover, Covered};
 use super::drawn::{self, DrawnJoint, DrawnShape};
 use super::ground::push_ground;
 use super::instances::{self, bar, placed, push_label};
@@ -17,11 +18,11 @@ use super::solids::push_solid;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
-    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Light, Line, Mesh, MeshData, Palette, Shot,
+    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette, Shot,
     ViewOptions, WearMap, to_f32,
 };
-use crate::scene::{ElementLook, Role, Scene, SignedAxis};
-use crate::simulate::{ContactState, Frame, JointReport};
+use crate::scene::{Element, ElementLook, Role, Scene, SignedAxis};
+use crate::simulate::{ContactState, ElementReport, Frame, JointReport};
 
 /// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
@@ -47,8 +48,9 @@ pub struct SceneView {
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
 /// Smallest width that leaves room for gravity between axes and legend, points.
 const SMALLEST_WITH_GRAVITY: f32 = 300.0;
-/// Radius of the halo of a joint that was hit, in radii of its socket.
+/// Radius of the halo of a joint that was hit, in radii of its socket; and most points that it is wider than that.
 const HALO: f32 = 1.7;
+const WIDEST_HALO: f32 = 22.0;
 /// Opacity of a ball in front of a wear map.
 const CLEAR_BALL: f32 = 0.25;
 /// Points of moving parts that a fixed part may hide: rays are cast to all of them in every frame.
@@ -123,11 +125,11 @@ impl SceneView {
 
     /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction is kept.
     pub fn fit(&self, camera: &mut Camera, scene: &Scene, frame: &Frame, options: &ViewOptions, size: [u32; 2]) {
-        camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 3]);
+        self.fit_around(camera, scene, frame, options, size, &[]);
     }
 
-    /// The same with room for text: beside a `plate` (width and height in pixels) in the upper left corner and above the
-    /// legend in the lower right, or below the plate; whichever shows the scene larger.
+    /// The same with the machine clear of `plates` (least and greatest corner, pixels), which stand over the picture: where it is
+    /// drawn largest. Where none is clear of them all, the one of which the plates cover least.
     pub fn fit_around(
         &self,
         camera: &mut Camera,
@@ -135,16 +137,69 @@ impl SceneView {
         frame: &Frame,
         options: &ViewOptions,
         size: [u32; 2],
-        plate: [f32; 2],
+        plates: &[[Vec2; 2]],
     ) {
-        const LEGEND: f32 = 60.0;
-        let extents = self.extents(scene, frame, options);
-        let mut below = *camera;
-        camera.fit_balls(&extents, size, [plate[0], 0.0, LEGEND]);
-        below.fit_balls(&extents, size, [0.0, plate[1], 0.0]);
-        if below.distance < camera.distance {
-            *camera = below;
+        // Of the room that the plates at a side take, from none to all.
+        const SHARES: [f32; 4] = [0.0, 0.35, 0.7, 1.0];
+        // Cells along the shorter edge, and gap between machine and plates in them.
+        const CELLS: f32 = 80.0;
+        const GAP: f32 = 1.5;
+        // Solids beyond which some are left out of the comparison with the plates.
+        const MOST: usize = 300;
+        let solids = self.solids(scene, frame, options);
+        let mut balls: Vec<(Vec3, f32)> = solids.iter().flatten().copied().collect();
+        // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
+        // not drawn, so that pictures with and without them can be compared.
+        let arrow = ARROW_LENGTH * self.bounds.radius;
+        balls.extend(frame.joints.iter().map(|joint| (to_f32(&joint.socket_centre), arrow)));
+        balls.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
+        let whole = Vec2::new(size[0] as f32, size[1] as f32);
+        let mut most = [0.0_f32; 4];
+        for [low, high] in plates {
+            let middle = (*low + *high) / 2.0;
+            let (x, y) = if middle.x < whole.x / 2.0 { (0, high.x) } else { (1, whole.x - low.x) };
+            most[x] = most[x].max(y);
+            let (x, y) = if middle.y < whole.y / 2.0 { (2, high.y) } else { (3, whole.y - low.y) };
+            most[x] = most[x].max(y);
         }
+        let shares = |room: f32| SHARES.into_iter().map(move |share| share * room).take(if room > 0.0 { 4 } else { 1 });
+        let mut tried: Vec<([f32; 4], Camera)> = Vec::new();
+        for left in shares(most[0]) {
+            for right in shares(most[1]) {
+                for top in shares(most[2]) {
+                    for bottom in shares(most[3]) {
+                        let (mut moved, free) = (*camera, [left, right, top, bottom]);
+                        moved.fit_balls(&balls, size, free);
+                        tried.push((free, moved));
+                    }
+                }
+            }
+        }
+        let room = |free: &[f32; 4]| free.iter().sum::<f32>();
+        tried.sort_by(|(a, near), (b, far)| {
+            near.distance.total_cmp(&far.distance).then(room(a).total_cmp(&room(b)))
+        });
+        let cell = whole.min_element() / CELLS;
+        let step = solids.len().div_ceil(MOST).max(1);
+        let mut least = f32::INFINITY;
+        let mut best = *camera;
+        for (_, moved) in tried {
+            let mut cover = Cover::new(size, cell);
+            let eye = moved.view(size);
+            for solid in solids.iter().step_by(step).filter(|_| !plates.is_empty()) {
+                cover.add(&eye, size, solid.iter().copied(), Covered::Body);
+            }
+            let gap = Vec2::splat(GAP * cell);
+            let covered = |[low, high]: &[Vec2; 2]| cover.under(*low - gap, *high + gap)[0];
+            let covered: f32 = plates.iter().map(covered).sum();
+            if covered < least {
+                (least, best) = (covered, moved);
+            }
+            if covered == 0.0 {
+                break;
+            }
+        }
+        *camera = best;
     }
 
     /// Magnification actually drawn for the one in `options`.
@@ -171,15 +226,24 @@ impl SceneView {
         1.0 - (1.0 - LEAST) * t * t * (3.0 - 2.0 * t)
     }
 
-    fn extents(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<(Vec3, f32)> {
-        let m = self.magnification(scene, frame, options);
-        let joints = drawn::joints(scene, frame, m);
-        let mut extents = extents(&self.parts, &self.symbols, frame, &joints);
-        // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
-        // not drawn, so that pictures with and without them can be compared.
-        let arrow = ARROW_LENGTH * self.bounds.radius;
-        extents.extend(joints.iter().map(|joint| (joint.socket_centre, arrow)));
-        extents
+    /// Spheres (centre, radius) for each thing that is drawn, whose convex hull contains it.
+    fn solids(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<Vec<(Vec3, f32)>> {
+        let joints = drawn::joints(scene, frame, self.magnification(scene, frame, options));
+        let palette = Palette::of(options.theme);
+        let mut solids = solids(&self.parts, &self.symbols, frame, &joints);
+        for (element, report) in scene.elements.iter().zip(&frame.elements) {
+            let (mut layer, mut lines) = (Layer::default(), Vec::new());
+            layer.clear(Mesh::SHARED);
+            self.push_element((element, report), (scene, frame), &palette, 1.0, &mut layer, &mut lines);
+            solids.extend(layer.by_mesh[Mesh::Cylinder.index()].iter().map(|bar| {
+                let [x, y, z] = bar.world_from_mesh;
+                let column = |k: usize| Vec3::new(x[k], y[k], z[k]);
+                let radius = column(0).length();
+                vec![(column(3), radius), (column(3) + column(2), radius)]
+            }));
+            solids.push(lines.iter().flat_map(|line| [(line.from.into(), 0.0), (line.to.into(), 0.0)]).collect());
+        }
+        solids
     }
 
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
@@ -231,43 +295,20 @@ impl SceneView {
             let flash = shot.marks.flash(i);
             if options.flash && flash > 0.02 {
                 let light = Material { colour: palette.flash.with_opacity(flash), ..palette.ball };
-                let halo = instances::ball(joint.socket_centre, HALO * joint.outer, light);
-                out.halos.push(halo);
+                // Wider it would hide what lies about the joint in a close-up.
+                let pixel = (joint.socket_centre - eye).dot(-camera.axes().2) * camera.metres_per_pixel(shot.size) / camera.distance;
+                let ring = ((HALO - 1.0) * joint.outer).min(WIDEST_HALO * shot.pixels_per_point * pixel.max(0.0));
+                let halo = instances::ball(joint.socket_centre, joint.outer + ring, light);
+                out.halos.push(Instance { metal: joint.outer / (joint.outer + ring), ..halo });
             }
         }
         if options.sockets {
             push_sockets(frame, &joints, eye, palette.socket, &mut out.sockets);
         }
 
-        for (element, report) in scene.elements.iter().zip(&frame.elements) {
-            let [from, to] = report.points.map(|point| to_f32(&point));
-            let width = 2.2 * shot.pixels_per_point;
-            let material = palette.material(Role::Pin);
-            let colour = material.colour;
-            let style = Style {
-                radius: self.bounds.radius,
-                width,
-                material,
-                outer: palette.material(Role::Slider),
-                colour: palette.text,
-            };
-            match element.kind.look {
-                ElementLook::Coil => {
-                    let radius = COIL * self.bounds.radius;
-                    push_coil(from, to, radius, width, colour, &mut out.lines);
-                }
-                ElementLook::Ground => {
-                    let up = to_f32(&element.vector("up"));
-                    let radius = GROUND * self.bounds.radius;
-                    push_ground(from, up, radius, width, colour, &mut out.lines);
-                }
-                ElementLook::Bushing => push_bushing(element, report, frame, &style, &mut out.solid),
-                ElementLook::Stop => push_stop(element, report, (scene, frame), &style, &mut out.solid),
-                ElementLook::Motor => {
-                    push_motor(element, report, (scene, frame), &style, &mut out.solid, &mut out.lines);
-                }
-                ElementLook::Arrow | ElementLook::Hidden => {}
-            }
+        for element in scene.elements.iter().zip(&frame.elements) {
+            let points = shot.pixels_per_point;
+            self.push_element(element, (scene, frame), &palette, points, &mut out.solid, &mut out.lines);
         }
         push_forces(shot, &joints, &palette, out);
         if options.trail {
@@ -282,6 +323,46 @@ impl SceneView {
                 let anchor = joint.socket_centre + up * (1.15 * joint.outer);
                 push_label(out, name, LabelKind::Joint(i), anchor, palette.text);
             }
+        }
+    }
+
+    /// What is drawn for a force element.
+    fn push_element(
+        &self,
+        (element, report): (&Element, &ElementReport),
+        (scene, frame): (&Scene, &Frame),
+        palette: &Palette,
+        pixels_per_point: f32,
+        solid: &mut Layer,
+        lines: &mut Vec<Line>,
+    ) {
+        let [from, to] = report.points.map(|point| to_f32(&point));
+        let width = 2.2 * pixels_per_point;
+        let material = palette.material(Role::Pin);
+        let colour = material.colour;
+        let style = Style {
+            radius: self.bounds.radius,
+            width,
+            material,
+            outer: palette.material(Role::Slider),
+            colour: palette.text,
+        };
+        match element.kind.look {
+            ElementLook::Coil => {
+                let radius = COIL * self.bounds.radius;
+                push_coil(from, to, radius, width, colour, lines);
+            }
+            ElementLook::Ground => {
+                let up = to_f32(&element.vector("up"));
+                let radius = GROUND * self.bounds.radius;
+                push_ground(from, up, radius, width, colour, lines);
+            }
+            ElementLook::Bushing => push_bushing(element, report, frame, &style, solid),
+            ElementLook::Stop => push_stop(element, report, (scene, frame), &style, solid),
+            ElementLook::Motor => {
+                push_motor(element, report, (scene, frame), &style, solid, lines);
+            }
+            ElementLook::Arrow | ElementLook::Hidden => {}
         }
     }
 
@@ -388,17 +469,31 @@ impl SceneView {
 
 /// Spheres (centre, radius) whose convex hull contains everything drawn.
 fn extents(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
-    let ends = symbols.iter().flat_map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)));
-    let mut extents: Vec<(Vec3, f32)> = ends.collect();
-    for part in parts {
-        part.place(frame, joints).extent(|centre, radius| extents.push((centre, radius)));
-    }
-    extents.extend(joints.iter().map(|joint| (joint.socket_centre, joint.outer)));
+    solids(parts, symbols, frame, joints).into_iter().flatten().collect()
+}
+
+/// The same for each thing by itself.
+fn solids(
+    parts: &[DrawnShape],
+    symbols: &[Symbol],
+    frame: &Frame,
+    joints: &[DrawnJoint],
+) -> Vec<Vec<(Vec3, f32)>> {
+    let pins = symbols.iter().map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)).to_vec());
+    let shapes = parts.iter().map(|part| {
+        let mut spheres = Vec::new();
+        part.place(frame, joints).extent(|centre, radius| spheres.push((centre, radius)));
+        spheres
+    });
+    let sockets = joints.iter().map(|joint| vec![(joint.socket_centre, joint.outer)]);
     let springs = frame.elements.iter().map(|element| element.points);
     let springs = springs.filter(|[from, to]| from != to);
-    extents.extend(springs.flatten().map(|end| (to_f32(&end), 0.0)));
-    extents.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
-    extents
+    let springs = springs.map(|ends| ends.map(|end| (to_f32(&end), 0.0)).to_vec());
+    let mut solids: Vec<_> = pins.chain(shapes).chain(sockets).chain(springs).collect();
+    for spheres in &mut solids {
+        spheres.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
+    }
+    solids
 }
 
 fn bounds(extents: &[(Vec3, f32)]) -> Bounds {

@@ -104,8 +104,8 @@ impl Camera {
     }
 
     /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction is
-    /// kept. `reserved` pixels at the left, the top and the bottom are kept free.
-    pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2], [left, top, bottom]: [f32; 3]) {
+    /// kept. So many pixels at the left, the right, the top and the bottom are kept free.
+    pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2], [left, right, top, bottom]: [f32; 4]) {
         const MARGIN: f32 = 1.16;
         let axes = self.axes();
         let [width, height] = size.map(|n| n.max(1) as f32);
@@ -130,7 +130,7 @@ impl Camera {
             let midway = move |d: f32| (above - below + d * (low - high)) / 2.0;
             (midway, (above + below) / (low + high))
         };
-        let (x, from_x) = span(axes.0, free_of(width, left, 0.0));
+        let (x, from_x) = span(axes.0, free_of(width, left, right));
         let (y, from_y) = span(axes.1, free_of(height, bottom, top));
         let eye_depth = from_x.max(from_y);
         let depths = || balls.iter().map(|(p, _)| p.dot(axes.2));
@@ -384,15 +384,17 @@ mod tests {
         let balls =
             [(Vec3::new(0.5, 0.0, 0.0), 0.05), (Vec3::new(-0.3, 0.2, 0.1), 0.1), (Vec3::new(0.0, -0.4, 0.2), 0.0)];
         for (size, reserved) in [
-            ([1280, 720], [0.0; 3]),
-            ([300, 900], [0.0; 3]),
-            ([640, 400], [250.0, 0.0, 60.0]),
-            ([640, 400], [0.0, 180.0, 0.0]),
+            ([1280, 720], [0.0; 4]),
+            ([300, 900], [0.0; 4]),
+            ([640, 400], [250.0, 0.0, 0.0, 60.0]),
+            ([640, 400], [0.0, 150.0, 90.0, 0.0]),
+            ([640, 400], [0.0, 0.0, 180.0, 0.0]),
         ] {
             let mut camera = camera(SignedAxis::MinusZ);
             camera.fit_balls(&balls, size, reserved);
             let [w, h] = size.map(|n| n as f32);
-            let (free_w, free_h) = (w - reserved[0], h - reserved[1] - reserved[2]);
+            let [left, right, top, bottom] = reserved;
+            let (free_w, free_h) = (w - left - right, h - top - bottom);
             let mut least = f32::INFINITY;
             for (centre, radius) in balls {
                 // Points of each ball, seen from all sides.
@@ -401,10 +403,10 @@ mod tests {
                     let on = centre + radius * Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
                     let p = camera.project(on, size).expect("before the eye");
                     least = least
-                        .min((p.x - reserved[0]) / free_w)
-                        .min((w - p.x) / free_w)
-                        .min((p.y - reserved[1]) / free_h)
-                        .min((h - reserved[2] - p.y) / free_h);
+                        .min((p.x - left) / free_w)
+                        .min((w - right - p.x) / free_w)
+                        .min((p.y - top) / free_h)
+                        .min((h - bottom - p.y) / free_h);
                 }
             }
             // The margin of 16 % leaves 0.5 (1 - 1/1.16) = 6.9 % at the tightest edge.

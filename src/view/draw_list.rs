@@ -76,7 +76,8 @@ pub struct Instance {
     pub colour: [f32; 4],
     /// From 0 (mirror) to 1 (chalk); for a ghost's outline its width, pixels.
     pub roughness: f32,
-    /// From 0 (plastic) to 1 (metal); for a ghost its depth slice ([`super::GhostLook::slice`]).
+    /// From 0 (plastic) to 1 (metal); for a ghost its depth slice ([`super::GhostLook::slice`]), for a halo the radius of the
+    /// socket that it surrounds, in its own.
     pub metal: f32,
     /// Inner radius of a socket, in units of its outer radius; unused elsewhere.
     pub inner_radius: f32,
@@ -192,7 +193,7 @@ pub struct Floor {
 }
 
 /// What a label names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LabelKind {
     /// An axis of the triad.
     Axis,

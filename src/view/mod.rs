@@ -15,6 +15,7 @@ mod build;
 mod camera;
 mod cast;
 mod coil;
+mod cover;
 mod draw_list;
 mod drawn;
 #[cfg(test)]
@@ -37,8 +38,10 @@ mod theme;
 mod wear;
 mod zones;
 
+pub use arrows::ARROW_LENGTH;
 pub use build::SceneView;
 pub use camera::{Camera, Preset};
+pub use cover::Cover;
 pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh, MeshData, Tick,
     WearScale,

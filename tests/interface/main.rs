@@ -29,4 +29,5 @@ mod scene_list;
 mod sound;
 mod touch;
 mod undo;
+mod watched;
 mod window;

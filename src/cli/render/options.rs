@@ -1,6 +1,9 @@
 //! Options of a picture: point of view, arrows, colours.
 
-use crate::app::plate;
+use eframe::egui::{Pos2, Rect, vec2};
+use glam::Vec2;
+
+use crate::app::plates;
 use crate::cli::args::{ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice, WearChoice};
 use crate::cli::{Failure, quantity};
 use crate::scene::Scene;
@@ -45,8 +48,10 @@ pub fn camera(
             if arguments.overlay {
                 // A line per joint, and one for the wear map.
                 let lines = scene.ball_joints.len() + usize::from(arguments.wear.is_some());
-                let plate = plate(lines);
-                view.fit_around(&mut camera, scene, frame, options, size, plate);
+                let whole = Rect::from_min_size(Pos2::ZERO, vec2(size[0] as f32, size[1] as f32));
+                let corners = |plate: Rect| [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
+                let plates: Vec<_> = plates(whole, lines, options).into_iter().map(corners).collect();
+                view.fit_around(&mut camera, scene, frame, options, size, &plates);
             } else {
                 view.fit(&mut camera, scene, frame, options, size);
             }

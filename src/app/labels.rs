@@ -1,0 +1,145 @@
+//! Where the names of joints, the sizes of forces and the like stand over a picture: clear of each other, of what else is written
+//! and, where there is room, of the machine. A label stays where it stands from its point until that place is no longer good.
+
+use std::collections::HashMap;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use eframe::egui::{Align2, FontId, Painter, Rect, Stroke, Vec2, pos2, vec2};
+
+use super::overlay::{colour, has_room, text};
+use crate::view::{Cover, DrawList, Label, LabelKind};
+
+/// Plates in a picture beyond which further ones are left out, and names without room after which no more are tried.
+pub(super) const MOST_PLATES: usize = 256;
+const MOST_MISSED: usize = 256;
+/// Distances of a plate from its point, points: further away it would seem to belong to something else.
+const GAPS: [f32; 6] = [8.0, 16.0, 28.0, 42.0, 57.0, FURTHEST];
+pub(super) const FURTHEST: f32 = 72.0;
+/// Directions from the point to the plate, from the one that its kind prefers to the opposite one.
+const TURNS: [f32; 12] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0, 6.0];
+/// Distance of a plate from what it names beyond which a line leads there, points.
+pub(super) const LED: f32 = 14.0;
+/// Room about the words of a plate, points.
+const PAD: Vec2 = vec2(4.0, 1.0);
+/// Edge of the cells in which it is known what bodies cover, points.
+const CELL: f32 = 5.0;
+/// What a place costs: the share of the plate that lies over balls, over bodies; each further distance, each further direction.
+const BALL: f32 = 6.0;
+const BODY: f32 = 1.0;
+const FURTHER: f32 = 0.08;
+const TURNED: f32 = 0.015;
+/// How much worse than the best a place may get before its label leaves it.
+const BETTER: f32 = 0.4;
+/// Opacity below which the mark of a peak has no label.
+const FAINT: f32 = 0.25;
+
+/// Distance and direction by index.
+type Place = (usize, usize);
+
+/// Where the labels of a picture stand, for the next one.
+#[derive(Clone, Debug, Default)]
+pub struct Places(HashMap<LabelKind, Place>);
+
+/// One label that is to be placed.
+struct Wanted<'a> {
+    label: &'a Label,
+    /// Its point, points of the window.
+    at: eframe::egui::Pos2,
+    /// Size of the words.
+    size: f32,
+    /// Direction that its kind prefers, rad, clockwise from the right.
+    direction: f32,
+}
+
+impl<'a> Wanted<'a> {
+    fn of(label: &'a Label, rect: Rect, scale: f32) -> Option<Self> {
+        let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
+        let (size, direction) = match label.kind {
+            LabelKind::Joint(_) => (13.0, -FRAC_PI_4),
+            LabelKind::Peak(_) | LabelKind::Outside => (12.0, 0.0),
+            LabelKind::Error => (12.0, FRAC_PI_2),
+            LabelKind::Axis | LabelKind::Gravity => return None,
+        };
+        let faint = matches!(label.kind, LabelKind::Peak(_)) && label.colour.0[3] < FAINT;
+        (rect.contains(at) && !faint).then_some(Self { label, at, size, direction })
+    }
+
+    /// The plate of `size` at a place.
+    fn plate(&self, size: Vec2, (gap, turn): Place) -> Rect {
+        let (sin, cos) = (self.direction + TURNS[turn] * PI / 6.0).sin_cos();
+        let half = size / 2.0;
+        // With a side or a corner towards the point.
+        let out = vec2(cos, sin) / cos.abs().max(sin.abs());
+        Rect::from_center_size(self.at + vec2(cos, sin) * GAPS[gap] + out * half, size)
+    }
+}
+
+/// Names of joints and axes at their places in `rect`, over none of what is `taken`.
+pub(super) fn paint(
+    painter: &Painter,
+    rect: Rect,
+    scale: f32,
+    list: &DrawList,
+    mut taken: Vec<Rect>,
+    places: &mut Places,
+) {
+    if !has_room(rect) {
+        return;
+    }
+    let before = std::mem::take(&mut places.0);
+    let halo = colour(list.background.bottom);
+    for label in list.labels.iter().filter(|label| matches!(label.kind, LabelKind::Axis | LabelKind::Gravity)) {
+        let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
+        text(painter, at, Align2::CENTER_CENTER, &label.text, 12.0, colour(label.colour), halo);
+    }
+    let cover = Cover::of(list, CELL * scale);
+    let cost = |plate: Rect, (gap, turn): Place| {
+        let [min, max] = [plate.min, plate.max].map(|corner| (corner - rect.min) * scale);
+        let [bodies, balls] = cover.under(glam::Vec2::new(min.x, min.y), glam::Vec2::new(max.x, max.y));
+        BODY * bodies + BALL * balls + FURTHER * gap as f32 + TURNED * turn as f32
+    };
+    let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
+    // Peaks come and go, so they give way to the names.
+    let labels = list.labels.iter().filter(|label| !is_peak(label)).chain(list.labels.iter().filter(is_peak));
+    let most = taken.len() + MOST_PLATES;
+    let mut missed = 0;
+    // Those that stay where they are come first: one that needs a new place drives no other away.
+    let mut wanted: Vec<_> = labels.filter_map(|label| Wanted::of(label, rect, scale)).collect();
+    wanted.sort_by_key(|wanted| (is_peak(&wanted.label), !before.contains_key(&wanted.label.kind)));
+    for wanted in wanted {
+        if taken.len() == most || missed == MOST_MISSED {
+            break;
+        }
+        let Wanted { label, at, .. } = wanted;
+        let ink = colour(label.colour);
+        let words = painter.layout_no_wrap(label.text.to_string(), FontId::proportional(wanted.size), ink);
+        let size = words.size() + 2.0 * PAD;
+        let free = |place: Place| {
+            let plate = wanted.plate(size, place);
+            let clear = rect.contains_rect(plate) && !taken.iter().any(|other| other.intersects(plate));
+            clear.then(|| (cost(plate, place), place, plate))
+        };
+        let stays = before.get(&label.kind).and_then(|place| free(*place));
+        let all = || (0..GAPS.len()).flat_map(|gap| (0..TURNS.len()).map(move |turn| (gap, turn)));
+        let best = || all().filter_map(free).min_by(|a, b| a.0.total_cmp(&b.0));
+        let found = match stays {
+            // None could be so much better.
+            Some(there) if there.0 <= BETTER => Some(there),
+            Some(there) => best().filter(|best| best.0 < there.0 - BETTER).or(Some(there)),
+            None => best(),
+        };
+        let Some((_, place, plate)) = found else {
+            missed += 1;
+            continue;
+        };
+        places.0.insert(label.kind, place);
+        taken.push(plate);
+        let end = plate.clamp(at);
+        if end.distance(at) > LED {
+            painter.line_segment([at, end], Stroke::new(1.0, ink.gamma_multiply(0.7)));
+        }
+        // On a plate of its own: it often lies over a dark part.
+        painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * label.colour.0[3]));
+        painter.galley(pos2(plate.min.x, plate.min.y) + PAD, words, ink);
+    }
+}
