@@ -204,8 +204,11 @@ impl Controls {
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
         ui.spacing_mut().slider_width = ui.available_width().max(40.0);
+        // Moved, it steps to round values; of a logarithmic one to three digits.
+        let decimals = if logarithmic { None } else { Some(value::decimals(greatest - least)) };
         let slider = Slider::new(&mut shown, least..=greatest)
             .logarithmic(logarithmic)
+            .max_decimals_opt(decimals)
             .clamping(SliderClamping::Never)
             .show_value(false);
         let response = keys::slider(ui, slider);
@@ -213,7 +216,8 @@ impl Controls {
         let changed = response.changed();
         response.accessible_name(&row.name);
         if changed {
-            self.set(player, row.key, &format_quantity_digits(from_display(shown, display), display, 4));
+            let digits = if logarithmic { 3 } else { 6 };
+            self.set(player, row.key, &format_quantity_digits(from_display(shown, display), display, digits));
         }
     }
 

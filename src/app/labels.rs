@@ -24,12 +24,12 @@ const PAD: Vec2 = vec2(4.0, 1.0);
 /// Edge of the cells in which it is known what bodies cover, points.
 const CELL: f32 = 5.0;
 /// What a place costs: the share of the plate that lies over balls, over bodies; each further distance, each further direction.
-const BALL: f32 = 6.0;
+const BALL: f32 = 8.0;
 const BODY: f32 = 1.0;
 const FURTHER: f32 = 0.08;
 const TURNED: f32 = 0.015;
 /// How much worse than the best a place may get before its label leaves it.
-const BETTER: f32 = 0.4;
+const BETTER: f32 = 0.6;
 /// Opacity below which the mark of a peak has no label.
 const FAINT: f32 = 0.25;
 
@@ -38,7 +38,7 @@ type Place = (usize, usize);
 
 /// Where the labels of a picture stand, for the next one.
 #[derive(Clone, Debug, Default)]
-pub struct Places(HashMap<LabelKind, Place>);
+pub struct Places(pub(super) HashMap<LabelKind, Place>);
 
 /// One label that is to be placed.
 struct Wanted<'a> {
@@ -141,5 +141,76 @@ pub(super) fn paint(
         // On a plate of its own: it often lies over a dark part.
         painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * label.colour.0[3]));
         painter.galley(pos2(plate.min.x, plate.min.y) + PAD, words, ink);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use eframe::egui::{Context, LayerId, Pos2, RawInput};
+    use glam::{Mat4, Vec3};
+
+    use super::*;
+    use crate::app::theme;
+    use crate::view::{Eye, Instance, Layer, Mesh, Palette, Theme};
+
+    /// A picture of 400 × 300 pixels, as many millimetres, with a name at a place and a cube of 40 mm whose centre is at another.
+    fn list(name: [f32; 2], cube: [f32; 2]) -> DrawList {
+        let clip_from_world = Mat4::from_scale(Vec3::new(2.0 / 400.0, -2.0 / 300.0, 1.0))
+            .mul_mat4(&Mat4::from_translation(Vec3::new(-200.0, -150.0, 0.5)));
+        let mut solid = Layer { by_mesh: vec![Vec::new(); Mesh::SHARED] };
+        let [x, y] = cube;
+        solid.by_mesh[Mesh::Cube.index()].push(Instance {
+            world_from_mesh: [[40.0, 0.0, 0.0, x], [0.0, 40.0, 0.0, y], [0.0, 0.0, 0.1, 0.0]],
+            ..bytemuck::Zeroable::zeroed()
+        });
+        let label = Label {
+            text: "S1".into(),
+            kind: LabelKind::Joint(0),
+            anchor: Vec3::ZERO,
+            pixel: name.into(),
+            colour: Palette::of(Theme::Light).text,
+        };
+        DrawList {
+            size: [400, 300],
+            eye: Eye { clip_from_world, position: Vec3::ZERO },
+            solid,
+            labels: vec![label],
+            ..DrawList::default()
+        }
+    }
+
+    fn place(list: &DrawList, places: &mut Places) -> Place {
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(400.0, 300.0));
+        let ctx = Context::default();
+        theme::apply(&ctx);
+        let mut output = ctx.run_ui(RawInput::default(), |ui| {
+            let painter = Painter::new(ui.ctx().clone(), LayerId::background(), rect);
+            paint(&painter, rect, 1.0, list, Vec::new(), places);
+        });
+        // No texture is made of it.
+        output.textures_delta.clear();
+        places.0[&LabelKind::Joint(0)]
+    }
+
+    #[test]
+    fn a_name_gives_way_to_a_body_once_and_does_not_flicker_beside_it() {
+        let name = [200.0, 150.0];
+        let free = place(&list(name, [60.0, 60.0]), &mut Places::default());
+        assert_eq!(free, (0, 0), "nothing is in the way");
+        let over = list(name, [225.0, 130.0]);
+        let beside = place(&over, &mut Places::default());
+        assert_ne!(beside, free, "a body is where it would stand");
+        // A body that comes slowly and trembles as it does.
+        let mut places = Places::default();
+        let mut seen = Vec::new();
+        for frame in 0..120 {
+            let shake = [-3.0, 3.0][frame % 2];
+            let at = [300.0 - 0.75 * frame as f32 + shake, 130.0 + shake];
+            seen.push(place(&list(name, at), &mut places));
+        }
+        seen.dedup();
+        assert_eq!((seen[0], seen.len()), (free, 2), "{seen:?}");
+        // The same pictures again, the same places.
+        assert_eq!(place(&over, &mut Places::default()), beside);
     }
 }

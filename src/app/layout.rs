@@ -471,7 +471,7 @@ impl App {
             above.push(edge.align_size_within_rect(size, inner));
         }
         if !plain && self.has_messages() {
-            above.push(inner.with_min_y(self.messages_place(ui, inner).top()));
+            above.push(self.messages_place(ui, inner));
         }
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
         self.viewport.ui(&mut place, &self.player, plain, &above);

@@ -159,6 +159,13 @@ pub fn digits_within(span: f64, most: f64) -> usize {
     if more.is_finite() { 4 + (more.max(0.0) as usize).min(11) } else { 4 }
 }
 
+/// Decimals of the values that a slider over `span` steps to: a hundred to a thousand of them.
+pub fn decimals(span: f64) -> usize {
+    let decimals = 2.0 - libm::log10(span);
+    // Of a power of ten a hundred, whatever the last bit of its logarithm.
+    if decimals.is_finite() { (decimals - 1e-9).ceil().clamp(0.0, 15.0) as usize } else { 15 }
+}
+
 /// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
 pub fn power_of_ten(share: f64) -> String {
     if share == 0.0 || (1e-3..1e4).contains(&share.abs()) { number(share, 2) } else { format!("{share:.0e}") }
@@ -252,6 +259,14 @@ mod tests {
             seen += 1;
         }
         assert!(seen > 10);
+    }
+
+    #[test]
+    fn a_slider_steps_to_round_values_in_proportion_to_its_range() {
+        let given = [(1.0, 2), (0.3, 3), (2.0, 2), (40.0, 1), (500.0, 0), (1e5, 0), (1e-3, 5), (0.0, 15), (f64::NAN, 15)];
+        for (span, expected) in given {
+            assert_eq!(decimals(span), expected, "{span}");
+        }
     }
 
     #[test]

@@ -893,9 +893,168 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashMap;
+
     use super::*;
     use crate::app::theme;
     use crate::scene::Scene;
+    use crate::view::{Cover, LabelKind};
+
+    /// What is seen of a scene in a picture of some size.
+    struct Watched {
+        player: Player,
+        viewport: Viewport,
+        ctx: egui::Context,
+    }
+
+    /// Plates of a picture: of the time, of the legend, of labels.
+    #[derive(Default)]
+    struct Seen {
+        time: Option<Rect>,
+        legend: Option<Rect>,
+        labels: Vec<Rect>,
+        list: Arc<DrawList>,
+    }
+
+    impl Watched {
+        fn new(scene: &str) -> Self {
+            let scene = Scene::load(scene, &[]).expect("built in");
+            let mut player = Player::new(&scene).expect("starts");
+            player.clock = || 0.0;
+            player.pacer.set_scale(crate::app::opening::time_scale(&scene));
+            player.set_playing(true);
+            let options = ViewOptions { magnification: 20.0, ..ViewOptions::default() };
+            let ctx = egui::Context::default();
+            theme::apply(&ctx);
+            Self { viewport: Viewport::new(&player, options), player, ctx }
+        }
+
+        /// The picture of `size`, points.
+        fn draw(&mut self, size: egui::Vec2) -> Seen {
+            let Self { player, viewport, ctx } = self;
+            let input = egui::RawInput {
+                screen_rect: Some(Rect::from_min_size(Pos2::ZERO, size)),
+                ..egui::RawInput::default()
+            };
+            let mut output = ctx.run_ui(input, |ui| viewport.ui(ui, player, false, &[]));
+            output.textures_delta.clear();
+            let mut seen = Seen { list: viewport.list.clone(), ..Seen::default() };
+            for shape in output.shapes {
+                let egui::Shape::Rect(plate) = shape.shape else {
+                    continue;
+                };
+                let (place, middle) = (plate.rect, plate.rect.center());
+                match plate.corner_radius.nw {
+                    6 if middle.x < size.x / 2.0 => seen.time = Some(place),
+                    6 => seen.legend = Some(place),
+                    4 => seen.labels.push(place),
+                    _ => {}
+                }
+            }
+            seen
+        }
+
+        fn pass(&mut self, dt: f32) {
+            self.player.advance(f64::from(dt));
+            self.viewport.advance(&self.player, dt);
+        }
+    }
+
+    /// Pictures in windows of 1280 × 800, 1920 × 1080 and 390 × 844.
+    const PICTURES: [egui::Vec2; 3] = [vec2(980.0, 432.0), vec2(1620.0, 690.0), vec2(390.0, 296.0)];
+
+    /// Each scene is watched for ten seconds.
+    #[test]
+    fn what_is_written_over_a_machine_hides_none_of_it_and_stays_where_it_is() {
+        const FRAMES: usize = 20;
+        // Of a plate, beyond what the cells of the cover are too coarse for; names are placed by coarser ones.
+        const HIDDEN: [f32; 2] = [0.005, 0.08];
+        for scene in crate::scene::BUILT_IN {
+            for size in PICTURES {
+                let mut watched = Watched::new(scene);
+                let mut stood: HashMap<LabelKind, _> = HashMap::new();
+                let mut moves = 0;
+                for frame in 0..FRAMES {
+                    let seen = watched.draw(size);
+                    watched.pass(10.0 / FRAMES as f32);
+                    let what = format!("{scene}, {size}, frame {frame}");
+                    let [time, legend] = [seen.time, seen.legend].map(|plate| plate.expect("written"));
+                    let all: Vec<Rect> = seen.labels.iter().copied().chain([time, legend]).collect();
+                    for (i, plate) in all.iter().enumerate() {
+                        assert!(!all[i + 1..].iter().any(|other| other.intersects(*plate)), "{what}");
+                    }
+                    let mut now = watched.viewport.places.0.clone();
+                    now.retain(|kind, _| matches!(kind, LabelKind::Joint(_)));
+                    moves += now.iter().filter(|(kind, place)| stood.get(kind).is_some_and(|was| was != *place)).count();
+                    stood = now;
+                    if frame % 2 > 0 {
+                        continue;
+                    }
+                    let cover = Cover::of(&seen.list, 2.0);
+                    let under = |plate: Rect| {
+                        let [min, max] = [plate.min, plate.max].map(|corner| Vec2::new(corner.x, corner.y));
+                        cover.under(min, max)
+                    };
+                    for plate in [time, legend] {
+                        let hidden: f32 = under(plate).iter().sum();
+                        assert!(hidden < HIDDEN[0], "{what}: {hidden} of {plate}");
+                    }
+                    for plate in &seen.labels {
+                        let [_, balls] = under(*plate);
+                        assert!(balls < HIDDEN[1], "{what}: balls under {balls} of {plate}");
+                    }
+                }
+                // On average none more than once in three seconds, whatever passes behind it.
+                assert!(!stood.is_empty() && moves <= 3 * stood.len(), "{scene}, {size}: {moves} of {}", stood.len());
+            }
+        }
+    }
+
+    #[test]
+    fn another_shape_is_fitted_anew_until_the_camera_is_moved_and_then_shows_as_much_across() {
+        let (wide, narrow) = (vec2(980.0, 432.0), vec2(420.0, 432.0));
+        let settled = |watched: &mut Watched, size| {
+            watched.draw(size);
+            watched.viewport.goal.unwrap_or(watched.viewport.camera)
+        };
+        let mut fresh = Watched::new("spcmm");
+        let expected = settled(&mut fresh, narrow);
+        let mut watched = Watched::new("spcmm");
+        let first = settled(&mut watched, wide);
+        // A little at a time, as a panel that opens.
+        for width in [940.0, 890.0, 700.0, 450.0] {
+            settled(&mut watched, vec2(width, 432.0));
+        }
+        assert_eq!(settled(&mut watched, narrow), expected);
+        assert_eq!(settled(&mut watched, wide), first);
+        // A point of view that was chosen fits, too.
+        for watched in [&mut watched, &mut fresh] {
+            watched.viewport.preset(Preset::Front);
+        }
+        let expected = settled(&mut fresh, narrow);
+        settled(&mut watched, wide);
+        assert_eq!(settled(&mut watched, narrow), expected);
+
+        settled(&mut watched, wide);
+        while watched.viewport.advance(&watched.player, 0.1) {}
+        watched.viewport.by_hand([980, 432], |camera| camera.orbit(Vec2::new(40.0, 10.0)));
+        let placed = watched.viewport.camera;
+        let across = |viewport: &Viewport, size: [u32; 2]| {
+            let camera = viewport.framed(size[0] as f32 / size[1] as f32);
+            size.map(|edge| edge as f32 * camera.metres_per_pixel(size))
+        };
+        let before = across(&watched.viewport, [980, 432]);
+        for size in [[420, 432], [980, 300], [300, 900], [980, 432]] {
+            let _ = settled(&mut watched, vec2(size[0] as f32, size[1] as f32));
+            assert_eq!(watched.viewport.camera, placed);
+            let after = across(&watched.viewport, size);
+            assert!(after[0] >= 0.999 * before[0] && after[1] >= 0.999 * before[1], "{size:?}: {before:?} {after:?}");
+        }
+        // A hand on the camera makes nothing jump.
+        let before = across(&watched.viewport, [300, 900]);
+        watched.viewport.by_hand([300, 900], |camera| camera.pan(Vec2::ZERO, [300, 900]));
+        assert_eq!(across(&watched.viewport, [300, 900]), before);
+    }
 
     #[test]
     fn the_first_picture_does_not_move_into_place() {

@@ -279,6 +279,69 @@ fn building_twice_gives_the_same_list_in_the_same_buffers() {
 }
 
 #[test]
+fn a_flash_is_a_narrow_ring_in_a_close_up_and_a_wide_one_from_afar() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let options = ViewOptions::default();
+    let mut marks = PeakMarks::new();
+    marks.update(&frame, &fixture::hits(&frame), 1.0);
+    let ring = |camera: &crate::view::Camera| {
+        let mut list = DrawList::default();
+        view.build(&shot(&scene, &frame, &marks, &options, camera), &mut list);
+        let halo = list.halos[0];
+        let (radius, inner) = (halo.world_from_mesh[0][0], halo.metal);
+        let [low, high] = [inner, 1.0].map(|share| {
+            let edge = place(&halo) + camera.axes().0 * (share * radius);
+            list.eye.project(edge, list.size).expect("in front").x
+        });
+        (high - low, 1.0 / inner)
+    };
+    let mut near = view.camera();
+    view.close_up(&mut near, 0, &scene, &frame, &options);
+    let (wide, share) = ring(&near);
+    assert!((15.0..25.0).contains(&wide) && share < 1.3, "{wide} pixels, {share} of the socket");
+    let mut far = view.camera();
+    view.fit(&mut far, &scene, &frame, &options, SIZE);
+    let (wide, share) = ring(&far);
+    assert!(wide < 25.0 && (share - 1.7).abs() < 1e-3, "{wide} pixels, {share} of the socket");
+}
+
+#[test]
+fn a_fit_takes_account_of_what_sticks_out_and_keeps_clear_of_plates() {
+    // Its discs are far beyond the rail.
+    let stop = "[[stop]]\nname = \"ends\"\njoint = \"slide\"\nlower = \"-900 mm\"\nupper = \"800 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
+    let motor = "[[motor]]\nname = \"m\"\njoint = \"slide\"\nforce = \"1 N\"\n";
+    for element in [stop, motor] {
+        let (scene, frame) = started(&format!("{ATTACHED}{element}"), &[]);
+        let view = SceneView::new(&scene, &frame);
+        let options = ViewOptions { floor: false, triad: false, ..ViewOptions::default() };
+        let corners = [[Vec2::ZERO, Vec2::new(300.0, 180.0)], [Vec2::new(1000.0, 500.0), Vec2::new(1280.0, 720.0)]];
+        for plates in [&[][..], &corners] {
+            let mut camera = view.camera();
+            view.fit_around(&mut camera, &scene, &frame, &options, SIZE, plates);
+            let marks = PeakMarks::new();
+            let mut list = DrawList::default();
+            view.build(&shot(&scene, &frame, &marks, &options, &camera), &mut list);
+            let mut seen = 0;
+            for bar in &list.solid.by_mesh[Mesh::Cylinder.index()] {
+                let [x, y, z] = bar.world_from_mesh;
+                let column = |k: usize| Vec3::new(x[k], y[k], z[k]);
+                for end in [column(3), column(3) + column(2)] {
+                    let at = camera.project(end, SIZE).expect("in front");
+                    assert!(at.cmpge(Vec2::ZERO).all() && at.cmple(Vec2::new(1280.0, 720.0)).all(), "{at}");
+                    seen += 1;
+                }
+            }
+            assert!(seen > 4);
+            let cover = crate::view::Cover::of(&list, 4.0);
+            for [low, high] in plates {
+                assert_eq!(cover.under(*low, *high), [0.0; 2], "{low} {high}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_frame_with_broken_numbers_draws_without_a_panic() {
     let (scene, mut frame) = fixture::three_legs();
     frame.bodies[3].position.x = f64::NAN;

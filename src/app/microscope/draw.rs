@@ -288,8 +288,13 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     sheet.words(below, Align2::LEFT_TOP, "wall", blue);
     let times = value::number(deep / wide, 2);
     let words = format!("depths ×{times}");
-    let right = rect.right_top() + vec2(-8.0, 5.0);
-    sheet.words(right, Align2::RIGHT_TOP, &words, sheet.faint);
+    // In the ball while it presses into the wall; beside its lowest point while it does not.
+    if patch.penetration > 0.0 {
+        sheet.words(above + vec2(0.0, 14.0), Align2::CENTER_TOP, &words, sheet.faint);
+    } else {
+        let right = pos2(rect.right() - 8.0, wall - 3.0);
+        sheet.words(right, Align2::RIGHT_BOTTOM, &words, sheet.faint);
+    }
     let bar = round_down(0.5 * half);
     let end = pos2(rect.right() - 10.0, rect.bottom() - 8.0);
     sheet.bar(end, (bar * wide) as f32, &length(bar, 3));
