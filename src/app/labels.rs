@@ -205,7 +205,7 @@ mod tests {
         let mut seen = Vec::new();
         for frame in 0..120 {
             let shake = [-3.0, 3.0][frame % 2];
-            let at = [300.0 - 0.75 * frame as f32 + shake, 130.0 + shake];
+            let at = [300.0 - 0.55 * frame as f32 + shake, 130.0 + shake];
             seen.push(place(&list(name, at), &mut places));
         }
         seen.dedup();

@@ -18,8 +18,8 @@ use super::solids::push_solid;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
-    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette, Shot,
-    ViewOptions, WearMap, to_f32,
+    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette,
+    Shot, ViewOptions, WearMap, to_f32,
 };
 use crate::scene::{Element, ElementLook, Role, Scene, SignedAxis};
 use crate::simulate::{ContactState, ElementReport, Frame, JointReport};
@@ -176,9 +176,7 @@ impl SceneView {
             }
         }
         let room = |free: &[f32; 4]| free.iter().sum::<f32>();
-        tried.sort_by(|(a, near), (b, far)| {
-            near.distance.total_cmp(&far.distance).then(room(a).total_cmp(&room(b)))
-        });
+        tried.sort_by(|(a, near), (b, far)| near.distance.total_cmp(&far.distance).then(room(a).total_cmp(&room(b))));
         let cell = whole.min_element() / CELLS;
         let step = solids.len().div_ceil(MOST).max(1);
         let mut least = f32::INFINITY;
@@ -296,7 +294,8 @@ impl SceneView {
             if options.flash && flash > 0.02 {
                 let light = Material { colour: palette.flash.with_opacity(flash), ..palette.ball };
                 // Wider it would hide what lies about the joint in a close-up.
-                let pixel = (joint.socket_centre - eye).dot(-camera.axes().2) * camera.metres_per_pixel(shot.size) / camera.distance;
+                let pixel = (joint.socket_centre - eye).dot(-camera.axes().2) * camera.metres_per_pixel(shot.size)
+                    / camera.distance;
                 let ring = ((HALO - 1.0) * joint.outer).min(WIDEST_HALO * shot.pixels_per_point * pixel.max(0.0));
                 let halo = instances::ball(joint.socket_centre, joint.outer + ring, light);
                 out.halos.push(Instance { metal: joint.outer / (joint.outer + ring), ..halo });
@@ -473,12 +472,7 @@ fn extents(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[Dr
 }
 
 /// The same for each thing by itself.
-fn solids(
-    parts: &[DrawnShape],
-    symbols: &[Symbol],
-    frame: &Frame,
-    joints: &[DrawnJoint],
-) -> Vec<Vec<(Vec3, f32)>> {
+fn solids(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[DrawnJoint]) -> Vec<Vec<(Vec3, f32)>> {
     let pins = symbols.iter().map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)).to_vec());
     let shapes = parts.iter().map(|part| {
         let mut spheres = Vec::new();

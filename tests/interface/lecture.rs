@@ -346,7 +346,7 @@ fn wear_and_a_pull_show_what_is_stored() {
 }
 
 /// A point of the picture on the platform at t = 0.
-fn platform(harness: &Harness<'_, App>) -> Pos2 {
+pub(crate) fn platform(harness: &Harness<'_, App>) -> Pos2 {
     let app = harness.state();
     let scene = app.player().scene();
     let platform = scene.bodies.iter().position(|body| body.name == "platform");

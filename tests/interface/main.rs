@@ -29,5 +29,4 @@ mod scene_list;
 mod sound;
 mod touch;
 mod undo;
-mod watched;
 mod window;

@@ -387,8 +387,7 @@ fn a_double_tap_follows_what_it_hits() {
     harness.key_press(Key::F);
     harness.run();
     // The middle of the platform, in the isometric view that the window starts with.
-    let view = harness.get_by_label("3D view").rect();
-    let platform = view.lerp_inside(vec2(0.571, 0.722));
+    let platform = crate::lecture::platform(&harness);
     harness.hover_at(platform);
     harness.run_steps(60);
     harness.get_by_label_contains("Angular speed");

@@ -732,8 +732,7 @@ fn the_left_arrow_takes_a_single_step_back() {
 fn hovering_names_a_part_and_a_double_click_follows_it() {
     let mut harness = window("spcmm");
     // The middle of the platform, in the isometric view that the window starts with.
-    let view = harness.get_by_label("3D view").rect();
-    let platform = view.lerp_inside(egui::vec2(0.571, 0.722));
+    let platform = crate::lecture::platform(&harness);
     harness.hover_at(platform);
     harness.run_steps(60);
     harness.get_by_label("Double-click to follow");
