@@ -417,7 +417,7 @@ impl Viewport {
         let aspect = screen.aspect();
         // Folding the sheet or turning a phone would leave half of the mechanism outside.
         // A touch alone makes its controls larger and the picture a little smaller: nothing moves under the finger.
-        let reshaped = !(0.88..=1.14).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
+        let reshaped = !(0.88..=1.25).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
         if self.frozen.is_none() && (self.fit_pending || (reshaped && self.fits)) {
             self.fit_pending = false;
             (self.fitted, self.fits) = (aspect, true);
