@@ -4,10 +4,9 @@
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-use eframe::egui::{Align2, FontId, Painter, Rect, Stroke, Vec2, pos2, vec2};
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2, pos2, vec2};
 
-use super::overlay::{colour, has_room, text};
-use crate::view::{Cover, DrawList, Label, LabelKind};
+use crate::view::{Colour, Cover, DrawList, Label, LabelKind};
 
 /// Plates in a picture beyond which further ones are left out, and names without room after which no more are tried.
 pub(super) const MOST_PLATES: usize = 256;
@@ -32,6 +31,38 @@ const TURNED: f32 = 0.015;
 const BETTER: f32 = 0.6;
 /// Opacity below which the mark of a peak has no label.
 const FAINT: f32 = 0.25;
+
+/// A view colour as a painter colour.
+pub(super) fn colour(colour: Colour) -> Color32 {
+    let [r, g, b, a] = colour.to_rgba8();
+    Color32::from_rgba_unmultiplied(r, g, b, a)
+}
+
+/// Text with a halo in the background colour, readable over anything.
+pub(super) fn text(
+    painter: &Painter,
+    at: Pos2,
+    anchor: Align2,
+    text: &str,
+    size: f32,
+    ink: Color32,
+    halo: Color32,
+) -> Rect {
+    let font = FontId::proportional(size);
+    let halo = halo.gamma_multiply(0.75);
+    for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+        painter.text(at + vec2(dx, dy), anchor, text, font.clone(), halo);
+    }
+    painter.text(at, anchor, text, font, ink)
+}
+
+/// Least edge of a picture that has room for more than the time, points.
+pub(super) const SMALL: f32 = 200.0;
+
+/// Whether a picture is large enough for a legend, names and forces.
+pub fn has_room(rect: Rect) -> bool {
+    rect.size().min_elem() >= SMALL
+}
 
 /// Distance and direction by index.
 type Place = (usize, usize);

@@ -2,51 +2,20 @@
 //! by headless frames.
 
 use eframe::egui::epaint::RectShape;
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use eframe::egui::{Align2, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
 use super::labels::{self, Places};
+pub(super) use super::labels::{SMALL, colour, has_room, text};
 use super::value;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};
-use crate::view::{ARROW_LENGTH, Colour, DrawList, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
+use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
 
-/// A view colour as a painter colour.
-pub(super) fn colour(colour: Colour) -> Color32 {
-    let [r, g, b, a] = colour.to_rgba8();
-    Color32::from_rgba_unmultiplied(r, g, b, a)
-}
-
-/// Text with a halo in the background colour, readable over anything.
-pub(super) fn text(
-    painter: &Painter,
-    at: Pos2,
-    anchor: Align2,
-    text: &str,
-    size: f32,
-    ink: Color32,
-    halo: Color32,
-) -> Rect {
-    let font = FontId::proportional(size);
-    let halo = halo.gamma_multiply(0.75);
-    for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
-        painter.text(at + vec2(dx, dy), anchor, text, font.clone(), halo);
-    }
-    painter.text(at, anchor, text, font, ink)
-}
-
 /// Longest axis of the legend, as a share of the picture's width.
 const LONGEST_AXIS: f32 = 0.4;
-
-/// Least edge of a picture that has room for more than the time, points.
-pub(super) const SMALL: f32 = 200.0;
-
-/// Whether a picture is large enough for a legend, names and forces.
-pub fn has_room(rect: Rect) -> bool {
-    rect.size().min_elem() >= SMALL
-}
 
 /// What is written over a picture.
 #[derive(Clone, Debug, Default)]
