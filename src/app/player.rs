@@ -217,7 +217,6 @@ impl Player {
             history: self.history.clone(),
             near: self.near.clone(),
             contact_history: self.contact_history.clone(),
-            blows: self.blows.clone(),
             impact_record: self.impact_record.clone(),
             recorded: self.recorded.clone(),
             recorded_to: self.recorded_to,

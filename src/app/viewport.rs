@@ -146,7 +146,7 @@ impl Viewport {
     pub fn look_as(&mut self, other: &Self) {
         (self.camera, self.goal) = (other.camera, other.goal);
         (self.fit_pending, self.fitted, self.moved) = (other.fit_pending, other.fitted, other.moved);
-        (self.frozen, self.followed) = (other.frozen, other.followed);
+        (self.frozen, self.followed, self.fits) = (other.frozen, other.followed, other.fits);
     }
 
     /// The same with its options, as it is drawn.
