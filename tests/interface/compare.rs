@@ -144,8 +144,8 @@ fn two_machines_of_the_same_parameters_are_the_same_picture() {
     let before = harness.get_by_label("3D view before the change").rect();
     let now = harness.get_by_label("3D view").rect();
     assert_eq!(before.size(), now.size());
-    // Below the time, above buttons and messages.
-    let middle = area(Rect::from_min_max(before.min + egui::vec2(1.0, 90.0), before.max - egui::vec2(1.0, 60.0)));
+    // Below the time and the highest name, above buttons and messages.
+    let middle = area(Rect::from_min_max(before.min + egui::vec2(1.0, 110.0), before.max - egui::vec2(1.0, 60.0)));
     let by = (now.left() - before.left()).round() as usize;
     harness.state_mut().run_to(0.05);
     harness.run_steps(200);

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impact_is_told_once_it_is_over_and_forgotten_with_its_future() {
+    fn an_impact_is_told_once_its_end_is_known_and_not_before_its_beginning() {
         let mut player = player("spcmm", &[]);
         let (mut before, mut ends) = (None, Vec::new());
         while ends.len() < 3 {
@@ -157,7 +157,12 @@ mod tests {
         assert!((ends[0].approach_speed - 0.076_909).abs() < 1e-4);
         let given = ends[0].separation_speed / ends[0].approach_speed;
         assert!((ends[0].achieved() - given).abs() < 1e-15 && ends[0].asked == 0.9);
+        // Going back into an impact shows what became of it.
         player.step_back();
+        assert_eq!(Sight::of(&player, 0).expect("has a joint").impact, Some(ends[2]));
+        while player.pacer.shown() >= ends[2].start {
+            player.step_back();
+        }
         let sight = Sight::of(&player, 0).expect("has a joint");
         assert_eq!(sight.impact, Some(ends[1]));
         assert_eq!(sight.since, f64::NEG_INFINITY, "fewer than are shown");

@@ -185,7 +185,7 @@ fn what_is_wrong_in_a_link_is_said() {
         ("scael=0.5", "(did you mean `scale`?)"),
         ("scale=2", "link: scale = 2: allowed 0.0001 to 1"),
         ("t=5", "link: t = 5: needs a unit"),
-        ("t=-5ms", "must not be before the start"),
+        ("t=-5ms", "allowed 0 to 1000000 s"),
         ("steps=many", "is not a number of steps"),
         ("hash=12", "is not a state hash"),
         ("camera=1,2,3", "is not a camera"),
