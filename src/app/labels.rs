@@ -133,12 +133,12 @@ pub(super) fn paint(
     // Peaks come and go, so they give way to the names.
     let labels = list.labels.iter().filter(|label| !is_peak(label)).chain(list.labels.iter().filter(is_peak));
     let most = taken.len() + MOST_PLATES;
-    let mut missed = 0;
+    let mut may_miss = MOST_MISSED;
     // Those that stay where they are come first: one that needs a new place drives no other away.
     let mut wanted: Vec<_> = labels.filter_map(|label| Wanted::of(label, rect, scale)).collect();
     wanted.sort_by_key(|wanted| (is_peak(&wanted.label), !before.contains_key(&wanted.label.kind)));
     for wanted in wanted {
-        if taken.len() == most || missed == MOST_MISSED {
+        if taken.len() == most || may_miss == 0 {
             break;
         }
         let Wanted { label, at, .. } = wanted;
@@ -160,7 +160,7 @@ pub(super) fn paint(
             None => best(),
         };
         let Some((_, place, plate)) = found else {
-            missed += 1;
+            may_miss -= 1;
             continue;
         };
         places.0.insert(label.kind, place);
