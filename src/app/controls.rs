@@ -431,7 +431,7 @@ mod tests {
     #[test]
     fn a_long_value_fits_into_its_entry() {
         let ctx = egui::Context::default();
-        theme::apply(&ctx);
+        theme::apply(&ctx, false);
         let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
             let room = ENTRY - 2.0 * f32::from(MARGIN);
             let width = |text: &str| {

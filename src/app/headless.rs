@@ -81,7 +81,7 @@ impl Headless {
         theme: Theme,
         scale: f32,
     ) -> Result<Image, RenderError> {
-        theme::apply(&self.canvas.ctx);
+        theme::apply(&self.canvas.ctx, false);
         let output = self.canvas.pass(list.size, scale, |ui| {
             let rect = ui.max_rect();
             let painter = ui.painter_at(rect);

@@ -209,7 +209,8 @@ impl App {
     /// The impact under way at the instant shown, in a line: `>>` and `<<` arrive at one. `None` while time passes.
     pub fn impact_badge(&self) -> Option<String> {
         let player = &self.player;
-        if player.is_playing() {
+        // A film steps through instants that nobody has stopped at.
+        if player.is_playing() || self.film.is_some() {
             return None;
         }
         let shown = player.pacer.shown();
@@ -223,7 +224,7 @@ impl App {
         let peak = value::quantity(own.top.force.norm(), "N", 3);
         Some(match own.finished() {
             Some(impact) => format!(
-                "{begins}, peak {peak}, {}, {} to {} mm/s",
+                "{begins}, peak {peak}, {}, approach {}, rebound {} mm/s",
                 duration(impact.end - impact.start),
                 millimetres(impact.approach_speed),
                 millimetres(impact.separation_speed)

@@ -27,6 +27,8 @@ const BALL: f32 = 8.0;
 const BODY: f32 = 1.0;
 const FURTHER: f32 = 0.08;
 const TURNED: f32 = 0.015;
+/// A line that runs over another plate, or under this one.
+const CROSSED: f32 = 2.0;
 /// How much worse than the best a place may get before its label leaves it.
 const BETTER: f32 = 0.6;
 /// Opacity below which the mark of a peak has no label.
@@ -105,6 +107,18 @@ impl<'a> Wanted<'a> {
     }
 }
 
+/// The line from a point to its plate, if that is far away.
+fn leader(at: Pos2, plate: Rect) -> Option<[Pos2; 2]> {
+    let end = plate.clamp(at);
+    (end.distance(at) > LED).then_some([at, end])
+}
+
+/// Whether a line runs over a plate.
+fn runs_over([from, to]: [Pos2; 2], plate: Rect) -> bool {
+    const POINTS: usize = 12;
+    (0..=POINTS).any(|k| plate.contains(from.lerp(to, k as f32 / POINTS as f32)))
+}
+
 /// Names of joints and axes at their places in `rect`, over none of what is `taken`.
 pub(super) fn paint(
     painter: &Painter,
@@ -134,6 +148,7 @@ pub(super) fn paint(
     let labels = list.labels.iter().filter(|label| !is_peak(label)).chain(list.labels.iter().filter(is_peak));
     let most = taken.len() + MOST_PLATES;
     let mut may_miss = MOST_MISSED;
+    let mut leaders: Vec<[Pos2; 2]> = Vec::new();
     // Those that stay where they are come first: one that needs a new place drives no other away.
     let mut wanted: Vec<_> = labels.filter_map(|label| Wanted::of(label, rect, scale)).collect();
     wanted.sort_by_key(|wanted| (is_peak(&wanted.label), !before.contains_key(&wanted.label.kind)));
@@ -148,7 +163,12 @@ pub(super) fn paint(
         let free = |place: Place| {
             let plate = wanted.plate(size, place);
             let clear = rect.contains_rect(plate) && !taken.iter().any(|other| other.intersects(plate));
-            clear.then(|| (cost(plate, place), place, plate))
+            let crosses = || {
+                let own = leader(at, plate);
+                let over = own.is_some_and(|line| taken.iter().any(|other| runs_over(line, *other)));
+                over || leaders.iter().any(|line| runs_over(*line, plate))
+            };
+            clear.then(|| (cost(plate, place) + if crosses() { CROSSED } else { 0.0 }, place, plate))
         };
         let stays = before.get(&label.kind).and_then(|place| free(*place));
         let all = || (0..GAPS.len()).flat_map(|gap| (0..TURNS.len()).map(move |turn| (gap, turn)));
@@ -165,9 +185,9 @@ pub(super) fn paint(
         };
         places.0.insert(label.kind, place);
         taken.push(plate);
-        let end = plate.clamp(at);
-        if end.distance(at) > LED {
-            painter.line_segment([at, end], Stroke::new(1.0, ink.gamma_multiply(0.7)));
+        if let Some(line) = leader(at, plate) {
+            leaders.push(line);
+            painter.line_segment(line, Stroke::new(1.0, ink.gamma_multiply(0.7)));
         }
         // On a plate of its own: it often lies over a dark part.
         painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * label.colour.0[3]));
@@ -213,7 +233,7 @@ mod tests {
     fn place(list: &DrawList, places: &mut Places) -> Place {
         let rect = Rect::from_min_size(Pos2::ZERO, vec2(400.0, 300.0));
         let ctx = Context::default();
-        theme::apply(&ctx);
+        theme::apply(&ctx, false);
         let mut output = ctx.run_ui(RawInput::default(), |ui| {
             let painter = Painter::new(ui.ctx().clone(), LayerId::background(), rect);
             paint(&painter, rect, 1.0, list, Vec::new(), places);

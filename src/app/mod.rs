@@ -479,7 +479,7 @@ impl App {
 
     /// Continues in another window, or with new graphics after the old were lost; nothing else changes.
     pub fn attach(&mut self, ctx: &egui::Context, state: Option<&egui_wgpu::RenderState>, theme: ThemePreference) {
-        theme::apply_with(ctx, self.contrast);
+        theme::apply(ctx, self.contrast);
         ctx.set_theme(theme);
         self.renderer = String::new();
         if let Some(state) = state {

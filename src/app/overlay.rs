@@ -324,7 +324,7 @@ mod tests {
 
     fn shapes(rect: Rect, paint: impl Fn(&Painter)) -> Vec<Shape> {
         let ctx = Context::default();
-        theme::apply(&ctx);
+        theme::apply(&ctx, false);
         let mut output = ctx.run_ui(RawInput::default(), |ui| {
             paint(&Painter::new(ui.ctx().clone(), LayerId::background(), rect));
         });

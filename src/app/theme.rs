@@ -9,7 +9,7 @@ use eframe::egui::{
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
 /// & Ito).
-const SERIES: [(Color32, Color32); 9] = [
+const SERIES: [(Color32, Color32); 12] = [
     (rgb(0x0072B2), rgb(0x56B4E9)),
     (rgb(0xD55E00), rgb(0xFF8C3A)),
     (rgb(0x008F68), rgb(0x2CD0A0)),
@@ -19,6 +19,9 @@ const SERIES: [(Color32, Color32); 9] = [
     (rgb(0x7A4A1E), rgb(0xC99A6B)),
     (rgb(0x6B6B6B), rgb(0xB5B5B5)),
     (rgb(0x9B1C31), rgb(0xFF8A94)),
+    (rgb(0x5A7A00), rgb(0xB9DB4A)),
+    (rgb(0x007C8A), rgb(0x7CE6EE)),
+    (rgb(0x7B2D8B), rgb(0xD08BE6)),
 ];
 
 const fn rgb(hex: u32) -> Color32 {
@@ -85,13 +88,8 @@ pub fn fonts() -> FontDefinitions {
     fonts
 }
 
-/// Sets the face of text and both themes' styles.
-pub fn apply(ctx: &egui::Context) {
-    apply_with(ctx, false);
-}
-
-/// The same, with `contrast` in black and white where they are grey.
-pub fn apply_with(ctx: &egui::Context, contrast: bool) {
+/// Sets the face of text and both themes' styles, with `contrast` in black and white where they are grey.
+pub fn apply(ctx: &egui::Context, contrast: bool) {
     ctx.set_fonts(fonts());
     apply_size(ctx, false);
     for theme in [Theme::Light, Theme::Dark] {
@@ -198,7 +196,7 @@ mod tests {
     #[test]
     fn the_face_has_every_character_that_is_shown() {
         let ctx = eframe::egui::Context::default();
-        apply(&ctx);
+        apply(&ctx, false);
         let mut output = ctx.run_ui(Default::default(), |_| {});
         output.textures_delta.clear();
         let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -231,7 +231,8 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let x = scale.x(shown);
     let colour = visuals.strong_text_color();
     painter.vline(x, scale.rect.y_range(), Stroke::new(1.5, colour));
-    let handle = pos2(x, scale.rect.top() + 4.0);
+    // Whole at both ends, too.
+    let handle = pos2(x.clamp(scale.rect.left() + 4.0, scale.rect.right() - 4.0), scale.rect.top() + 4.0);
     painter.circle_filled(handle, 4.0, colour);
     let edge =
         if response.has_focus() { visuals.widgets.hovered.fg_stroke } else { visuals.widgets.noninteractive.bg_stroke };

@@ -926,7 +926,7 @@ mod tests {
             player.set_playing(true);
             let options = ViewOptions { magnification: 20.0, ..ViewOptions::default() };
             let ctx = egui::Context::default();
-            theme::apply(&ctx);
+            theme::apply(&ctx, false);
             Self { viewport: Viewport::new(&player, options), player, ctx }
         }
 
@@ -1065,7 +1065,7 @@ mod tests {
         let mut viewport = Viewport::new(&player, ViewOptions::default());
         let draw = |viewport: &mut Viewport| {
             let ctx = egui::Context::default();
-            theme::apply(&ctx);
+            theme::apply(&ctx, false);
             let mut output = ctx.run_ui(egui::RawInput::default(), |ui| viewport.ui(ui, &player, true, &[]));
             // No texture is made of it.
             output.textures_delta.clear();

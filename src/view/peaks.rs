@@ -55,7 +55,7 @@ struct Blow {
 /// How long a mark stays visible, s of viewing time; a flash half as long.
 pub const SEEN: f64 = 0.8;
 /// Half-life of the automatic scale, in multiples of the fade time: slow, so that lengths can be compared.
-const SCALE_HALF_LIFE: f64 = 2.5;
+const SCALE_HALF_LIFE: f64 = 0.75;
 /// A current force above this fraction of the peak counts as the peak: nothing to mark.
 const PRESENT: f32 = 0.95;
 /// Least brightness: a touch a hundred times softer than the hardest recent one still shows, but does not dazzle.

@@ -17,7 +17,7 @@ const PAGE: &str = "index.html";
 /// What keeps the page for when there is no network: knows all its files.
 const KEEPER: &str = "web/offline.js";
 /// Scripts, style and icons beside it, copied as they are.
-const PARTS: [&str; 12] = [
+const PARTS: [&str; 11] = [
     "web/stuck.js",
     "web/main.js",
     "web/host.js",
@@ -27,8 +27,7 @@ const PARTS: [&str; 12] = [
     "web/worker.js",
     "web/page.css",
     "web/icon.svg",
-    "web/icon-180.png",
-    "web/icon-512.png",
+    "web/icon-192.png",
     "web/page.webmanifest",
 ];
 
