@@ -1,6 +1,6 @@
 //! What the window does with the runs kept from before a change: keeping, saving, and the picture of one beside the machine.
 
-use eframe::egui::{self, Rect, Ui, pos2};
+use eframe::egui::{self, Button, Rect, Ui, pos2, vec2};
 
 use super::App;
 use super::compare::Comparison;
@@ -49,7 +49,7 @@ impl App {
     pub(super) fn advance_kept(&mut self, dt: f32) -> bool {
         let Self { plots, player, beside, .. } = self;
         let before = plots.comparison.beside().map(|(kept, _)| kept.run().pacer.shown());
-        let lags = plots.comparison.advance(player);
+        let lags = plots.comparison.advance(player, f64::from(dt));
         if let (Some((kept, _)), Some((_, picture))) = (plots.comparison.beside(), beside) {
             picture.advance(kept.run(), dt);
             if !player.is_playing() && before != Some(kept.run().pacer.shown()) {
@@ -63,7 +63,7 @@ impl App {
     pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
         let Self { plots, player, viewport, beside, .. } = self;
         let Some((kept, number)) = plots.comparison.beside() else {
-            (viewport.title, *beside) = (None, None);
+            (viewport.title, viewport.common, *beside) = (None, None, None);
             return area;
         };
         let (before, now) = halves(area);
@@ -79,15 +79,22 @@ impl App {
             }
         };
         picture.link(viewport);
+        let common = viewport.reference().max(picture.reference());
+        (viewport.common, picture.common) = (Some(common), Some(common));
         picture.title = Some(format!("before: {}", kept.name()));
         viewport.title = Some(format!("now: {}", kept.named_in(player)));
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(before).id_salt("before"));
-        picture.ui(&mut place, kept.run(), plain, &[]);
+        let close =
+            Rect::from_min_size(before.right_top() + vec2(-80.0, 10.0), vec2(70.0, ui.spacing().interact_size.y));
+        picture.ui(&mut place, kept.run(), plain, if plain { &[] } else { std::slice::from_ref(&close) });
         viewport.look_as(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
             // What cannot be pulled stays as it is.
             let _ = kept.run_mut().pull(pull);
+        }
+        if !plain && ui.put(close, Button::new("Close")).on_hover_text("The machine now alone").clicked() {
+            plots.comparison.show_alone();
         }
         now
     }

@@ -8,9 +8,11 @@ use super::{layout, value};
 
 /// Most runs pinned. One more is the latest before a change.
 const MOST_PINNED: usize = 3;
-/// Stepping time per frame for all of them, s: while the run plays, and while it does not.
-const BUDGET: f64 = 3e-3;
-const BUDGET_AT_REST: f64 = 12e-3;
+/// Stepping time per frame for all of them, as a share of the frame, and at least, s: while the run plays, and while one of them is
+/// waited for.
+const SHARE: f64 = 0.2;
+const LEAST_BUDGET: f64 = 3e-3;
+const WAITED_FOR: f64 = 3.0;
 /// Part of a member's colour in the grey of its curve before: enough to tell members apart.
 const HUE: f32 = 0.3;
 /// Length of the dashes of pinned curves, points.
@@ -69,6 +71,11 @@ impl Kept {
     /// Length of its dashes, points; `None` for a full line.
     pub fn dashes(&self) -> Option<f32> {
         self.place.checked_sub(1).map(|pinned| DASHES[pinned])
+    }
+
+    /// Whether it has yet to come to the instant that `player` shows.
+    fn lags(&self, player: &Player) -> bool {
+        self.run.reached() < player.pacer.shown() && self.run.stopped().is_none()
     }
 
     /// Where its record has what `player` records at `channel`.
@@ -149,10 +156,17 @@ impl Comparison {
         self.kept.iter().filter(|kept| kept.shown)
     }
 
-    /// Takes the runs to where `player` is; returns whether one of them still lags behind.
-    pub fn advance(&mut self, player: &Player) -> bool {
+    /// Whether the run that is shown beside the one of `player` has yet to come to the instant on show.
+    pub fn is_waited_for(&self, player: &Player) -> bool {
+        let beside = self.kept.iter().find(|kept| Some(kept.place) == self.beside);
+        beside.is_some_and(|kept| kept.lags(player))
+    }
+
+    /// Takes the runs to where `player` is, in a frame of `dt` seconds; returns whether one of them still lags behind.
+    pub fn advance(&mut self, player: &Player, dt: f64) -> bool {
         let start = (player.clock)();
-        let budget = if player.is_playing() { BUDGET } else { BUDGET_AT_REST };
+        let waited = !player.is_playing() || self.is_waited_for(player);
+        let budget = (SHARE * dt).max(LEAST_BUDGET) * if waited { WAITED_FOR } else { 1.0 };
         let may_step = || (player.clock)() - start < budget;
         let mut lags = false;
         for kept in &mut self.kept {
@@ -200,7 +214,7 @@ impl Comparison {
     }
 
     /// What the grey curves of a plot are, in what is left of a row `height` points high.
-    pub fn legend(&mut self, ui: &mut Ui, height: f32) {
+    pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32) {
         let dark = ui.visuals().dark_mode;
         let count = self.kept.len().max(1) as f32;
         let width = (ui.available_width() / count - 6.0).min(170.0);
@@ -208,7 +222,10 @@ impl Comparison {
             return;
         }
         for kept in &mut self.kept {
-            let text = format!("{} {}", LINES[kept.place], kept.name());
+            let mut text = format!("{} {}", LINES[kept.place], kept.name());
+            if kept.lags(player) {
+                text += &format!(" (so far to {})", value::time(kept.run.reached()));
+            }
             let mut text = RichText::new(text).small().color(kept.colour(Color32::GRAY, dark));
             if !kept.shown {
                 text = text.strikethrough();
@@ -260,14 +277,15 @@ impl Comparison {
                 ui.horizontal(|ui| {
                     ui.checkbox(&mut kept.shown, "Curves").on_hover_text("Its curves in the plots, grey");
                     let pinned = kept.place > 0;
-                    let pin = egui::Button::selectable(pinned, "Pin");
+                    let pin = egui::Button::new("Pin").selected(pinned);
                     let help = format!("Keep it when another parameter is changed; up to {MOST_PINNED}");
                     if ui.add_enabled(pinned || !full, pin).on_hover_text(help).clicked() {
                         wish = Some((at, Wish::Pin));
                     }
                     let beside = self.beside == Some(kept.place);
                     let help = "Its machine beside the machine now, at the same instant and from the same side";
-                    if ui.selectable_label(beside, "Side by side").on_hover_text(help).clicked() {
+                    let switch = egui::Button::new("Side by side").selected(beside);
+                    if ui.add(switch).on_hover_text(help).clicked() {
                         self.beside = (!beside).then_some(kept.place);
                     }
                     if ui.button("Save").on_hover_text("Its record, CSV").clicked() {
@@ -288,6 +306,11 @@ impl Comparison {
             }
             None => {}
         }
+    }
+
+    /// Shows the machine now alone again.
+    pub(super) fn show_alone(&mut self) {
+        self.beside = None;
     }
 
     /// The run whose machine is to be shown beside the one now, and its number.

@@ -14,7 +14,7 @@ use super::reload::{Given, SceneFile};
 use super::replay::Verdict;
 use super::share::shown::Instruments;
 use super::share::{Link, SceneText, is_link, shown};
-use super::{App, Notice};
+use super::{App, Notice, value};
 use crate::simulate::Channel;
 
 /// Rows of a saved record.
@@ -477,9 +477,9 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
 /// Description of a picture, stored in it.
 fn describe(player: &Player) -> String {
     let mut words = format!(
-        "{} at t = {} s, state hash {:016x}",
+        "{} at t = {}, state hash {:016x}",
         player.scene().name,
-        player.pacer.shown(),
+        value::time(player.pacer.shown()),
         player.simulation().state_hash()
     );
     for (key, value) in &player.scene().changes {

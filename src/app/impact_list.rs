@@ -30,7 +30,7 @@ const COLUMNS: [Column; 9] = [
     ("Restitution", 70.0, "Rebound speed over approach speed"),
     (
         "Law",
-        106.0,
+        132.0,
         "Restitution that the normal-force law gives an undisturbed impact. Disturbed: another joint was in contact meanwhile or \
          a parameter changed, so the law alone does not set the ratio. Slow: it began below the impact speed floor and rebounds \
          higher.",

@@ -74,9 +74,15 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
             ui.data_mut(|data| data.insert_temp(opened, true));
             ui.ctx().request_repaint();
         }
-        let elsewhere = ui
-            .memory(egui::Memory::focused)
-            .filter(|focused| *focused != response.id)
+        let focused = ui.memory(egui::Memory::focused);
+        // What had the focus when a click opened the menu, such as the slider moved last, may keep it.
+        let kept = response.id.with("focus when opened");
+        if response.clicked() {
+            ui.data_mut(|data| data.insert_temp(kept, focused));
+        }
+        let before = ui.data(|data| data.get_temp::<Option<Id>>(kept)).flatten();
+        let elsewhere = focused
+            .filter(|focused| *focused != response.id && Some(*focused) != before)
             .and_then(|focused| ui.ctx().read_response(focused))
             // A popup opened from a menu is in the foreground, too.
             .is_some_and(|focused| focused.layer_id.order != egui::Order::Foreground);
@@ -453,7 +459,7 @@ impl App {
         self.picture_rect = area;
         let presenting = self.is_presenting() || self.embedded().is_some();
         self.player.place_ghost();
-        let caption = self.caption_plate(ui, self.is_presenting());
+        let caption = self.caption_plate(ui, area, self.is_presenting());
         let mut above: Vec<_> = caption.iter().map(|(_, plate)| *plate).collect();
         let inner = area.shrink(10.0);
         let narrow = area.width() < 520.0;

@@ -791,7 +791,9 @@ impl App {
             return true;
         }
         let sought = self.player.is_seeking();
-        self.advance_heard(dt);
+        // Two machines side by side are seen at the same instant: the one now waits for the other.
+        let waits = self.plots.comparison.is_waited_for(&self.player);
+        self.advance_heard(if waits { 0.0 } else { dt });
         if sought && !self.player.is_seeking() {
             self.viewport.revisit(&self.player);
         }

@@ -505,7 +505,7 @@ impl Plots {
         }
 
         ui.vertical(|ui| {
-            self.title(ui, panel);
+            self.title(ui, player, panel);
             let font = egui::TextStyle::Small.resolve(ui.style());
             let axis = |hints: AxisHints<'static>| hints.tick_label_color(faint).tick_label_font(font.clone());
             let width = space.x - 12.0;
@@ -697,7 +697,7 @@ impl Plots {
     }
 
     /// What is shown with its unit, and its members as switches in the colours of their lines.
-    fn title(&mut self, ui: &mut Ui, panel: &Panel<'_>) {
+    fn title(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = vec2(4.0, 1.0);
@@ -723,7 +723,7 @@ impl Plots {
                 }
             }
             if panel.kind != PlotKind::Bands {
-                self.comparison.legend(ui, height);
+                self.comparison.legend(ui, player, height);
             }
         });
     }

@@ -221,10 +221,9 @@ impl App {
         Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
     }
 
-    /// The words of the caption and the plate they stand on: the impact under way at an instant that is looked at; when
+    /// The words of the caption and the plate they stand on in the picture's `area`: the impact under way at an instant that is looked at; when
     /// `presenting`, otherwise, the last one that ended.
-    pub(super) fn caption_plate(&self, ui: &Ui, presenting: bool) -> Option<(Arc<Galley>, Rect)> {
-        let area = ui.available_rect_before_wrap();
+    pub(super) fn caption_plate(&self, ui: &Ui, area: Rect, presenting: bool) -> Option<(Arc<Galley>, Rect)> {
         let ink = ui.visuals().strong_text_color();
         if !presenting && (!overlay::has_room(area) || self.picture.is_plain()) {
             return None;

@@ -94,8 +94,9 @@ pub struct Viewport {
     clicked: Option<usize>,
     /// What the frames on the screen allow; `None`: the options' quality, always.
     pace: Option<Pace>,
-    /// What it shows, where another picture is beside it.
+    /// What it shows, where another picture is beside it, and the force of the longest arrow in both, N.
     pub title: Option<String>,
+    pub(super) common: Option<f32>,
     /// Where it is shown.
     place: render::Place,
 }
@@ -133,6 +134,7 @@ impl Viewport {
             clicked: None,
             pace: None,
             title: None,
+            common: None,
             place: render::Place::Window,
         }
     }
@@ -140,6 +142,11 @@ impl Viewport {
     /// A second viewport, for another run beside the first.
     pub fn beside(player: &Player) -> Self {
         Self { place: render::Place::Beside, ..Self::new(player, ViewOptions::default()) }
+    }
+
+    /// Force of the longest arrow, N.
+    pub(super) fn reference(&self) -> f32 {
+        self.marks.reference(&self.options.arrows)
     }
 
     /// Looks from where `other` looks.
@@ -167,6 +174,17 @@ impl Viewport {
             distance: camera.distance,
             target: camera.target.to_array(),
         })
+    }
+
+    /// Width over height of the picture that the camera was placed for.
+    pub fn shape(&self) -> f32 {
+        self.fitted
+    }
+
+    /// As [`Self::set_pose`], placed for a picture of this [`Self::shape`].
+    pub fn set_pose_for(&mut self, pose: CameraPose, shape: f32) {
+        self.set_pose(pose);
+        self.fitted = shape;
     }
 
     /// Places the camera.
@@ -513,6 +531,8 @@ impl Viewport {
     fn list_next(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let mut list = std::mem::take(&mut self.next);
         let drawn = screen.drawn_with(quality);
+        let own = self.options.arrows.reference;
+        self.options.arrows.reference = own.or(self.common);
         let shot = shot!(self, player, camera, drawn);
         self.view.build(&shot, &mut list);
         list.quality = quality;
@@ -520,6 +540,7 @@ impl Viewport {
         if let Some(wear) = player.wear() {
             self.view.add_wear(&shot, wear, &mut list);
         }
+        self.options.arrows.reference = own;
         self.next = list;
         said
     }

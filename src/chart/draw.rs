@@ -23,6 +23,8 @@ pub struct Sheet {
     pub size: (u32, u32),
     /// A line under everything; "" leaves it out.
     pub note: String,
+    /// Each chart has a legend of its own: the same colours stand for other things in each.
+    pub apart: bool,
 }
 
 /// Sizes of text, pixels.
@@ -80,10 +82,8 @@ impl Sheet {
             write(root, &self.note, (0.5 * width, bottom), &style)?;
             bottom -= TEXT + 8.0;
         }
-        let rows = self.legend_rows(width);
-        bottom -= ROW * rows.len() as f64;
-        for (n, row) in rows.iter().enumerate() {
-            draw_legend(root, row, width, bottom + ROW * (n as f64 + 0.5))?;
+        if !self.apart {
+            bottom = draw_legends(root, &self.charts, 0.0, width, bottom)?;
         }
         let columns = self.columns.clamp(1, self.charts.len().max(1));
         let lines = self.charts.len().div_ceil(columns).max(1);
@@ -93,34 +93,46 @@ impl Sheet {
         }
         for (n, chart) in self.charts.iter().enumerate() {
             let (x, y) = ((n % columns) as f64 * w, top + (n / columns) as f64 * h);
-            let area = root.clone().shrink((fine(x), fine(y)), (fine(w), fine(h)));
+            let legend = if self.apart { std::slice::from_ref(chart) } else { &[] };
+            let low = draw_legends(root, legend, x, w, y + h)?;
+            let area = root.clone().shrink((fine(x), fine(y)), (fine(w), fine(low - y)));
             draw_chart(root, &area, chart)?;
         }
         Ok(())
     }
+}
 
-    /// Legend entries without duplicates, broken into rows.
-    fn legend_rows(&self, width: f64) -> Vec<Vec<&Series>> {
-        let mut rows: Vec<Vec<&Series>> = Vec::new();
-        let mut used = f64::INFINITY;
-        let mut names: Vec<&str> = Vec::new();
-        for series in self.charts.iter().flat_map(|chart| &chart.series) {
-            if series.label.is_empty() || names.contains(&series.label.as_str()) {
-                continue;
-            }
-            names.push(&series.label);
-            let entry = entry_width(series);
-            if used + entry > width - 24.0 {
-                rows.push(Vec::new());
-                used = 0.0;
-            }
-            used += entry;
-            if let Some(row) = rows.last_mut() {
-                row.push(series);
-            }
+/// Legend entries of `charts` without duplicates, broken into rows.
+fn legend_rows(charts: &[Chart], width: f64) -> Vec<Vec<&Series>> {
+    let mut rows: Vec<Vec<&Series>> = Vec::new();
+    let mut used = f64::INFINITY;
+    let mut names: Vec<&str> = Vec::new();
+    for series in charts.iter().flat_map(|chart| &chart.series) {
+        if series.label.is_empty() || names.contains(&series.label.as_str()) {
+            continue;
         }
-        rows
+        names.push(&series.label);
+        let entry = entry_width(series);
+        if used + entry > width - 24.0 {
+            rows.push(Vec::new());
+            used = 0.0;
+        }
+        used += entry;
+        if let Some(row) = rows.last_mut() {
+            row.push(series);
+        }
     }
+    rows
+}
+
+/// Draws the legend of `charts` above `bottom`, from `left` on in `width`; returns its upper edge.
+fn draw_legends(root: &Canvas, charts: &[Chart], left: f64, width: f64, bottom: f64) -> Result<f64, SheetError> {
+    let rows = legend_rows(charts, width);
+    let top = bottom - ROW * rows.len() as f64;
+    for (n, row) in rows.iter().enumerate() {
+        draw_legend(root, row, left, width, top + ROW * (n as f64 + 0.5))?;
+    }
+    Ok(top)
 }
 
 fn text_width(text: &str, size: f64) -> f64 {
@@ -131,9 +143,9 @@ fn entry_width(series: &Series) -> f64 {
     SAMPLE + 6.0 + text_width(&series.label, TEXT) + GAP
 }
 
-fn draw_legend(root: &Canvas, row: &[&Series], width: f64, y: f64) -> Result<(), SheetError> {
+fn draw_legend(root: &Canvas, row: &[&Series], left: f64, width: f64, y: f64) -> Result<(), SheetError> {
     let total: f64 = row.iter().map(|series| entry_width(series)).sum();
-    let mut x = 0.5 * (width - total + GAP);
+    let mut x = left + 0.5 * (width - total + GAP);
     let style = style(TEXT, INK, HPos::Left, VPos::Center);
     for series in row {
         if series.line {

@@ -50,7 +50,14 @@ fn sheet(size: (u32, u32)) -> Sheet {
         series: vec![series("broken", broken, 1), series("empty", Vec::new(), 2)],
         ..Chart::default()
     };
-    Sheet { title: "Two charts".to_owned(), charts: vec![linear, log], columns: 2, size, note: "a note".to_owned() }
+    Sheet {
+        title: "Two charts".to_owned(),
+        charts: vec![linear, log],
+        columns: 2,
+        size,
+        note: "a note".to_owned(),
+        apart: false,
+    }
 }
 
 #[test]
@@ -178,6 +185,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
         columns: 2,
         size: (900, 360),
         note: String::new(),
+        apart: false,
     };
     let svg = sheet.svg().unwrap();
     for word in ["kN", "even", "odd", "Clearance (mm)"] {
@@ -211,6 +219,7 @@ fn a_hundred_thousand_points_make_no_large_file() {
             columns: 1,
             size: (600, 400),
             note: String::new(),
+            apart: false,
         }
         .svg()
         .unwrap()
@@ -233,6 +242,7 @@ fn a_line_stands_no_higher_than_its_peak() {
             size: (500, 400),
             title: String::new(),
             note: String::new(),
+            apart: false,
         };
         let png = sheet.png(2.0).unwrap();
         let picture = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();

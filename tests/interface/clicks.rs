@@ -160,3 +160,18 @@ fn a_time_scale_is_chosen_from_the_list_by_a_mouse_and_by_a_drag_across_it() {
         assert!(!Popup::is_any_open(&harness.ctx), "a drag opens nothing");
     }
 }
+
+#[test]
+fn a_menu_opens_at_the_first_click_after_a_slider_was_drawn() {
+    for menu in ["Save", "Lessons", "Before and after (1)"] {
+        let mut harness = sized("slider-crank", WIDE, egui::Theme::Light);
+        let track = harness.get_by_role_and_label(Role::Slider, "Clearance").rect();
+        harness.drag_at(track.left_center() + vec2(12.0, 0.0));
+        harness.hover_at(track.left_center() + vec2(90.0, 0.0));
+        harness.run_steps(2);
+        harness.drop_at(track.left_center() + vec2(90.0, 0.0));
+        harness.run_steps(45);
+        press_on(&mut harness, Role::Button, menu);
+        assert!(Popup::is_any_open(&harness.ctx), "{menu}");
+    }
+}

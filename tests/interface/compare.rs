@@ -174,3 +174,31 @@ fn two_machines_of_the_same_parameters_are_the_same_picture() {
     assert!(differing(&same, &turned, middle, 0) > 1000, "turned");
     assert_eq!(differing(&turned, &turned, middle, by), 0);
 }
+
+#[test]
+fn the_machine_now_waits_for_the_one_beside_it() {
+    let mut harness = window();
+    set(&mut harness, "Clearance", 0.9);
+    // The one now is far ahead, and goes on.
+    harness.state_mut().run_to(0.3);
+    click(&mut harness, "Before and after (1)");
+    click(&mut harness, "Side by side");
+    click(&mut harness, "Before and after (1)");
+    let instants = |harness: &Harness<'_, App>| {
+        let app = harness.state();
+        [app.comparison().kept()[0].run().pacer.shown(), app.player().pacer.shown()]
+    };
+    harness.state_mut().player_mut().set_playing(true);
+    let mut waited = 0;
+    while instants(&harness)[0] < 0.3 {
+        assert_eq!(instants(&harness)[1], 0.3, "it goes on alone");
+        harness.step();
+        waited += 1;
+        assert!(waited < 5000);
+    }
+    harness.run_steps(30);
+    let [before, now] = instants(&harness);
+    assert!(now > 0.3 && (now - before).abs() < 0.05, "{before} {now}");
+    click(&mut harness, "Close");
+    assert!(harness.query_by_label("3D view before the change").is_none());
+}

@@ -312,6 +312,13 @@ fn the_window_comes_back_as_it_was_when_a_lesson_ends() {
         };
         assert_eq!(panels(&harness), [true, false, true]);
         let before = harness.state().share_state();
+        let kept = |harness: &Harness<'_, App>| {
+            let names: Vec<String> = harness.state().comparison().kept().iter().map(|kept| kept.name()).collect();
+            (names, harness.state().undo_words(false))
+        };
+        let kept_before = kept(&harness);
+        assert_eq!(kept_before.0, ["Clearance: 0.3 mm"]);
+        assert!(kept_before.1.is_some());
         let title = &Lesson::built_in(name).expect("a lesson").title;
         harness.get_by_label("Lessons").click();
         harness.run_steps(3);
@@ -325,6 +332,7 @@ fn the_window_comes_back_as_it_was_when_a_lesson_ends() {
         harness.get_by_label("Leave the lesson").click();
         harness.run_steps(60);
         assert_eq!(harness.state().share_state(), before, "{name}");
+        assert_eq!(kept(&harness), kept_before, "{name}");
         assert_eq!(panels(&harness), [true, false, true], "{name}");
     }
 }

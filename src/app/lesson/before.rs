@@ -2,10 +2,12 @@
 
 use super::Lesson;
 use crate::app::bench::Bench;
+use crate::app::compare::Comparison;
 use crate::app::layout::Sheet;
 use crate::app::player::Player;
 use crate::app::plots::PlotChoice;
 use crate::app::reload::SceneFile;
+use crate::app::undo::Undo;
 use crate::app::{App, CameraPose};
 use crate::view::{Picked, ViewOptions};
 
@@ -18,11 +20,15 @@ pub struct WindowBefore {
     bench: Bench,
     options: ViewOptions,
     pose: Option<CameraPose>,
+    shape: f32,
     followed: Option<Picked>,
     /// Whether the microscope was open, and its ball joint.
     microscope: (bool, usize),
     ideal: bool,
     scale: f64,
+    /// Runs kept from before a change, and what can be undone.
+    comparison: Comparison,
+    undo: Undo,
     /// The run and its file, once a scene of the lesson has replaced them.
     run: Option<(Player, SceneFile)>,
 }
@@ -41,10 +47,13 @@ impl App {
             bench: std::mem::take(&mut self.bench),
             options: self.viewport.options.clone(),
             pose: self.viewport.pose(),
+            shape: self.viewport.shape(),
             followed: self.viewport.followed(),
             microscope: (self.microscope.is_open(), self.microscope.joint()),
             ideal: self.player.ideal().is_some(),
             scale: self.player.pacer.scale(),
+            comparison: std::mem::take(&mut self.plots.comparison),
+            undo: std::mem::take(&mut self.undo),
             run: None,
         }));
     }
@@ -83,12 +92,13 @@ impl App {
             self.controls.clear();
             self.timeline.reset();
             self.viewport.show_scene(&self.player);
+            (self.plots.comparison, self.undo) = (before.comparison, before.undo);
         } else {
             self.player.pacer.set_scale(before.scale);
             self.show_ideal(before.ideal);
         }
         if let Some(pose) = before.pose {
-            self.viewport.set_pose(pose);
+            self.viewport.set_pose_for(pose, before.shape);
         }
         self.viewport.follow(before.followed);
         self.microscope.focus(before.microscope.1);

@@ -85,7 +85,7 @@ impl Plots {
         let columns = COLUMNS.min(charts.len());
         let rows = charts.len().div_ceil(columns.max(1)) as u32;
         let size = (CHART.0 * columns as u32, CHART.1 * rows + REST);
-        (!charts.is_empty()).then_some(Sheet { title: String::new(), charts, columns, size, note })
+        (!charts.is_empty()).then_some(Sheet { title: String::new(), charts, columns, size, note, apart: true })
     }
 
     fn chart(&self, player: &Player, panel: &Panel<'_>) -> Chart {

@@ -46,7 +46,14 @@ pub(super) fn picture_name(variant: &Variant, name: &str) -> String {
 /// Charts in rows of two.
 fn sheet(charts: Vec<Chart>) -> Sheet {
     let rows = charts.len().div_ceil(2) as u32;
-    Sheet { title: String::new(), charts, columns: 2, size: (WIDTH, ROW * rows + 34), note: String::new() }
+    Sheet {
+        title: String::new(),
+        charts,
+        columns: 2,
+        size: (WIDTH, ROW * rows + 34),
+        note: String::new(),
+        apart: false,
+    }
 }
 
 fn axis(label: &str, unit: &str) -> Axis {

@@ -52,6 +52,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
         charts,
         columns,
         note: format!("jointplay {}, {machine}", crate::VERSION),
+        apart: false,
     }
 }
 
