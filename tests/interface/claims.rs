@@ -373,7 +373,7 @@ fn walk(mode: Mode) -> Vec<String> {
             };
             check(&mut shown, Begins);
             if play(&mut shown.harness) {
-                shown.harness.run_steps(30);
+                shown.harness.run_steps(8);
                 check(&mut shown, Ends);
             }
             press(&mut shown.harness, Key::PageDown);
@@ -385,7 +385,7 @@ fn walk(mode: Mode) -> Vec<String> {
 /// Keeps the picture where `KEEP_PICTURES` says.
 fn keep_picture(shown: &mut Shown, name: &str) {
     if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
-        shown.harness.run_steps(30);
+        shown.harness.run_steps(8);
         let image = shown.harness.render().expect("drawn");
         let mode = format!("{:?}", shown.mode).to_lowercase();
         image.save(std::path::Path::new(&keep).join(format!("{mode}_{name}.png"))).expect("writable");
