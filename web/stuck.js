@@ -11,7 +11,8 @@ if (window !== window.top) {
 
 // The program did not come: the page says so.
 function stuck() {
-    var sealed = window.origin === 'null';
+    // A page that was opened as a file has no origin either.
+    var sealed = window !== window.top && window.origin === 'null';
     document.getElementById(sealed ? 'sealed' : 'stuck').hidden = false;
 }
 
