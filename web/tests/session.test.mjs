@@ -148,7 +148,7 @@ test('loading the page anew goes on from what was shown, and what no address hol
         sessionStorage.clear();
         location.hash = address;
     }, address);
-    await lab.says('kept in the tab');
+    await lab.says('stored only in the browser tab');
     await lab.close();
 });
 
