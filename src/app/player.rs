@@ -18,8 +18,8 @@ use crate::analysis::presets::too_slow;
 use crate::analysis::section::Schedule;
 use crate::scene::{SOLVER_KEYS, Scene, Value};
 use crate::simulate::{
-    ChangeError, Channels, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
-    StartError, Stopped, Wear,
+    ChangeError, Channels, ContactState, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS,
+    Simulation, StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
 use impact_record::ImpactRecord;
@@ -981,7 +981,22 @@ impl Player {
         self.run_at(shown).sample(shown, &mut frame);
         // The hand is shown where it is now, though the run feels it only from its next step on.
         frame.pull = self.simulation.pull_in(&frame);
+        if !self.playing && self.unchanged.is_some() {
+            self.show_changed_clearances(&mut frame);
+        }
         self.frame = frame;
+    }
+
+    /// Who changes the clearance of a ball in flight while the run is paused sees it at once, though the run has it only from its next
+    /// step on.
+    fn show_changed_clearances(&mut self, frame: &mut Frame) {
+        let mut next = Frame::default();
+        self.simulation.sample(self.simulation.time(), &mut next);
+        let pairs = frame.joints.iter_mut().zip(&next.joints);
+        for (own, next) in pairs.filter(|(own, _)| own.state == ContactState::Free) {
+            own.penetration += own.clearance - next.clearance;
+            own.clearance = next.clearance;
+        }
     }
 
     fn show_latest(&mut self) {
