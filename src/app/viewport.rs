@@ -991,9 +991,9 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "full: a minute"]
+    #[ignore = "full: half a minute"]
     fn full_what_is_written_over_a_machine_hides_none_of_it_and_stays_where_it_is() {
-        watch(&PICTURES, 20);
+        watch(&PICTURES, 8);
     }
 
     /// Watches each scene for ten seconds, in pictures of all `sizes`, with so many `frames`.
