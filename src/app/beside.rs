@@ -93,7 +93,7 @@ impl App {
             // What cannot be pulled stays as it is.
             let _ = kept.run_mut().pull(pull);
         }
-        if !plain && ui.put(close, Button::new("Close")).on_hover_text("The machine now alone").clicked() {
+        if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show the present machine alone").clicked() {
             plots.comparison.show_alone();
         }
         now

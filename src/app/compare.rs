@@ -224,7 +224,7 @@ impl Comparison {
         for kept in &mut self.kept {
             let mut text = format!("{} {}", LINES[kept.place], kept.name());
             if kept.lags(player) {
-                text += &format!(" (so far to {})", value::time(kept.run.reached()));
+                text += &format!(" (computed to {})", value::time(kept.run.reached()));
             }
             let mut text = RichText::new(text).small().color(kept.colour(Color32::GRAY, dark));
             if !kept.shown {
@@ -237,7 +237,7 @@ impl Comparison {
             });
             let response = response.inner;
             ui.ctx().accesskit_node_builder(response.id, |node| node.set_toggled(kept.shown.into()));
-            if response.on_hover_text("The run before the change: its curves shown or hidden").clicked() {
+            if response.on_hover_text("Show or hide the curves of the run before the change").clicked() {
                 kept.shown = !kept.shown;
             }
         }
@@ -249,14 +249,13 @@ impl Comparison {
             0 => "Before and after".to_owned(),
             count => format!("Before and after ({count})"),
         };
-        let help = "Runs as they were before a change of a parameter: in the plots, or beside the picture";
+        let help = "Runs with the old value of a changed parameter: in the plots, or side by side";
         layout::menu(ui, &name, true, |ui| self.entries(ui, player)).on_hover_text(help);
     }
 
     fn entries(&mut self, ui: &mut Ui, player: &Player) {
-        ui.checkbox(&mut self.on, "Keep the run before a change").on_hover_text(
-            "When a parameter is changed, the run goes on with the old value beside the new one: its curves are grey",
-        );
+        ui.checkbox(&mut self.on, "Keep the run before a change")
+            .on_hover_text("When a parameter changes, a second run continues with the old value; its curves are grey");
         if self.kept.is_empty() {
             ui.weak("Change a parameter to compare");
         }
@@ -275,23 +274,24 @@ impl Comparison {
                     kept.name = None;
                 }
                 ui.horizontal(|ui| {
-                    ui.checkbox(&mut kept.shown, "Curves").on_hover_text("Its curves in the plots, grey");
+                    ui.checkbox(&mut kept.shown, "Curves").on_hover_text("Show its curves in the plots, in grey");
                     let pinned = kept.place > 0;
                     let pin = egui::Button::new("Pin").selected(pinned);
-                    let help = format!("Keep it when another parameter is changed; up to {MOST_PINNED}");
+                    let help = format!("Keep this run when another parameter changes; at most {MOST_PINNED}");
                     if ui.add_enabled(pinned || !full, pin).on_hover_text(help).clicked() {
                         wish = Some((at, Wish::Pin));
                     }
                     let beside = self.beside == Some(kept.place);
-                    let help = "Its machine beside the machine now, at the same instant and from the same side";
+                    let help =
+                        "Show this machine beside the present one, at the same instant and from the same point of view";
                     let switch = egui::Button::new("Side by side").selected(beside);
                     if ui.add(switch).on_hover_text(help).clicked() {
                         self.beside = (!beside).then_some(kept.place);
                     }
-                    if ui.button("Save").on_hover_text("Its record, CSV").clicked() {
+                    if ui.button("Save").on_hover_text("Save its record as CSV").clicked() {
                         wish = Some((at, Wish::Save));
                     }
-                    if ui.button("Remove").on_hover_text("Forget this run").clicked() {
+                    if ui.button("Remove").on_hover_text("Discard this run").clicked() {
                         wish = Some((at, Wish::Remove));
                     }
                 });

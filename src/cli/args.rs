@@ -63,8 +63,8 @@ pub struct SceneArguments {
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
-    /// The scene of a share link instead, with the parameters that its run began with; `run` does what was done on the way as well,
-    /// to the link's instant, and compares the state's hash.
+    /// Use the scene of a share link, with its initial parameters. `run` also replays the live changes up to the link's instant
+    /// and compares the state hash.
     #[arg(long, value_name = "LINK", conflicts_with_all = ["scene", "changes"])]
     pub link: Option<String>,
 }
@@ -150,7 +150,7 @@ pub struct RunArguments {
     /// File for the state at the end, from which --from-state resumes, with the same bits as a run without a break.
     #[arg(long, value_name = "FILE")]
     pub save_state: Option<PathBuf>,
-    /// Go on from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.
+    /// Resume from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.
     #[arg(long, value_name = "FILE", conflicts_with = "link")]
     pub from_state: Option<PathBuf>,
     /// Form of the summary on standard output.
@@ -253,8 +253,8 @@ pub struct RenderArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Instants to draw, e.g. `0s,7.85ms`. They end no step: a state hash is that at the end of the step that an instant lies in,
-    /// and not the one of `run --duration`, which ends a step there.
+    /// Instants to draw, e.g. `0s,7.85ms`. They do not end a step: the manifest has the state hash at the end of the step that
+    /// contains the instant, while `run --duration` ends a step there and so reports another hash.
     #[arg(long, value_name = "TIME,…", value_delimiter = ',', allow_hyphen_values = true)]
     pub at: Vec<String>,
     /// Simulated time of a film, e.g. `0.1s`.

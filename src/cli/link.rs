@@ -83,7 +83,7 @@ impl Way {
         let steps = simulation.statistics().steps;
         while let Some(entry) = self.entries.pop_front_if(|entry| entry.steps <= steps && entry.event != Event::Stop) {
             let done = self.apply(simulation, &entry.event);
-            done.map_err(|error| format!("the link's change after {} steps: {error}", entry.steps))?;
+            done.map_err(|error| format!("the change that the link made after {} steps: {error}", entry.steps))?;
         }
         Ok(())
     }
@@ -122,13 +122,13 @@ impl Way {
     pub fn verdict(&self, simulation: &Simulation) -> Result<String, String> {
         let found = simulation.state_hash();
         match self.hash {
-            None => Ok("it has no hash to compare with".to_owned()),
+            None => Ok("the link has no hash to compare with".to_owned()),
             Some(wanted) if wanted == found => Ok(format!("state reproduced: hash {found:016x} agrees")),
             Some(wanted) => {
                 let made =
                     self.version.as_deref().map_or("another version".to_owned(), |made| format!("version {made}"));
                 Err(format!(
-                    "the state has the hash {found:016x}, the link says {wanted:016x}; it was made by {made}, this is {}",
+                    "the state hash is {found:016x}, the link says {wanted:016x}; the link was made by {made}, this is {}",
                     crate::VERSION
                 ))
             }
