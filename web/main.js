@@ -389,7 +389,7 @@ async function main() {
         if (location.href !== newURL) history.replaceState(null, '', newURL);
         opened = location.hash;
         // What came with the page has been read.
-        if (location.search !== ownQuery()) history.replaceState(history.state, '', location.pathname + ownQuery() + opened);
+        if (!framed && location.search !== ownQuery()) history.replaceState(history.state, '', location.pathname + ownQuery() + opened);
         // Another way to draw needs another start.
         if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) {
             mendable = Infinity;

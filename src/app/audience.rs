@@ -145,7 +145,7 @@ impl App {
         }
         CentralPanel::no_frame().show(ui, |ui| {
             let area = ui.available_rect_before_wrap();
-            let caption = self.caption_plate(ui, ui.available_rect_before_wrap(), true);
+            let caption = self.caption_plate(ui, area, true);
             let above = caption.as_ref().map(|(_, plate)| *plate);
             self.viewport.second_ui(ui, &self.player, present::THICKNESS, above);
             self.caption(ui, area, caption);

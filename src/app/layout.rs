@@ -5,6 +5,7 @@ use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollAr
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
 use super::{App, present, theme, transport};
+use crate::view::Preset;
 
 /// Below this width or height the window is small, points.
 const NARROW: f32 = 760.0;
@@ -467,10 +468,10 @@ impl App {
         // Beside the microscope of a phone the time needs all of the upper edge.
         let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {
-            let names = ["View options", "Isometric", "Front", "Side", "Top", "Fit"];
-            let buttons = names[..if narrow { 1 } else { names.len() }].iter().map(|name| {
+            let cameras = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).filter(|_| !narrow);
+            let buttons = ["View options"].into_iter().chain(cameras).map(|name| {
                 let font = egui::TextStyle::Button.resolve(ui.style());
-                let words = ui.painter().layout_no_wrap((*name).to_owned(), font, egui::Color32::BLACK);
+                let words = ui.painter().layout_no_wrap(name.to_owned(), font, egui::Color32::BLACK);
                 words.size().x + 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x
             });
             let size = egui::vec2(buttons.sum(), row.y);

@@ -4,8 +4,8 @@
 //! and are not logged.
 
 use crate::analysis::section::Schedule;
-use crate::scene::Vec3;
-use crate::simulate::Pull;
+use crate::scene::{SOLVER_KEYS, Scene, Value, Vec3};
+use crate::simulate::{ChangeError, Effect, Pull, Simulation};
 
 /// Largest stiffness in N/m, and damping in N s/m, of a hand in a log.
 const STIFFEST: f64 = 1e9;
@@ -47,6 +47,29 @@ impl Event {
             key: key.to_owned(),
             // One line per event: line breaks count as spaces.
             value: value.split_whitespace().collect::<Vec<_>>().join(" "),
+        }
+    }
+
+    /// Makes the change in `run`; `original` is the scene as its file gives it. Sections and a refused step change nothing: they are
+    /// for whoever steps the run.
+    ///
+    /// # Errors
+    /// As [`Simulation::set`]; nothing has changed then.
+    pub fn apply(&self, run: &mut Simulation, original: &Scene) -> Result<Effect, ChangeError> {
+        match self {
+            Self::Set { key, value } => {
+                let effect = run.set(key, value)?;
+                if key == "solver.preset" {
+                    // A preset chosen live must take effect: it replaces solver keys set by name before.
+                    for by_name in SOLVER_KEYS {
+                        run.set_value(by_name, &Value::Unset)?;
+                    }
+                }
+                Ok(effect)
+            }
+            Self::Original { key } => run.set_value(key, &original.get(key)?),
+            Self::Pull(pulled) => run.pull(pulled.map(Pull::from)).map(|()| Effect::Now),
+            Self::Sections { .. } | Self::Stop => Ok(Effect::Now),
         }
     }
 

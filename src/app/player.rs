@@ -637,8 +637,9 @@ impl Player {
             self.branch();
         }
         let before = self.wanted().changes.clone();
-        let effect = self.apply_set(key, value)?;
-        self.note(Event::set(key, value));
+        let event = Event::set(key, value);
+        let effect = self.apply(&event)?;
+        self.note(event);
         self.note_edits(&before);
         self.changed_from(run_before);
         Ok(effect)
@@ -678,14 +679,17 @@ impl Player {
         }
     }
 
-    fn apply_set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
-        let effect = self.change(|run| run.set(key, value))?;
-        if key == "solver.preset" {
-            // A preset chosen here must take effect: it replaces solver keys set by name before.
-            for by_name in SOLVER_KEYS {
-                self.simulation.set_value(by_name, &Value::Unset)?;
-            }
-        }
+    /// Makes a change of the run at its latest state. The rest of the latest step is still shown as it was.
+    fn apply(&mut self, event: &Event) -> Result<Effect, ChangeError> {
+        let Self { simulation: run, unchanged, original, pacer, .. } = self;
+        let effect = if pacer.shown() >= run.time() || run.step_start() >= run.time() {
+            event.apply(run, original)?
+        } else {
+            let mut copy = Simulation::of(&run.snapshot());
+            let effect = event.apply(&mut copy, original)?;
+            *unchanged = Some(Box::new(std::mem::replace(run, copy)));
+            effect
+        };
         self.after_change();
         Ok(effect)
     }
@@ -706,18 +710,11 @@ impl Player {
         let run_before = self.before_change();
         self.branch();
         let before = self.wanted().changes.clone();
-        let effect = self.apply_original(key)?;
-        let key = key.to_owned();
-        self.note(Event::Original { key });
+        let event = Event::Original { key: key.to_owned() };
+        let effect = self.apply(&event)?;
+        self.note(event);
         self.note_edits(&before);
         self.changed_from(run_before);
-        Ok(effect)
-    }
-
-    fn apply_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
-        let value = self.original.get(key)?;
-        let effect = self.change(|run| run.set_value(key, &value))?;
-        self.after_change();
         Ok(effect)
     }
 
@@ -738,27 +735,10 @@ impl Player {
             self.log.entries.pop();
             self.event_times.pop();
         }
-        self.apply_pull(pull)?;
-        self.note(Event::Pull(pull.map(Into::into)));
+        let event = Event::Pull(pull.map(Into::into));
+        self.apply(&event)?;
+        self.note(event);
         Ok(())
-    }
-
-    fn apply_pull(&mut self, pull: Option<Pull>) -> Result<Effect, ChangeError> {
-        self.change(|run| run.pull(pull))?;
-        self.after_change();
-        Ok(Effect::Now)
-    }
-
-    /// Changes the run at its latest state. The rest of the latest step is still shown as it was.
-    fn change<T>(&mut self, change: impl FnOnce(&mut Simulation) -> Result<T, ChangeError>) -> Result<T, ChangeError> {
-        let run = &mut self.simulation;
-        if self.pacer.shown() >= run.time() || run.step_start() >= run.time() {
-            return change(run);
-        }
-        let mut copy = Simulation::of(&run.snapshot());
-        let done = change(&mut copy)?;
-        self.unchanged = Some(Box::new(std::mem::replace(run, copy)));
-        Ok(done)
     }
 
     fn after_change(&mut self) {

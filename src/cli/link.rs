@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use super::Failure;
 use crate::analysis::section::Schedule;
 use crate::app::{Entry, Event, Link};
-use crate::scene::{SOLVER_KEYS, Scene, Value};
-use crate::simulate::{ChangeError, Simulation};
+use crate::scene::Scene;
+use crate::simulate::Simulation;
 
 /// The rest of a link's run.
 pub struct Way {
@@ -82,32 +82,9 @@ impl Way {
     fn do_due(&mut self, simulation: &mut Simulation) -> Result<(), String> {
         let steps = simulation.statistics().steps;
         while let Some(entry) = self.entries.pop_front_if(|entry| entry.steps <= steps && entry.event != Event::Stop) {
-            let done = self.apply(simulation, &entry.event);
+            self.sections = entry.event.schedule().or(self.sections);
+            let done = entry.event.apply(simulation, &self.original);
             done.map_err(|error| format!("the change that the link made after {} steps: {error}", entry.steps))?;
-        }
-        Ok(())
-    }
-
-    fn apply(&mut self, simulation: &mut Simulation, event: &Event) -> Result<(), ChangeError> {
-        match event {
-            Event::Set { key, value } => {
-                simulation.set(key, value)?;
-                if key == "solver.preset" {
-                    // As in the window: it replaces what was set by name before.
-                    for by_name in SOLVER_KEYS {
-                        simulation.set_value(by_name, &Value::Unset)?;
-                    }
-                }
-            }
-            Event::Original { key } => {
-                let value = self.original.get(key)?;
-                simulation.set_value(key, &value)?;
-            }
-            Event::Pull(pulled) => {
-                simulation.pull(pulled.map(Into::into))?;
-            }
-            Event::Sections { .. } => self.sections = event.schedule(),
-            Event::Stop => {}
         }
         Ok(())
     }

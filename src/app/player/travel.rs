@@ -5,10 +5,10 @@ use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
 use super::{FINEST_BIN, Player, sentences};
-use crate::app::log::{Entry, Event};
+use crate::app::log::Event;
 use crate::app::paths::Paths;
 use crate::app::settled::Settling;
-use crate::simulate::{Bin, History, Pull};
+use crate::simulate::{Bin, History};
 
 /// Most steps retaken before a past instant, so that the plots show in detail what led to it.
 const LEAD: u64 = 512;
@@ -315,22 +315,13 @@ impl Player {
             }
             let entry = entry.clone();
             self.applied += 1;
-            self.apply(&entry);
-        }
-    }
-
-    fn apply(&mut self, entry: &Entry) {
-        // It was accepted before, for the same scene in the same state.
-        let _ = match &entry.event {
-            Event::Set { key, value } => self.apply_set(key, value),
-            Event::Original { key } => self.apply_original(key),
-            Event::Pull(pulled) => self.apply_pull(pulled.map(Pull::from)),
-            Event::Sections { .. } => {
-                self.sections = entry.event.schedule();
-                return;
+            if let Some(schedule) = entry.event.schedule() {
+                self.sections = Some(schedule);
+            } else {
+                // It was accepted before, for the same scene in the same state.
+                let _ = self.apply(&entry.event);
             }
-            Event::Stop => return,
-        };
+        }
     }
 
     /// Continues from the displayed instant by retaking the known steps; if more events were logged after it, that future is
