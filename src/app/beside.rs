@@ -18,16 +18,17 @@ fn halves(area: Rect) -> (Rect, Rect) {
 }
 
 impl App {
-    /// Keeps the run as it was before the change of `key` that was just made, unless a lesson is under way, which speaks of its own
-    /// plots; from now on the run before the next change is kept, if a gesture is over.
-    pub(super) fn compare(&mut self, key: Option<&str>, is_over: bool) {
+    /// Keeps the run as it was before a change that was just made, unless a lesson is under way, which speaks of its own plots.
+    /// `is_over`: the gesture that made it has ended.
+    pub(super) fn compare(&mut self, is_over: bool) {
         let comparison = &mut self.plots.comparison;
         let wanted = comparison.is_on() && self.course.is_none();
-        if let Some((run, key)) = self.player.take_before().filter(|_| wanted).zip(key) {
-            comparison.add(run, key.to_owned());
+        if let Some((run, key)) = self.player.take_before().filter(|_| wanted) {
+            comparison.add(run, key);
         }
-        if is_over || !wanted {
-            self.player.keep_before(wanted);
+        self.player.keep_before(wanted);
+        if is_over {
+            self.player.end_gesture();
         }
     }
 

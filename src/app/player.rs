@@ -83,9 +83,11 @@ pub struct Player {
     log: Log,
     /// Changes of parameters since they were last taken.
     edits: Vec<Edit>,
-    /// Whether the run is to be copied before its next change; and that copy.
+    /// Whether the run is copied before a change; the parameter of the gesture under way, which is one change; and the latest copy with
+    /// the parameter that was changed after it.
     keeps_before: bool,
-    before: Option<Box<Self>>,
+    gesture: Option<String>,
+    before: Option<(Box<Self>, String)>,
     /// Number of log entries before the displayed instant; and the time of every entry, s.
     applied: usize,
     event_times: Vec<f64>,
@@ -181,6 +183,7 @@ impl Player {
             log: Log::new(&scene.changes),
             edits: Vec::new(),
             keeps_before: false,
+            gesture: None,
             before: None,
             sections: None,
             watch: RunWatch::new(scene),
@@ -231,6 +234,7 @@ impl Player {
             log: self.log.clone(),
             edits: Vec::new(),
             keeps_before: false,
+            gesture: None,
             before: None,
             applied: self.applied,
             event_times: self.event_times.clone(),
@@ -244,13 +248,18 @@ impl Player {
         }
     }
 
-    /// Whether the run is copied before its next change of a parameter, for [`Self::take_before`].
+    /// Whether the run is copied before a change of a parameter, for [`Self::take_before`].
     pub(super) fn keep_before(&mut self, on: bool) {
         self.keeps_before = on;
     }
 
-    /// The run as it was before the change since [`Self::keep_before`], if there was one.
-    pub(super) fn take_before(&mut self) -> Option<Box<Self>> {
+    /// The next change of a parameter is another one, even if it is the same parameter's.
+    pub(super) fn end_gesture(&mut self) {
+        self.gesture = None;
+    }
+
+    /// The run as it was before the latest change since this was last asked, if it was copied, and the key of the parameter.
+    pub(super) fn take_before(&mut self) -> Option<(Box<Self>, String)> {
         self.before.take()
     }
 
@@ -278,16 +287,16 @@ impl Player {
         &self.picks
     }
 
-    /// The run as it is, if it is to be kept before a change.
-    fn before_change(&self) -> Option<Box<Self>> {
-        self.keeps_before.then(|| Box::new(self.copy()))
+    /// The run as it is, if it is to be kept before a change of `key`.
+    fn before_change(&self, key: &str) -> Option<Box<Self>> {
+        (self.keeps_before && self.gesture.as_deref() != Some(key)).then(|| Box::new(self.copy()))
     }
 
-    /// A change was made to the run that was `before`; nothing if it changed no parameter.
-    fn changed_from(&mut self, before: Option<Box<Self>>) {
+    /// `key` was changed in the run that was `before`; nothing if it has the same value.
+    fn changed_from(&mut self, before: Option<Box<Self>>, key: &str) {
         let changed = |before: &Self| before.wanted().changes != self.wanted().changes;
         if let Some(before) = before.filter(|before| changed(before)) {
-            (self.before, self.keeps_before) = (Some(before), false);
+            (self.before, self.gesture) = (Some((before, key.to_owned())), Some(key.to_owned()));
         }
     }
 
@@ -630,7 +639,7 @@ impl Player {
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
-        let run_before = self.before_change();
+        let run_before = self.before_change(key);
         if self.has_future() {
             // A refused change must not abandon the future.
             self.wanted().clone().set(key, value)?;
@@ -641,7 +650,7 @@ impl Player {
         let effect = self.apply(&event)?;
         self.note(event);
         self.note_edits(&before);
-        self.changed_from(run_before);
+        self.changed_from(run_before, key);
         Ok(effect)
     }
 
@@ -707,14 +716,14 @@ impl Player {
     /// As [`Simulation::set_value`]; nothing has changed then.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
         self.original.get(key)?;
-        let run_before = self.before_change();
+        let run_before = self.before_change(key);
         self.branch();
         let before = self.wanted().changes.clone();
         let event = Event::Original { key: key.to_owned() };
         let effect = self.apply(&event)?;
         self.note(event);
         self.note_edits(&before);
-        self.changed_from(run_before);
+        self.changed_from(run_before, key);
         Ok(effect)
     }
 

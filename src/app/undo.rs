@@ -245,8 +245,7 @@ impl App {
             self.undo.view = None;
             return;
         }
-        let key = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()).map(|edit| &*edit.key);
-        self.compare(key, !held && self.undo.last().is_none_or(|at| now - at > TOGETHER));
+        self.compare(!held && self.undo.last().is_none_or(|at| now - at > TOGETHER));
         if let Some(edit) = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()) {
             let original = self.player.original(&edit.key);
             let scene = self.player.wanted();

@@ -112,6 +112,20 @@ fn of_many_changes_the_latest_and_three_pinned_runs_stay() {
 }
 
 #[test]
+fn another_parameter_is_another_change_however_soon_it_comes() {
+    let mut harness = window();
+    for (slider, value, before) in
+        [("Clearance", 0.9, "Clearance: 0.3 mm"), ("Friction coefficient", 0.4, "Friction coefficient: 0.15")]
+    {
+        harness.get_by_role_and_label(Role::Slider, slider).set_value_accesskit(value);
+        harness.run_steps(3);
+        assert_eq!(names(&harness), [before]);
+    }
+    let kept = harness.state().comparison().kept()[0].run();
+    assert_eq!(kept.scene().contact.clearance, 9e-4);
+}
+
+#[test]
 fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
     let mut harness = window();
     set(&mut harness, "Clearance", 0.9);
