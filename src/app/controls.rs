@@ -67,10 +67,14 @@ impl Controls {
         self.drafts.clear();
     }
 
-    /// All controls, one under the other.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
+    /// What the scene is called.
+    pub fn title(ui: &mut Ui, player: &Player) {
         ui.label(RichText::new(&player.scene().title).small().weak()).on_hover_text(&player.scene().description);
         ui.add_space(2.0);
+    }
+
+    /// All controls, one under the other.
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
         self.few(ui, player);
         let table = player.wanted().parameters();
         ui.separator();
@@ -190,17 +194,35 @@ impl Controls {
     }
 
     fn number(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
-        let Kind::Number { display, slider, logarithmic, .. } = row.parameter.kind else {
-            return;
-        };
         let Value::Number(si) = row.now else {
             return;
         };
+        if theme::has_fingers(ui) {
+            // Side by side, so that a phone shows three of them.
+            ui.spacing_mut().item_spacing.y = 0.0;
+            label(ui, player, row);
+            let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+            let backwards = egui::Layout::right_to_left(egui::Align::Center);
+            ui.allocate_ui_with_layout(size, backwards, |ui| {
+                self.entry(ui, player, row);
+                self.default_button(ui, player, row);
+                self.slider(ui, player, row, si);
+            });
+            return;
+        }
         let room = 92.0 + theme::side(ui, UNDO);
         self.heading(ui, player, room, row, |this, ui, player| {
             this.default_button(ui, player, row);
             this.entry(ui, player, row);
         });
+        self.slider(ui, player, row, si);
+    }
+
+    /// As wide as there is room; `si`: where its handle is.
+    fn slider(&mut self, ui: &mut Ui, player: &mut Player, row: &Row, si: f64) {
+        let Kind::Number { display, slider, logarithmic, .. } = row.parameter.kind else {
+            return;
+        };
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
         ui.spacing_mut().slider_width = ui.available_width().max(40.0);
@@ -287,9 +309,7 @@ impl Controls {
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let mut rest = Some(rest);
         ui.horizontal(|ui| {
-            let text = if FIRST.contains(&row.key) { RichText::new(name).strong() } else { RichText::new(name) };
-            let label = ui.label(text);
-            tooltip(ui, &label, player, row);
+            label(ui, player, row);
             if !below && let Some(rest) = rest.take() {
                 ui.with_layout(backwards, |ui| rest(self, ui, player));
             }
@@ -372,6 +392,13 @@ impl Controls {
             }
         }
     }
+}
+
+/// The parameter's name.
+fn label(ui: &mut Ui, player: &Player, row: &Row) {
+    let name = RichText::new(row.parameter.label);
+    let label = ui.label(if FIRST.contains(&row.key) { name.strong() } else { name });
+    tooltip(ui, &label, player, row);
 }
 
 /// The font of the text, smaller if it does not fit into `room` (points): a unit that is cut off reads as another unit.

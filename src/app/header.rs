@@ -10,7 +10,7 @@ use super::App;
 use super::dialogs::Dialog;
 use super::files::verdict_words;
 use super::replay::Verdict;
-use super::{layout, opening};
+use super::{layout, opening, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 
 /// Width of the window from which the header has room for the program's name, points.
@@ -229,19 +229,19 @@ impl App {
     /// Everything that does not fit into a small header.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
+        theme::tighten(ui);
         self.open_button(ui, "Open…");
         #[cfg(not(target_arch = "wasm32"))]
         self.desktop_entries(ui);
         self.link_button(ui);
         self.code_button(ui);
-        self.undo_entries(ui);
+        // Folded, so that what follows is in sight, too.
+        ui.collapsing("Lessons", |ui| self.lesson_menu(ui));
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
         self.save_menu(ui);
         ui.separator();
-        ui.label(RichText::new("Lessons").small().weak());
-        self.lesson_menu(ui);
-        ui.separator();
+        self.undo_entries(ui);
         theme_box(ui);
         if ui.button("Keys").on_hover_text("Keys (?)").clicked() {
             self.dialog = Some(Dialog::Help);

@@ -4,7 +4,8 @@ use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollAr
 
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
-use super::{App, present, theme, transport};
+use super::controls::Controls;
+use super::{App, overlay, present, theme, transport};
 use crate::view::Preset;
 
 /// Below this width or height the window is small, points.
@@ -42,12 +43,18 @@ pub enum Sheet {
     Lesson,
 }
 
-/// The entries of a menu; on a low screen they scroll, and a bar shows that they do.
-pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
+/// The bar of what scrolls in `ui` from here on is seen at rest, too: a finger does not hover over it.
+pub(super) fn show_bar(ui: &mut Ui) {
     let bar = &mut ui.spacing_mut().scroll;
-    // At rest, too: a finger does not hover over it.
     bar.dormant_handle_opacity = 0.6;
     bar.floating_width = bar.bar_width;
+}
+
+/// The entries of a menu; on a low screen they scroll, and a bar shows that they do.
+pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
+    show_bar(ui);
+    let bar = &mut ui.spacing_mut().scroll;
+    bar.floating_allocated_width = bar.bar_width;
     // Room for its frame and for a strip of what lies under it.
     let most = ui.ctx().content_rect().height() - 48.0;
     ScrollArea::vertical()
@@ -240,6 +247,7 @@ impl App {
                     // Room for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
+                    Controls::title(ui, player);
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 });
             },
@@ -306,7 +314,9 @@ impl App {
 
     fn portrait(&mut self, ui: &mut Ui, bar: Frame) {
         if self.sheet.is_some() {
-            let height = (ui.available_height() * 0.42).max(160.0);
+            // A question of a lesson and its answers.
+            let share = if self.sheet == Some(Sheet::Lesson) { 0.47 } else { 0.42 };
+            let height = (ui.available_height() * share).max(160.0);
             Panel::bottom("sheet").frame(bar).exact_size(height).show(ui, |ui| self.sheet(ui));
         }
         let free = !self.is_under_way();
@@ -416,6 +426,7 @@ impl App {
     }
 
     fn sheet(&mut self, ui: &mut Ui) {
+        show_bar(ui);
         if self.sheet == Some(Sheet::Lesson) {
             return self.lesson_ui(ui);
         }
@@ -463,18 +474,20 @@ impl App {
         let caption = self.caption_plate(ui, area, self.is_presenting());
         let mut above: Vec<_> = caption.iter().map(|(_, plate)| *plate).collect();
         let inner = area.shrink(10.0);
-        let narrow = area.width() < 520.0;
         let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
+        let width = |name: &str| {
+            let font = egui::TextStyle::Button.resolve(ui.style());
+            let words = ui.painter().layout_no_wrap(name.to_owned(), font, egui::Color32::BLACK);
+            words.size().x + 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x
+        };
+        let options = width("View options");
+        let cameras: f32 = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).map(width).sum();
+        // The time stands to the left of them.
+        let narrow = area.width() < overlay::plate(0)[0] + cameras + options + 10.0;
         // Beside the microscope of a phone the time needs all of the upper edge.
         let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {
-            let cameras = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).filter(|_| !narrow);
-            let buttons = ["View options"].into_iter().chain(cameras).map(|name| {
-                let font = egui::TextStyle::Button.resolve(ui.style());
-                let words = ui.painter().layout_no_wrap(name.to_owned(), font, egui::Color32::BLACK);
-                words.size().x + 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x
-            });
-            let size = egui::vec2(buttons.sum(), row.y);
+            let size = egui::vec2(if narrow { options } else { options + cameras }, row.y);
             above.push(edge.align_size_within_rect(size, inner));
         }
         if !plain && self.has_messages() {

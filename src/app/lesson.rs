@@ -43,6 +43,8 @@ pub struct Course {
     reached: bool,
     /// What shows then has not been drawn yet.
     fresh: bool,
+    /// Whether the panel shows only the upper part of the step.
+    more: bool,
     measured: Measured,
 }
 
@@ -55,6 +57,7 @@ impl Course {
             predicted: None,
             reached: false,
             fresh: false,
+            more: false,
             measured: Measured::new(lesson.clone()),
             lesson,
         }

@@ -44,6 +44,8 @@ pub fn panel(ui: &Ui) -> Frame {
 
 /// Least side of a touch target, points.
 pub const FINGER: f32 = 44.0;
+/// The same in rows close together; WCAG 2.2 asks for 24 (2.5.8).
+const TIGHT: f32 = 30.0;
 
 /// Sizes the controls for a mouse, or for fingers.
 pub fn apply_size(ctx: &egui::Context, fingers: bool) {
@@ -59,9 +61,22 @@ pub fn apply_size(ctx: &egui::Context, fingers: bool) {
     });
 }
 
+/// Whether controls are sized for fingers.
+pub fn has_fingers(ui: &Ui) -> bool {
+    ui.spacing().interact_size.x >= FINGER
+}
+
 /// Side of a small button, points: `mouse` where there is no need to make it larger.
 pub fn side(ui: &Ui, mouse: f32) -> f32 {
-    if ui.spacing().interact_size.y >= FINGER { FINGER } else { mouse }
+    if has_fingers(ui) { ui.spacing().interact_size.y } else { mouse }
+}
+
+/// Rows that follow in `ui` lie close together: a phone shows the answers of a question, and most of a menu.
+pub fn tighten(ui: &mut Ui) {
+    if has_fingers(ui) {
+        let spacing = ui.spacing_mut();
+        (spacing.interact_size.y, spacing.item_spacing.y) = (TIGHT, 4.0);
+    }
 }
 
 /// A small line of text that warns.

@@ -720,7 +720,8 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
 
     // 9
     class.tap(Role::Button, "Menu");
-    class.draw_near(Role::Button, "Where chaos begins");
+    class.tap(Role::DisclosureTriangle, "Lessons");
+    class.frames(20);
     class.tap(Role::Button, "Where chaos begins");
     class.frames(10);
     assert!(class.app().player().twin().is_some());

@@ -2,10 +2,10 @@
 
 use eframe::egui::{self, Pos2, Rect, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
-use jointplay::app::App;
+use jointplay::app::{App, AppOptions};
 
 use crate::hands::fingers;
-use crate::page::{click, label, window};
+use crate::page::{click, label, open, window};
 
 const UPRIGHT: [f32; 2] = [390.0, 844.0];
 const LYING: [f32; 2] = [844.0, 390.0];
@@ -120,6 +120,70 @@ fn nothing_covers_anything_however_small_the_window_is() {
 }
 
 #[test]
+fn a_phone_shows_the_machine_play_and_all_three_sliders() {
+    for (size, picture) in [([390.0, 664.0], 150.0), (LYING, 180.0)] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        let sliders = ["Clearance", "Friction coefficient", "Restitution"];
+        let tracks = sliders.map(|name| rect(&harness, Role::Slider, name));
+        let entries = sliders.map(|name| rect(&harness, Role::TextInput, name));
+        let play = rect(&harness, Role::Button, "Play");
+        let whole = Rect::from_min_size(Pos2::ZERO, size.into());
+        // The sheet ends at the edge of the window, or where the transport begins.
+        let low =
+            if play.top() > tracks[0].bottom() { rect(&harness, Role::Slider, "Timeline, s").top() } else { size[1] };
+        for row in tracks.iter().chain(&entries) {
+            assert!(whole.contains_rect(*row) && row.bottom() <= low - 2.0, "{size:?}: {row:?}");
+            assert!(row.height() >= 24.0, "a finger hits it: {row:?}");
+        }
+        assert!(tracks[1].top() - tracks[0].top() < 80.0, "two rows close together: {tracks:?}");
+        assert!(whole.contains_rect(play), "{size:?}: {play:?}");
+        let view = harness.get_by_label("3D view").rect();
+        assert!(view.height() >= picture && view.width() >= 320.0, "{size:?}: {view:?}");
+    }
+}
+
+#[test]
+fn all_answers_of_a_question_are_in_sight_or_a_button_leads_to_them() {
+    let options = || AppOptions::from_link("?lesson=first-impact&step=2").expect("a link");
+    let last = "It stays where it is";
+    let (mut harness, _) = open(options(), [390.0, 664.0]);
+    harness.run_steps(30);
+    let answer = rect(&harness, Role::RadioButton, last);
+    assert!(answer.bottom() <= rect(&harness, Role::Button, "Next").top(), "{answer:?}");
+
+    let (mut harness, _) = open(options(), LYING);
+    harness.run_steps(30);
+    let hidden = |harness: &Harness<'_, App>| {
+        let next = rect(harness, Role::Button, "Next").top();
+        rect(harness, Role::RadioButton, last).bottom() > next
+    };
+    assert!(hidden(&harness));
+    for _ in 0..4 {
+        if harness.query_by_role_and_label(Role::Button, "More").is_some() {
+            let at = rect(&harness, Role::Button, "More").center();
+            fingers(&mut harness, &[&[at]]);
+            harness.run_steps(30);
+        }
+    }
+    assert!(!hidden(&harness));
+    assert!(harness.query_by_role_and_label(Role::Button, "More").is_none(), "at its end");
+}
+
+#[test]
+fn the_buttons_over_the_picture_leave_the_time_alone_however_wide_it_is() {
+    for width in [760.0, 800.0, 820.0, 850.0, 880.0, 920.0, 1000.0] {
+        let (mut harness, _) = window("spcmm", [width, 1180.0]);
+        harness.run();
+        let view = harness.get_by_label("3D view").rect();
+        let first = harness.query_by_role_and_label(Role::Button, "Isometric");
+        let first = first.map_or_else(|| rect(&harness, Role::Button, "View options"), |button| button.rect());
+        // "t = 43.5000 ms" in large letters, with its plate.
+        assert!(first.left() - view.left() > 164.0, "{width}: {first:?} in {view:?}");
+    }
+}
+
+#[test]
 fn in_a_small_window_the_panels_are_behind_one_button() {
     let (mut harness, _) = window("spcmm", SMALL);
     harness.run();
@@ -161,7 +225,7 @@ fn a_menu_that_is_cut_shows_that_it_scrolls() {
         let rows = first.top() as u32..(harness.ctx.content_rect().height() - 40.0) as u32;
         // No text is that long.
         rows.filter(|&y| {
-            let pixel = picture.get_pixel(right as u32 - 3, y);
+            let pixel = picture.get_pixel(right as u32 + 5, y);
             let apart = (0..3).map(|k| pixel[k].abs_diff(fill.to_array()[k]));
             apart.max().is_some_and(|most| most > 40)
         })

@@ -14,12 +14,17 @@ use crate::app::{App, layout, theme};
 
 /// Height of a choice where only the mouse reaches it, points.
 const LOW: f32 = 24.0;
+/// A page that goes on below what is in sight by more than this has a button for it, points.
+const MORE: f32 = 8.0;
+/// Where there is less beside the buttons that turn pages, points, the steps are counted in fewer words.
+const ROOM: f32 = 200.0;
 
 /// What the buttons of the panel ask for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Asked {
     Nothing,
     Turn(bool),
+    More,
     Set,
     Leave,
 }
@@ -58,19 +63,28 @@ impl App {
                             ui.spacing_mut().interact_size.y = LOW;
                             ui.spacing_mut().icon_width = LOW - 8.0;
                         }
+                        if asked == Asked::More {
+                            // The last line of a page is the first of the next.
+                            ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
+                        }
                         let set = course.page(ui, own);
                         if let Some(elsewhere) = &elsewhere {
                             ui.label(RichText::new(elsewhere).weak());
                         }
                         set
                     });
+                    let below = set.content_size.y - set.state.unclamped_offset().y - set.inner_rect.height();
+                    if course.more != (below > MORE) {
+                        course.more = below > MORE;
+                        ui.ctx().request_repaint();
+                    }
                     if set.inner { Asked::Set } else { asked }
                 })
                 .inner
             })
             .inner;
         match asked {
-            Asked::Nothing => {}
+            Asked::Nothing | Asked::More => {}
             Asked::Turn(forward) => self.turn_page(forward),
             Asked::Set => self.set_step(),
             Asked::Leave => self.leave_lesson(),
@@ -117,12 +131,16 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
                 asked = Asked::Turn(forward);
             }
         }
-        ui.label(format!("Step {} of {}", course.step + 1, last + 1));
+        let count = format!("{} of {}", course.step + 1, last + 1);
+        ui.label(if course.more && ui.available_width() < ROOM { count } else { format!("Step {count}") });
         ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
             let help = "Ends the lesson and restores the window as it was before";
             let leave = ui.button("End").on_hover_text(help);
             if leave.accessible_name("Leave the lesson").clicked() {
                 asked = Asked::Leave;
+            }
+            if course.more && ui.button("More").on_hover_text("The step goes on below: scrolls down").clicked() {
+                asked = Asked::More;
             }
         });
     });
@@ -145,6 +163,7 @@ impl Course {
             prose(ui, &step.text, &names);
         }
         if let Some(question) = &step.question {
+            theme::tighten(ui);
             let (right, names) = (self.right(), self.measured.names());
             let shows = self.reached && own;
             let mut predicted = self.predicted;
