@@ -74,7 +74,23 @@ export function makeHost(laboratory, lost) {
     // Browsers let sound begin with a gesture alone, some within its event alone.
     for (const gesture of ['pointerup', 'keyup']) addEventListener(gesture, resume, { capture: true });
 
+    /** Between two frames: what the user does meanwhile is seen to after each spell. */
+    const { port1: next, port2: turn } = new MessageChannel();
+    let goesOn = false;
+    function spell() {
+        const pause = laboratory.trouble ? undefined : laboratory.page.stepBetween();
+        goesOn = pause !== undefined;
+        if (pause === 0) next.postMessage(null);
+        else if (goesOn) setTimeout(spell, pause);
+    }
+    turn.onmessage = spell;
+
     return {
+        goOn() {
+            if (!goesOn) next.postMessage(null);
+            goesOn = true;
+        },
+
         address: () => location.origin + location.pathname,
 
         shared(link) {

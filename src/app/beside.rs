@@ -70,6 +70,7 @@ impl App {
         let (before, now) = halves(area);
         if plain {
             kept.run_mut().follow(player.pacer.shown(), || true);
+            kept.run_mut().hand_out_peaks();
         }
         let (_, picture) = match beside.take().filter(|(of, _)| *of == number) {
             Some(shown) => beside.insert(shown),

@@ -12,6 +12,8 @@ const MOST_PINNED: usize = 3;
 /// waited for.
 const SHARE: f64 = 0.2;
 const LEAST_BUDGET: f64 = 3e-3;
+/// However slow frames are: the interface still answers.
+const MOST_BUDGET: f64 = 16e-3;
 const WAITED_FOR: f64 = 3.0;
 /// Part of a member's colour in the grey of its curve before: enough to tell members apart.
 const HUE: f32 = 0.3;
@@ -164,9 +166,19 @@ impl Comparison {
 
     /// Takes the runs to where `player` is, in a frame of `dt` seconds; returns whether one of them still lags behind.
     pub fn advance(&mut self, player: &Player, dt: f64) -> bool {
-        let start = (player.clock)();
         let waited = !player.is_playing() || self.is_waited_for(player);
         let budget = (SHARE * dt).max(LEAST_BUDGET) * if waited { WAITED_FOR } else { 1.0 };
+        let lags = self.follow(player, budget.min(MOST_BUDGET));
+        for kept in &mut self.kept {
+            kept.run.hand_out_peaks();
+            kept.run.place_ghost();
+        }
+        lags
+    }
+
+    /// The same within `budget`, s, between two frames, or as part of one.
+    pub fn follow(&mut self, player: &Player, budget: f64) -> bool {
+        let start = (player.clock)();
         let may_step = || (player.clock)() - start < budget;
         let mut lags = false;
         for kept in &mut self.kept {
@@ -179,7 +191,6 @@ impl Comparison {
             let shown = player.pacer.shown();
             if self.beside == Some(kept.place) || shown > run.reached() {
                 lags |= !run.follow(shown, may_step);
-                run.place_ghost();
             }
         }
         lags
@@ -190,6 +201,7 @@ impl Comparison {
         self.kept.retain_mut(|kept| kept.run.is_as_started() || kept.run.reset().is_ok());
         for kept in &mut self.kept {
             kept.run.follow(0.0, || true);
+            kept.run.hand_out_peaks();
         }
     }
 

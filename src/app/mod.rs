@@ -82,7 +82,7 @@ use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene, Vec3};
-use crate::simulate::{Simulation, StartError};
+use crate::simulate::{LONGEST_FRAME, SPELL, Simulation, StartError};
 use crate::view::{Preset, Quality, ViewOptions};
 
 use accuracy::Accuracy;
@@ -801,6 +801,18 @@ impl App {
         let moves = self.viewport.advance(&self.player, dt as f32);
         let moves = self.advance_kept(dt as f32) || moves;
         moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
+    }
+
+    /// Steps the runs on between two frames, as [`Player::step_between`].
+    pub fn step_between(&mut self, since: f64) -> Option<bool> {
+        if self.is_under_way() || since > LONGEST_FRAME {
+            return None;
+        }
+        let comparison = &mut self.plots.comparison;
+        let waits = comparison.is_waited_for(&self.player);
+        let behind = if waits { None } else { self.player.step_between(since) };
+        let lags = comparison.follow(&self.player, SPELL);
+        behind.or(lags.then_some(true)).map(|behind| behind || lags)
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {

@@ -270,16 +270,14 @@ impl Player {
 
     /// Shows `time`, s, as far as the run can be taken there while `may_step`; whether it got there, or as far as it goes.
     pub(super) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
-        let there = if time <= self.reached {
+        if time <= self.reached {
             if time != self.pacer.shown() {
                 self.go_to(time);
             }
             true
         } else {
             self.run_towards(time, may_step)
-        };
-        self.hand_out_peaks();
-        there
+        }
     }
 
     /// By what names channels are picked.
@@ -531,19 +529,43 @@ impl Player {
             self.playing = self.pacer.shown() > 0.0;
         } else if self.playing {
             let target = self.pacer.begin(dt);
-            let start = (self.clock)();
-            let before = self.simulation.time();
-            while self.simulation.time() < target && self.pacer.may_step((self.clock)() - start) {
-                if !self.step() {
-                    break;
-                }
-            }
-            let spent = (self.clock)() - start;
-            self.measure(self.simulation.time() - before, spent);
+            let spent = self.pursue(target, Pacer::may_step);
             self.pacer.end(dt, target, self.simulation.time(), spent);
             self.present();
         }
         self.hand_out_peaks();
+    }
+
+    /// Goes on for a spell between two frames, `since` seconds after the first of them began. Returns whether the run is still behind;
+    /// `None` while there is nothing to do before the next frame.
+    pub fn step_between(&mut self, since: f64) -> Option<bool> {
+        if !self.playing || self.backwards || self.sought.is_some() {
+            return None;
+        }
+        let target = self.pacer.begin_between(since)?;
+        let spent = self.pursue(target, Pacer::may_step_between);
+        let before = self.pacer.shown();
+        let (another, behind) = self.pacer.end_between(target, self.simulation.time(), spent);
+        if self.pacer.shown() > before {
+            self.present();
+        }
+        another.then_some(behind)
+    }
+
+    /// Steps until `target`, s, while the pacer allows it; how long that took, s.
+    fn pursue(&mut self, target: f64, may_step: fn(&Pacer, f64) -> bool) -> f64 {
+        if self.simulation.time() >= target {
+            return 0.0;
+        }
+        let (start, before) = ((self.clock)(), self.simulation.time());
+        while self.simulation.time() < target && may_step(&self.pacer, (self.clock)() - start) {
+            if !self.step() {
+                break;
+            }
+        }
+        let spent = (self.clock)() - start;
+        self.measure(self.simulation.time() - before, spent);
+        spent
     }
 
     fn measure(&mut self, stepped: f64, stepping: f64) {
@@ -946,7 +968,7 @@ impl Player {
     }
 
     /// Hands out the peaks since the previous call.
-    fn hand_out_peaks(&mut self) {
+    pub(super) fn hand_out_peaks(&mut self) {
         std::mem::swap(&mut self.peaks, &mut self.passed);
         self.passed.clear();
         self.passed.resize(self.peaks.len(), Peak::default());

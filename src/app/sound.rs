@@ -55,7 +55,7 @@ impl App {
     pub(super) fn advance_heard(&mut self, dt: f64) {
         let player = &mut self.player;
         let plays = player.is_playing() && !player.is_playing_backwards() && !player.is_seeking();
-        let from = player.pacer.shown();
+        let from = player.pacer.shown_before();
         player.advance(dt);
         if !(self.sound.on && plays) {
             return;

@@ -36,6 +36,9 @@ extern "C" {
     /// Plays `samples` so many seconds from now.
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn click(samples: &[f32], after: f64);
+    /// Has [`super::page::Page::step_between`] called until the next frame.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = goOn)]
+    pub fn go_on();
     /// Reports that the graphics of start number `start` are lost.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = graphicsLost)]
     pub fn graphics_lost(start: u32, why: &str);

@@ -12,10 +12,11 @@ use serde_json::json;
 use wasm_bindgen::prelude::*;
 
 use super::crash;
-use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost};
+use super::host::{Inbox, WebHost, are_graphics_lost, go_on, graphics_lost};
 use super::mirror::Mirror;
 use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
+use crate::simulate::SPELL;
 
 /// Time between two notes of what is running, s; a crash report and a restart go back to the latest.
 const NOTE_INTERVAL: f64 = 2.0;
@@ -37,6 +38,8 @@ struct Laboratory {
     frames: u32,
     /// When what is running was last noted, s of viewing.
     noted: Option<f64>,
+    /// When the latest frame began, s of the player's clock.
+    began: f64,
 }
 
 /// What eframe runs: the laboratory on one canvas.
@@ -240,6 +243,16 @@ impl Page {
         });
     }
 
+    /// Steps on between two frames; returns after how long it wants to go on, ms, or nothing until the next frame.
+    #[wasm_bindgen(js_name = stepBetween)]
+    pub fn step_between(&self) -> Option<f64> {
+        let behind = self.with(|laboratory| {
+            let since = (laboratory.app.player().clock)() - laboratory.began;
+            laboratory.app.step_between(since)
+        })??;
+        Some(if behind { 0.0 } else { 1000.0 * SPELL })
+    }
+
     fn with<T>(&self, ask: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {
         // After a panic it stays borrowed.
         self.laboratory.try_borrow_mut().ok()?.as_mut().map(ask)
@@ -292,7 +305,7 @@ impl Laboratory {
         let mut app = App::new(cc, options)?;
         app.set_host(Box::new(WebHost { inbox, no_sound: None }));
         app.follow_frame_rate();
-        Ok(Self { app, ctx: cc.egui_ctx.clone(), renderer: describe(cc), frames: 0, noted: None })
+        Ok(Self { app, ctx: cc.egui_ctx.clone(), renderer: describe(cc), frames: 0, noted: None, began: 0.0 })
     }
 
     /// Continues with new graphics.
@@ -373,8 +386,10 @@ impl Laboratory {
 impl eframe::App for OnCanvas {
     fn logic(&mut self, ctx: &egui::Context, frame: &mut eframe::Frame) {
         if let Some(laboratory) = &mut *self.0.borrow_mut() {
+            laboratory.began = (laboratory.app.player().clock)();
             laboratory.app.logic(ctx, frame);
             laboratory.note();
+            go_on();
         }
     }
 

@@ -24,7 +24,7 @@ pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
-pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE};
+pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
 pub use simulation::ideal::{ProbeFault, closed};
 pub use simulation::live::{ChangeError, differs_in_conditions_alone};
 pub use simulation::saved::{Misfit, SavedState};

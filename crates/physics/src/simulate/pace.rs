@@ -15,6 +15,9 @@ pub const USUAL_BUDGET: f64 = 0.012;
 /// Largest stepping budget, s, however slow drawing is: the interface still answers.
 pub const LARGEST_BUDGET: f64 = 0.25;
 
+/// Longest spell of stepping between two frames, s: what the user does meanwhile is seen to after it.
+pub const SPELL: f64 = 0.008;
+
 /// Averaging time of the achieved time scale, s.
 const AVERAGE: f64 = 0.5;
 
@@ -45,11 +48,17 @@ fn budget(dt: f64, drawing: f64) -> f64 {
 pub struct Pacer {
     scale: f64,
     shown: f64,
+    /// What was displayed at the end of the latest frame, s.
+    base: f64,
+    /// Stepping until the next frame, and of it within the latest one, s.
     budget: f64,
-    /// Length of the latest frame, stepping in it, and all else in the one before, s.
+    within: f64,
+    /// Length of the latest frame, stepping since it began, and all else in the one before, s.
     frame: f64,
     spent: f64,
     drawing: f64,
+    /// The spells since the latest frame could not keep up.
+    behind: bool,
     advanced: f64,
     elapsed: f64,
 }
@@ -59,10 +68,13 @@ impl Default for Pacer {
         Self {
             scale: 0.02,
             shown: 0.0,
+            base: 0.0,
             budget: USUAL_BUDGET,
+            within: USUAL_BUDGET,
             frame: 0.0,
             spent: 0.0,
             drawing: 0.0,
+            behind: false,
             advanced: 0.0,
             elapsed: 0.0,
         }
@@ -88,9 +100,14 @@ impl Pacer {
         self.shown
     }
 
+    /// Time displayed at the end of the latest frame, s.
+    pub fn shown_before(&self) -> f64 {
+        self.base
+    }
+
     /// Displays `time`, as after a reset or a single step.
     pub fn jump(&mut self, time: f64) {
-        self.shown = time;
+        (self.shown, self.base, self.behind) = (time, time, false);
         (self.frame, self.spent, self.drawing) = (0.0, 0.0, 0.0);
         self.forget_average();
     }
@@ -102,9 +119,39 @@ impl Pacer {
         let drawing = (frame - self.spent).max(0.0);
         // One slow frame is a hitch: it takes two to tell.
         self.budget = budget(dt, drawing.min(self.drawing));
+        self.within = if std::mem::take(&mut self.behind) { self.budget.min(SPELL) } else { self.budget };
         let passed = dt.min(LONGEST_FRAME.max(self.frame));
         (self.frame, self.drawing) = (frame, drawing);
-        self.shown + passed * self.scale
+        self.target(passed)
+    }
+
+    /// Where the simulation should be `passed` seconds after the latest frame.
+    fn target(&self, passed: f64) -> f64 {
+        (self.base + passed * self.scale).max(self.shown)
+    }
+
+    /// Starts a spell of stepping between two frames, `since` seconds after the first of them began; returns the simulated time to
+    /// reach, `None` where that frame lasts longer than can be caught up with.
+    pub fn begin_between(&self, since: f64) -> Option<f64> {
+        (since < LONGEST_FRAME.max(self.frame)).then(|| self.target(since))
+    }
+
+    /// Whether another step may start after `spent` seconds of stepping in this spell.
+    pub fn may_step_between(&self, spent: f64) -> bool {
+        spent < SPELL && self.has_budget(spent)
+    }
+
+    /// Whether so much more may be spent before the next frame, s.
+    fn has_budget(&self, more: f64) -> bool {
+        self.spent + more < self.budget
+    }
+
+    /// Ends the spell: as [`Self::end`]. Returns whether another one may follow, and whether the simulation is still behind.
+    pub fn end_between(&mut self, target: f64, reached: f64, spent: f64) -> (bool, bool) {
+        self.spent += spent;
+        self.shown = target.min(reached).max(self.shown);
+        self.behind = reached < target;
+        (self.has_budget(0.0), self.behind)
     }
 
     /// What the frame before the latest [`Self::begin`] took beyond stepping, s.
@@ -114,7 +161,7 @@ impl Pacer {
 
     /// Whether another step may start after `spent` seconds of stepping in this frame.
     pub fn may_step(&self, spent: f64) -> bool {
-        spent < self.budget
+        spent < self.within
     }
 
     /// Ends the frame begun `dt` seconds after the last: `target` is what [`Self::begin`] returned, `reached` the time of
@@ -125,10 +172,10 @@ impl Pacer {
         // So long a pause was no frame: it says nothing about the machine.
         if dt.is_finite() && dt < REST {
             let keep = libm::exp(-dt / AVERAGE);
-            self.advanced = self.advanced * keep + (shown - self.shown);
+            self.advanced = self.advanced * keep + (shown - self.base);
             self.elapsed = self.elapsed * keep + dt;
         }
-        self.shown = shown;
+        (self.shown, self.base) = (shown, shown);
     }
 
     /// Simulated seconds per second achieved lately; `None` before anything was measured.
