@@ -20,6 +20,8 @@ const PRESET: &str = "solver.preset";
 /// Parameters shown first.
 const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
 
+/// From this width on a slider for fingers has its value beside it, points.
+const BESIDE: f32 = 220.0;
 /// Side of the undo button, points.
 const UNDO: f32 = 22.0;
 /// Width of a text field, and its margin on either side, points.
@@ -197,7 +199,7 @@ impl Controls {
         let Value::Number(si) = row.now else {
             return;
         };
-        if theme::has_fingers(ui) {
+        if theme::has_fingers(ui) && ui.available_width() > BESIDE {
             // Side by side, so that a phone shows three of them.
             ui.spacing_mut().item_spacing.y = 0.0;
             label(ui, player, row);
@@ -210,6 +212,7 @@ impl Controls {
             });
             return;
         }
+        theme::tighten(ui);
         let room = 92.0 + theme::side(ui, UNDO);
         self.heading(ui, player, room, row, |this, ui, player| {
             this.default_button(ui, player, row);

@@ -8,7 +8,7 @@ use eframe::egui::{
 
 use super::App;
 use super::dialogs::Dialog;
-use super::files::verdict_words;
+use super::files::{is_right, verdict_words};
 use super::replay::Verdict;
 use super::{layout, opening, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
@@ -290,9 +290,11 @@ impl App {
         }
     }
 
-    /// Whether the verdict on a link is on show.
+    /// Whether the verdict on a link is on show. In a frame of another page all its room belongs to the machine.
     fn shows_verdict(&self) -> bool {
-        self.verdict.is_some() && self.verdict_shown != Some(f64::NEG_INFINITY)
+        let framed = self.embedded().is_some();
+        let told = self.verdict.as_ref().is_some_and(|verdict| !(framed && is_right(verdict)));
+        told && self.verdict_shown != Some(f64::NEG_INFINITY)
     }
 
     /// Errors, the progress of a replay, and the verdict on a link.

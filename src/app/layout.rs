@@ -148,7 +148,7 @@ impl App {
     /// Everything, in whatever space there is.
     pub fn show(&mut self, ui: &mut Ui) {
         let size = ui.available_size();
-        let arrangement = if size.y < SHORT {
+        let arrangement = if size.y < SHORT || (size.x < NARROW && size.x > size.y) {
             Arrangement::Landscape
         } else if size.x < NARROW {
             Arrangement::Portrait
@@ -374,7 +374,7 @@ impl App {
             })
             .inner;
         if self.sheet.is_some() {
-            let width = (ui.available_width() * 0.42).clamp(260.0, 340.0);
+            let width = (ui.available_width() * 0.42).clamp(260.0, 340.0).min(0.55 * ui.available_width());
             Panel::right("sheet beside").frame(bar).resizable(false).exact_size(width).show(ui, |ui| self.sheet(ui));
         }
         self.central(ui, asked);

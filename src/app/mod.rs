@@ -325,6 +325,8 @@ pub struct App {
     /// How the last one was to be.
     film_wanted: Option<film::Wanted>,
     presentation: Option<present::Presentation>,
+    /// The zoom of the interface without what a tiny window takes off it.
+    squeezed: Option<f32>,
     /// Which of the chosen plots is shown alone: in a presentation, and in the window for the class.
     single_plot: Option<usize>,
     /// The window for the class.
@@ -416,6 +418,7 @@ impl App {
             film: None,
             film_wanted: None,
             presentation: None,
+            squeezed: None,
             single_plot: None,
             #[cfg(not(target_arch = "wasm32"))]
             audience: None,

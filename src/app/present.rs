@@ -45,6 +45,10 @@ pub(super) fn plots_height(ui: &Ui) -> f32 {
     (0.36 * ui.available_height()).max(LEAST_PLOTS)
 }
 
+/// What controls and picture need at least, points, and how much smaller than their own size they may get for it.
+const LEAST_WINDOW: egui::Vec2 = egui::vec2(320.0, 300.0);
+const LEAST_ZOOM: f32 = 0.5;
+
 /// Height of the screen, points at zoom 1.
 pub(super) fn screen_height(ctx: &egui::Context) -> f32 {
     ctx.content_rect().height() * ctx.zoom_factor()
@@ -88,7 +92,8 @@ impl App {
     /// Zoom of the interface, but for that of a presentation.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn own_zoom(&self, ctx: &egui::Context) -> f32 {
-        self.presentation.as_ref().map_or_else(|| ctx.zoom_factor(), |presentation| presentation.zoom)
+        let shown = || self.squeezed.unwrap_or_else(|| ctx.zoom_factor());
+        self.presentation.as_ref().map_or_else(shown, |presentation| presentation.zoom)
     }
 
     /// Which of the chosen plots a presentation and the window for the class show, if any.
@@ -110,7 +115,7 @@ impl App {
     /// Sizes the type for the screen, once its size has changed: on the way to the full screen and back.
     pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
         let Some(presentation) = &mut self.presentation else {
-            return;
+            return self.squeeze(ctx);
         };
         let height = screen_height(ctx);
         let change = (height - presentation.height).abs();
@@ -119,6 +124,18 @@ impl App {
         if settled && change > FOLLOWED * presentation.height {
             presentation.height = height;
             ctx.set_zoom_factor(legible(height));
+        }
+    }
+
+    /// Makes everything smaller in a window that is too small for its controls, as on a page at four times the size.
+    fn squeeze(&mut self, ctx: &egui::Context) {
+        let now = ctx.zoom_factor();
+        let own = self.squeezed.unwrap_or(now);
+        let room = ctx.content_rect().size() * now / LEAST_WINDOW;
+        let zoom = own.min(room.min_elem().max(LEAST_ZOOM));
+        self.squeezed = (zoom < own).then_some(own);
+        if (zoom - now).abs() > 1e-3 {
+            ctx.set_zoom_factor(zoom);
         }
     }
 

@@ -67,7 +67,9 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
         if ui.available_width() > clock(ui).x + SCALES_WIDTH + ui.spacing().item_spacing.x {
             time(ui, player);
         }
-        scales(ui, player);
+        if ui.available_width() >= SCALES_WIDTH {
+            scales(ui, player);
+        }
         if ui.available_width() > REACHED {
             reached(ui, player);
         }

@@ -350,6 +350,58 @@ mod tests {
         }
     }
 
+    /// Frames of which drawing takes `drawing` s, on a machine that simulates `speed` seconds per second of stepping and steps between
+    /// frames, too, while another processor waits for the screen `idle` s; returns the longest spell of stepping, s.
+    fn stepped_between(pacer: &mut Pacer, frames: usize, drawing: f64, idle: f64, speed: f64) -> f64 {
+        let (mut time, mut dt, mut longest) = (pacer.shown(), drawing + idle, 0.0_f64);
+        let step = 1e-5;
+        for _ in 0..frames {
+            let (target, mut spent) = (pacer.begin(dt), 0.0);
+            while time < target && pacer.may_step(spent) {
+                (time, spent) = (time + step, spent + step / speed);
+            }
+            pacer.end(dt, target, time, spent);
+            longest = longest.max(spent);
+            let mut since = drawing + spent;
+            while let Some(target) = pacer.begin_between(since).filter(|_| since < drawing + idle) {
+                let mut spent = 0.0;
+                while time < target && pacer.may_step_between(spent) {
+                    (time, spent) = (time + step, spent + step / speed);
+                }
+                let shown = pacer.shown();
+                let (another, behind) = pacer.end_between(target, time, spent);
+                assert!(
+                    pacer.shown() >= shown && time - pacer.shown() <= step,
+                    "what is shown is within the latest step"
+                );
+                longest = longest.max(spent);
+                since += spent + if behind { 0.0 } else { SPELL };
+                if !another {
+                    break;
+                }
+            }
+            dt = since.max(drawing + idle);
+        }
+        longest
+    }
+
+    #[test]
+    fn between_slow_frames_it_steps_in_short_spells_and_as_far_as_within_them() {
+        // Half a second a second are possible, but for what drawing takes.
+        for (speed, wanted) in [(0.5, 0.1), (0.5, 1.0), (10.0, 1.0)] {
+            let mut pacer = Pacer::default();
+            pacer.set_scale(wanted);
+            // The first frames do not know yet that there is more to do than they have time for.
+            stepped_between(&mut pacer, 20, 0.03, 0.12, speed);
+            let longest = stepped_between(&mut pacer, 100, 0.03, 0.12, speed);
+            assert!(longest <= SPELL + 1e-5 / speed + 1e-12, "{speed} {wanted}: {longest}");
+            let reached = pacer.reached_scale().expect("measured");
+            // Nearly as much time goes into stepping as into all else.
+            let least = wanted.min(0.45 * speed);
+            assert!(reached > 0.98 * least && reached < 1.01 * wanted, "{speed} {wanted}: {reached}");
+        }
+    }
+
     #[test]
     fn the_limit_is_what_takes_more_of_the_asked_scale() {
         let limit = |asked, drawing, speed| {
