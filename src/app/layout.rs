@@ -166,6 +166,10 @@ impl App {
             ui.set_style(ui.ctx().global_style());
         }
         self.summary(ui);
+        // Its keys are shared with the page around it.
+        if self.embedded().is_none() {
+            transport::first_of_tab(ui);
+        }
         if self.dialog.is_some() {
             // Disabled, so that no tooltip stays open above the dialog. The dialog's own backdrop dims what lies under it.
             ui.visuals_mut().disabled_alpha = 1.0;

@@ -1,6 +1,8 @@
 //! Transport: play, step, reset, time scale, and how fast time really passes.
 
-use eframe::egui::{self, ComboBox, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText};
+use eframe::egui::{
+    self, ComboBox, FocusDirection, Id, Key, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText,
+};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
@@ -19,6 +21,9 @@ const SCALE_APART: f32 = 20.0;
 
 /// Width of [`row`] with its buttons and the list of time scales for fingers, points.
 pub const LEAST: f32 = 270.0;
+
+/// Where the button that plays is kept from one frame to the next.
+const FIRST: &str = "first stop of Tab";
 
 /// Size of the button that plays and pauses, points.
 pub const PLAY: f32 = 40.0;
@@ -101,6 +106,19 @@ fn settled(ui: &mut Ui, player: &Player) {
     });
 }
 
+/// Gives the focus to the button that plays if nothing has it and Tab is pressed: most come to play, and header and parameters are a
+/// long way. From there Tab goes round through everything. To be called before anything is shown.
+pub fn first_of_tab(ui: &Ui) {
+    let play = ui.data_mut(|data| data.remove_temp::<Option<Id>>(Id::unique(FIRST)).flatten());
+    let tab = ui.input(|input| input.key_pressed(Key::Tab) && !input.modifiers.shift);
+    if let Some(play) = play.filter(|_| tab && ui.memory(|memory| memory.focused().is_none())) {
+        ui.memory_mut(|memory| {
+            memory.request_focus(play);
+            memory.move_focus(FocusDirection::None);
+        });
+    }
+}
+
 /// Reset, play and step. Returns as [`ui`].
 fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY));
@@ -117,7 +135,11 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     };
     let runs = player.stopped().is_none();
     ui.add_enabled_ui(runs, |ui| {
-        if icon_button(ui, icon, name, help, large, true).clicked() {
+        let play = icon_button(ui, icon, name, help, large, true);
+        if ui.is_enabled() {
+            ui.data_mut(|data| data.insert_temp(Id::unique(FIRST), Some(play.id)));
+        }
+        if play.clicked() {
             player.set_playing(!player.is_playing());
         }
         let help = "One step of the solver (right arrow; left arrow takes it back)";
