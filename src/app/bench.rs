@@ -14,6 +14,7 @@ use eframe::egui::{CollapsingHeader, RichText, Ui};
 
 use super::host::Host;
 use super::player::Player;
+use super::spoken;
 use crate::analysis::ready::ReadySweep;
 use crate::scene::Scene;
 pub use asked::Asked;
@@ -78,11 +79,14 @@ impl Bench {
 
     /// The whole bench; returns what was asked of the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
-        ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("Chaos bench").strong());
+        const TITLE: &str = "Chaos bench";
+        let title = ui.horizontal_wrapped(|ui| {
+            let title = ui.label(RichText::new(TITLE).strong());
             ui.label("Coordinate");
             self.coordinate.ui(ui);
+            title
         });
+        spoken::titled(ui, &title.inner, TITLE);
         let Self { coordinate, portrait, sweep } = self;
         let help = "How fast neighbouring motions of the running scene diverge";
         part(ui, "Divergence of neighbouring motions", help, |ui| {

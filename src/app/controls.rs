@@ -11,7 +11,7 @@ use eframe::egui::{
 use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::{equations, keys, theme, value};
+use super::{equations, keys, spoken, theme, value};
 use crate::scene::{Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display};
 use crate::simulate::{ChangeError, Effect};
 
@@ -71,7 +71,10 @@ impl Controls {
 
     /// What the scene is called.
     pub fn title(ui: &mut Ui, player: &Player) {
-        ui.label(RichText::new(&player.scene().title).small().weak()).on_hover_text(&player.scene().description);
+        let title = &player.scene().title;
+        let label = ui.label(RichText::new(title).small().weak());
+        spoken::heading(&label, title);
+        label.on_hover_text(&player.scene().description);
         ui.add_space(2.0);
     }
 
@@ -106,6 +109,7 @@ impl Controls {
 
     /// The most important ones.
     pub fn few(&mut self, ui: &mut Ui, player: &mut Player) {
+        spoken::landmark(ui, "Parameters");
         let table = player.wanted().parameters();
         for key in FIRST {
             if let Some(parameter) = table.iter().find(|p| p.key == key) {
@@ -239,6 +243,7 @@ impl Controls {
         let response = keys::slider(ui, slider);
         tooltip(ui, &response, player, row);
         let changed = response.changed();
+        spoken::value(&response, &row.shown());
         response.accessible_name(&row.name);
         if changed {
             let digits = if logarithmic { 3 } else { 6 };

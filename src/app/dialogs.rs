@@ -7,6 +7,7 @@ use super::host::SaveFile;
 use super::keys::Group;
 use super::load::Load;
 use super::player::Player;
+use super::spoken;
 use crate::analysis::ready::ReadySweep;
 use code::SharedLink;
 
@@ -137,9 +138,11 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
     };
     let widest = (ctx.content_rect().width() - 48.0).min(width);
     let frame = egui::Frame::window(&ctx.global_style());
-    let modal = Modal::new(Id::unique("dialog")).frame(frame).show(ctx, |ui| {
+    let id = Id::unique("dialog");
+    let area = Modal::default_area(id).accessible_name(dialog.title());
+    let modal = Modal::new(id).area(area).frame(frame).show(ctx, |ui| {
         ui.set_width(widest);
-        ui.heading(dialog.title());
+        spoken::heading(&ui.heading(dialog.title()), dialog.title());
         ui.add_space(6.0);
         let scrolled = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
         let entered = scrolled

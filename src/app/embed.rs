@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Frame, Panel, ScrollArea, Ui};
 
-use super::{App, transport};
+use super::{App, spoken, transport};
 
 /// Width of the controls beside the picture, points.
 const CONTROLS: f32 = 250.0;
@@ -73,6 +73,7 @@ impl App {
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
+                spoken::landmark(ui, "Transport");
                 if panels.has(Part::Timeline) {
                     ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 }

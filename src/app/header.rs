@@ -10,7 +10,7 @@ use super::App;
 use super::dialogs::Dialog;
 use super::files::{is_right, verdict_words};
 use super::replay::Verdict;
-use super::{layout, opening, theme};
+use super::{layout, opening, spoken, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 
 /// Width of the window from which the header has room for the program's name, points.
@@ -57,6 +57,7 @@ impl AboutScene {
 
 impl App {
     pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
+        spoken::landmark(ui, "Scene and files");
         ui.horizontal(|ui| {
             // In a narrow window its buttons need the room.
             if !compact && ui.available_width() > NAMED {

@@ -5,7 +5,7 @@ use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollAr
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
 use super::controls::Controls;
-use super::{App, overlay, present, theme, transport};
+use super::{App, overlay, present, spoken, theme, transport};
 use crate::view::Preset;
 
 /// Below this width or height the window is small, points.
@@ -280,6 +280,7 @@ impl App {
             .default_size(plots_height)
             .size_range(150.0..=600.0)
             .show_collapsible(ui, show_plots, |ui| {
+                spoken::landmark(ui, "Plots");
                 // Otherwise the panel would shrink to what the plots leave of it.
                 ui.take_available_space();
                 ui.horizontal(|ui| {
@@ -294,6 +295,11 @@ impl App {
                     viewport.revisit(player);
                 }
             });
+        for (panel, name) in
+            [("controls", "Width of the controls"), ("bench", "Width of the bench"), ("plots", "Height of the plots")]
+        {
+            spoken::splitter(ui, panel, name);
+        }
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
@@ -444,6 +450,7 @@ impl App {
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 }
                 Some(Sheet::Plots) => {
+                    spoken::landmark(ui, "Plots");
                     plots.header(ui, player);
                     let size = egui::vec2(ui.available_width(), 340.0);
                     let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
@@ -465,6 +472,7 @@ impl App {
 
     /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
     pub(super) fn picture(&mut self, ui: &mut Ui) -> bool {
+        spoken::landmark(ui, "The machine");
         let plain = self.picture.is_plain();
         if !plain {
             self.microscope_beside(ui);

@@ -7,7 +7,7 @@ use eframe::egui::{self, ComboBox, Grid, Panel, RichText, Role, ScrollArea, Sens
 use glam::Vec3;
 
 use super::player::Player;
-use super::{App, layout, theme, value};
+use super::{App, layout, spoken, theme, value};
 use crate::simulate::ContactState;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
@@ -83,11 +83,14 @@ impl Microscope {
         }
         let size = (SHARE * room).min(USUAL).max(least);
         let panel = panel.default_size(size).size_range(least..=(MOST * room).max(least));
-        panel
+        let shown = panel
             .resizable(true)
             .frame(theme::panel(ui).inner_margin(8.0))
-            .show(ui, |ui| self.contents(ui, player, view))
-            .inner
+            .show(ui, |ui| self.contents(ui, player, view));
+        for panel in ["microscope", "microscope below"] {
+            spoken::splitter(ui, panel, "Size of the microscope");
+        }
+        shown.inner
     }
 
     fn contents(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
@@ -96,7 +99,7 @@ impl Microscope {
         let mut chosen = None;
         ui.horizontal_wrapped(|ui| {
             if ui.available_width() > 300.0 {
-                ui.label(RichText::new("Microscope").strong());
+                spoken::heading(&ui.label(RichText::new("Microscope").strong()), "Microscope");
             }
             let name = joints.get(self.joint).map_or("", |joint| &joint.name);
             ComboBox::from_id_salt("joint under the microscope")

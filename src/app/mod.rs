@@ -60,6 +60,7 @@ mod share;
 mod sound;
 #[cfg(all(feature = "sound", not(target_arch = "wasm32")))]
 mod speaker;
+mod spoken;
 mod stack;
 mod theme;
 mod timeline;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use eframe::egui::{self, Align2, FontId, Galley, Id, Panel, Rect, Sense, Ui, Vec2, vec2};
 
-use super::{App, overlay, theme, transport, value};
+use super::{App, overlay, spoken, theme, transport, value};
 
 /// Least height of a text as a share of the screen's: what the last row of a lecture hall can read.
 const LEAST_TEXT: f32 = 1.0 / 40.0;
@@ -297,9 +297,10 @@ impl App {
     }
 }
 
-/// Whether the bar that fills `ui` is double-clicked or double-tapped where it holds nothing else. Comes before its contents, which
-/// lie over it.
+/// Names the bar that fills `ui` for screen readers. Whether it is double-clicked or double-tapped where it holds nothing else. Comes
+/// before its contents, which lie over it.
 pub fn double_tapped(ui: &Ui) -> bool {
+    spoken::landmark(ui, "Transport");
     let bar: Rect = ui.max_rect();
     let response = ui.interact(bar, ui.scope_id().with("double tap"), Sense::click());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Toolbar, true, "Transport bar"));

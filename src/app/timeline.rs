@@ -11,7 +11,7 @@ use super::icons::{Icon, icon_button};
 use super::player::contact_history::ContactHistory;
 use super::player::{Flag, Player};
 use super::zoom::{self, Zoom};
-use super::{theme, value};
+use super::{spoken, theme, value};
 use crate::simulate::{ContactState, RECORDED_JOINTS};
 
 /// Height of the row of flags, and of all lanes together, points.
@@ -106,6 +106,7 @@ impl Timeline {
         let shown = player.pacer.shown();
         let enabled = ui.is_enabled();
         response.widget_info(|| WidgetInfo::slider(enabled, shown, "Timeline, s"));
+        spoken::value(&response, &value::time(shown));
         ui.ctx().accesskit_node_builder(response.id, |node| {
             node.set_min_numeric_value(0.0);
             node.set_max_numeric_value(player.reached());

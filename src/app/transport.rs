@@ -6,7 +6,7 @@ use eframe::egui::{
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::{keys, theme, value};
+use super::{keys, spoken, theme, value};
 use crate::simulate::{Limit, SCALE_RANGE};
 
 /// Time scales that a list offers.
@@ -175,6 +175,7 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     if response.changed() {
         player.pacer.set_scale(scale);
     }
+    spoken::value(&response, &value::time_scale(scale).replace(':', " to "));
     response.accessible_name("Time scale");
     scales(ui, player);
     reached(ui, player);

@@ -15,7 +15,7 @@ use super::pace::{Pace, Seen};
 use super::player::Player;
 use super::pull::Grip;
 use super::share::CameraPose;
-use super::{ghosts, keys, value, zoom};
+use super::{ghosts, keys, spoken, value, zoom};
 use crate::render;
 use crate::scene::Vec3 as Exact;
 use crate::simulate::{ContactState, Pull};
@@ -730,7 +730,8 @@ impl Viewport {
              socket. The motion of the machine stays as it is. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
-        keys::slider(ui, slider).accessible_name("Magnification of the clearance");
+        let slider = keys::slider(ui, slider).accessible_name("Magnification of the clearance");
+        spoken::value(&slider, &format!("{} times", value::number(f64::from(options.magnification), 3)));
         ui.add_space(4.0);
         ui.label("Force arrows");
         ui.horizontal(|ui| {
@@ -756,9 +757,11 @@ impl Viewport {
             options.arrows.reference = if automatic { None } else { Some(self.marks.reference(&options.arrows)) };
         }
         if let Some(reference) = &mut options.arrows.reference {
-            ui.add(Slider::new(reference, 0.1..=10_000.0).logarithmic(true).suffix(" N").max_decimals(1))
+            let slider = ui
+                .add(Slider::new(reference, 0.1..=10_000.0).logarithmic(true).suffix(" N").max_decimals(1))
                 .on_hover_text("Force of the longest arrow in the legend")
                 .accessible_name("Force of the reference arrow");
+            spoken::value(&slider, &format!("{} N", value::number(f64::from(*reference), 6)));
         }
         ui.add_space(4.0);
         ui.label("Show");

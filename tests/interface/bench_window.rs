@@ -284,7 +284,7 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     harness.get_by_label_contains("Running: pendulum, ");
     click_point(&mut harness);
     assert_eq!(harness.state().loading(), None);
-    harness.get_by_label("Change the running scene?");
+    harness.get_by_role_and_label(Role::Dialog, "Change the running scene?");
     harness.get_by_label("Scene: spcmm instead of pendulum");
     click(&mut harness, Role::Button, "Close");
     assert_eq!(harness.state().player().scene().name, "pendulum");

@@ -10,7 +10,7 @@ use crate::app::curve::Path;
 use crate::app::layout::reserved;
 use crate::app::player::Player;
 use crate::app::watch::Observed;
-use crate::app::{keys, theme, value};
+use crate::app::{keys, spoken, theme, value};
 
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
@@ -80,14 +80,14 @@ impl Portrait {
                 .suffix("°")
                 .max_decimals(1)
                 .clamping(SliderClamping::Always);
-            let changed = keys::slider(ui, slider)
+            let slider = keys::slider(ui, slider)
                 .on_hover_text(
                     "Where in the period of the drive sections are taken, of the running scene and of the next sweep; 0° is \
                      the phase at t = 0. Another phase starts the section anew.",
                 )
-                .accessible_name("Drive phase")
-                .changed();
-            if changed {
+                .accessible_name("Drive phase");
+            spoken::value(&slider, &format!("{}°", value::number(degrees, 4)));
+            if slider.changed() {
                 player.set_phase(degrees / 360.0);
             }
         });

@@ -10,7 +10,7 @@ use super::spots::Spots;
 use super::text::{self, Block, Face};
 use super::{Course, lesson_titles};
 use crate::app::bench::Bench;
-use crate::app::{App, layout, theme};
+use crate::app::{App, layout, spoken, theme};
 
 /// Height of a choice where only the mouse reaches it, points.
 const LOW: f32 = 24.0;
@@ -46,6 +46,7 @@ impl App {
         let Some(course) = &mut self.course else {
             return;
         };
+        spoken::landmark(ui, "Lesson");
         let own = course.sets || course.is_own(&self.player);
         // In a presentation the screen is low in points, but nobody's finger is on it.
         let low = self.presentation.is_some() && !self.touched;
@@ -156,7 +157,7 @@ impl Course {
         {
             let names = self.measured.names();
             ui.label(RichText::new(&lesson.title).small().weak());
-            ui.label(RichText::new(&step.title).heading().strong());
+            spoken::heading(&ui.label(RichText::new(&step.title).heading().strong()), &step.title);
             if let Some(why) = self.measured.fault() {
                 theme::error(ui, format!("This lesson cannot be computed: {why}"));
             }

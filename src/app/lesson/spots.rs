@@ -46,7 +46,8 @@ impl Spots {
         let named = |node: &Node, name: &str| node.label() == Some(name) || node.value() == Some(name);
         for name in self.wanted.iter() {
             let all = || tree.nodes.iter().filter(|(_, node)| named(node, name));
-            let is_text = |node: &Node| matches!(node.role(), Role::Label | Role::TextRun);
+            let is_text =
+                |node: &Node| matches!(node.role(), Role::Label | Role::TextRun | Role::Heading | Role::Region);
             // A text of that name counts only where no control has it.
             let controls = all().any(|(_, node)| !is_text(node));
             let rects = all()
