@@ -226,7 +226,7 @@ impl Comparison {
     }
 
     /// What the grey curves of a plot are, in what is left of a row `height` points high.
-    pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32) {
+    pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32, plot: &str) {
         let dark = ui.visuals().dark_mode;
         let count = self.kept.len().max(1) as f32;
         let width = (ui.available_width() / count - 6.0).min(170.0);
@@ -238,6 +238,7 @@ impl Comparison {
             if kept.lags(player) {
                 text += &format!(" (computed to {})", value::time(kept.run.reached()));
             }
+            let name = format!("{text} in {plot}");
             let mut text = RichText::new(text).small().color(kept.colour(Color32::GRAY, dark));
             if !kept.shown {
                 text = text.strikethrough();
@@ -248,7 +249,10 @@ impl Comparison {
                 ui.add(button.min_size(vec2(0.0, height)))
             });
             let response = response.inner;
-            ui.ctx().accesskit_node_builder(response.id, |node| node.set_toggled(kept.shown.into()));
+            ui.ctx().accesskit_node_builder(response.id, |node| {
+                node.set_toggled(kept.shown.into());
+                node.set_label(name);
+            });
             if response.on_hover_text("Show or hide the curves of the run before the change").clicked() {
                 kept.shown = !kept.shown;
             }

@@ -1,7 +1,10 @@
 //! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind; and one per name by which
 //! channels are picked, and unit.
 
-use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo, vec2};
+use eframe::egui::{
+    self, ComboBox, EventFilter, Id, Key, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo,
+    accesskit::Live, vec2,
+};
 use egui_plot::{AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform};
 
 use super::compare::{Comparison, Kept};
@@ -10,7 +13,7 @@ use super::player::Player;
 use super::stack::stack;
 use super::zoom::{self, Zoom};
 use super::{curve, layout, opening};
-use super::{theme, value};
+use super::{spoken, theme, value};
 use crate::scene::Scene;
 use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
@@ -27,6 +30,8 @@ const LEAST_HEIGHT: f32 = 110.0;
 const MARKS_APART: f32 = 16.0;
 /// Generous width of a character of the numbers, points.
 const LETTER: f64 = 7.0;
+/// Fraction of the time range that an arrow key moves the cursor by.
+const NUDGE: f64 = 0.01;
 /// Approximate maximum number of marks on an axis.
 const MARKS: f64 = 5.0;
 /// A range smaller than this fraction of the values, or than this in axis units, is rounding and not motion.
@@ -68,6 +73,8 @@ pub struct Plots {
     places: Vec<(Quantity, Place)>,
     /// Time range that the user has zoomed to, s, in place of the window.
     zoomed: Option<(f64, f64)>,
+    /// Where the arrow keys have moved the cursor of the plot that has the focus, s.
+    cursor: Option<(Id, f64)>,
 }
 
 /// What of the plots is chosen: quantities, channels, time window, hidden lines.
@@ -138,6 +145,11 @@ impl<'a> Panel<'a> {
             }
         }
         panels
+    }
+
+    /// What its controls are called by: of channels picked by one name each unit has a plot.
+    fn name(&self) -> String {
+        if self.quantity.is_some() { self.label.to_owned() } else { self.title() }
     }
 
     /// Label with the unit.
@@ -213,6 +225,7 @@ impl Plots {
             comparison: Comparison::default(),
             places: Vec::new(),
             zoomed: None,
+            cursor: None,
         }
     }
 
@@ -232,7 +245,7 @@ impl Plots {
     /// Selection of the quantities and of the time window.
     pub fn header(&mut self, ui: &mut Ui, player: &Player) {
         ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("Plots").strong());
+            spoken::heading(&ui.label(RichText::new("Plots").strong()), "Plots");
             let menu = egui::containers::menu::MenuConfig::new()
                 .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
             egui::containers::menu::MenuButton::new("Choose plots")
@@ -555,26 +568,27 @@ impl Plots {
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0);
             let Self { traces, levels, readings, hidden, comparison, before, .. } = &*self;
-            // All curves at the time under the pointer.
-            let reading = |position: &HoverPosition<'_>| {
-                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
-                let time = position.x * time_size;
-                let mut words = format!("{} {time_unit}", value::number(position.x, earliest));
-                for ((channel, member), trace) in members.iter().zip(traces) {
-                    let values = trace.at(time).filter(|_| !hidden.contains(channel));
-                    let Some((least, greatest)) = values else {
+            let instant = |time: f64| format!("{} {time_unit}", value::number(time / time_size, earliest));
+            // All curves at an instant, behind these words.
+            let reading = |time: f64, mut words: String, between: &str| {
+                for ((_, member), trace) in members.iter().zip(traces) {
+                    let Some((least, greatest)) = trace.at(time) else {
                         continue;
                     };
                     let [least, greatest] = [least, greatest].map(|v| value::number(v / size, finest));
                     words += &if least == greatest {
-                        format!("\n{member} {least} {unit}")
+                        format!("{between}{member} {least} {unit}")
                     } else {
-                        format!("\n{member} {least} to {greatest} {unit}")
+                        format!("{between}{member} {least} to {greatest} {unit}")
                     };
                 }
-                Some(words)
+                words
             };
-            let plot = plot.label_formatter(reading);
+            let plot = plot.label_formatter(|position: &HoverPosition<'_>| {
+                let (HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position }) = position;
+                let time = position.x * time_size;
+                Some(reading(time, instant(time), "\n"))
+            });
             let shown = plot.show(ui, |plot| {
                 plot.set_plot_bounds_x(from / time_size..=to / time_size);
                 plot.set_plot_bounds_y(least..=greatest);
@@ -604,9 +618,29 @@ impl Plots {
                     }
                 }
             });
-            let name = format!("Plot of {}", panel.label);
+            let name = format!("Plot of {}", panel.name());
             shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
             let transform = shown.transform;
+            let own = shown.response.id;
+            let cursor = self.cursor.and_then(|(plot, time)| (plot == own).then_some(time));
+            ui.ctx().accesskit_node_builder(own, |node| {
+                if let Some(time) = cursor {
+                    // Read out as it moves.
+                    node.set_live(Live::Polite);
+                    let values = reading(time, String::new(), ", ");
+                    let values = values.trim_start_matches(", ");
+                    node.set_label(spoken::words(&format!("{values} at {}", instant(time))));
+                } else {
+                    let mut words = format!("{} to {}", value::number(from / time_size, earliest), instant(to));
+                    if let Some((member, least, most, time)) = largest(members, traces) {
+                        let [least, most] = [least, most].map(|v| value::number(v / size, finest));
+                        words += &format!(", from {least} to {most} {unit}, largest in {member} at {}", instant(time));
+                    }
+                    node.set_value(spoken::words(&words));
+                }
+            });
+            let cursor = cursor.map(|time| (time, reading(time, instant(time), "\n")));
+            self.move_cursor(ui, &shown.response, player);
             let asked = self.pointer(ui, &shown.response, &transform, time_size, player);
             if let Some(quantity) = panel.quantity {
                 self.places.push((quantity, Place { transform, units }));
@@ -630,9 +664,42 @@ impl Plots {
                 let line = egui::Stroke::new(1.0, ui.visuals().warn_fg_color.gamma_multiply(0.7));
                 ui.painter_at(frame).vline(x(flag.time), frame.y_range(), line);
             }
+            if let Some((time, words)) = cursor {
+                let painter = ui.painter_at(frame);
+                painter.vline(x(time), frame.y_range(), ui.visuals().selection.stroke);
+                let colour = ui.visuals().strong_text_color();
+                let words = painter.layout_no_wrap(words, font, colour);
+                let left = (x(time) + 4.0).min(frame.right() - words.size().x);
+                painter.galley(egui::pos2(left, frame.top()), words, colour);
+            }
             asked
         })
         .inner
+    }
+
+    /// Arrow keys on a plot that has the focus: an instant to read its values at.
+    fn move_cursor(&mut self, ui: &Ui, response: &egui::Response, player: &Player) {
+        if !response.has_focus() {
+            self.cursor = self.cursor.filter(|(plot, _)| *plot != response.id);
+            return;
+        }
+        let arrows = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
+        let pressed = |key| ui.input(|input| input.num_presses(key)) as f64;
+        let by = pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
+        if by != 0.0 {
+            let (from, to) = self.range(player);
+            let before = self.cursor.map_or(player.pacer.shown(), |(_, time)| time);
+            let wanted = before + by * NUDGE * (to - from);
+            // A recorded instant, and never the same again.
+            let all = self.traces.iter().flat_map(|trace| &trace.bins).map(|bin| 0.5 * (bin.from + bin.to));
+            let ahead = all.filter(|time| (time - before) * by > 0.0);
+            let nearest = ahead.min_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()));
+            if let Some(time) = nearest {
+                self.cursor = Some((response.id, time));
+                ui.ctx().request_repaint();
+            }
+        }
     }
 
     /// Pointer input on a plot: another time range, or the instant that is returned, s.
@@ -713,7 +780,10 @@ impl Plots {
                     text = text.strikethrough().color(ui.visuals().weak_text_color());
                 }
                 let response = ui.add(egui::Button::new(text).frame(false).min_size(vec2(theme::side(ui, 0.0), 0.0)));
-                ui.ctx().accesskit_node_builder(response.id, |node| node.set_toggled(on.into()));
+                ui.ctx().accesskit_node_builder(response.id, |node| {
+                    node.set_toggled(on.into());
+                    node.set_label(format!("{member} in {}", panel.name()));
+                });
                 if response.on_hover_text("Line shown or hidden").clicked() {
                     if on {
                         self.hidden.push(*channel);
@@ -723,10 +793,27 @@ impl Plots {
                 }
             }
             if panel.kind != PlotKind::Bands {
-                self.comparison.legend(ui, player, height);
+                self.comparison.legend(ui, player, height, &panel.name());
             }
         });
     }
+}
+
+/// The least and the greatest value of all curves, SI, and where the greatest is: its curve, and its time, s.
+fn largest<'a>(members: &[(usize, &'a str)], traces: &[Trace]) -> Option<(&'a str, f64, f64, f64)> {
+    let mut found: Option<(&str, f64, f64, f64)> = None;
+    for ((_, member), trace) in members.iter().zip(traces) {
+        for bin in trace.bins.iter().filter(|bin| !bin.greatest.is_nan()) {
+            let (_, least, most, _) = found.unwrap_or((member, bin.least, f64::NEG_INFINITY, 0.0));
+            if bin.greatest > most {
+                found = Some((member, least, bin.greatest, 0.5 * (bin.from + bin.to)));
+            }
+            if let Some(found) = &mut found {
+                found.1 = found.1.min(bin.least);
+            }
+        }
+    }
+    found
 }
 
 /// What `kept` recorded of the members of `panel`, from and to these instants, s, in at most so many bins.

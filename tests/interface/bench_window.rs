@@ -1,7 +1,7 @@
 //! The chaos bench of the window, driven by role and label.
 
 use std::cell::Cell;
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -450,21 +450,31 @@ fn the_bench_shows_what_is_stored() {
 }
 
 #[test]
-fn every_control_of_the_bench_has_a_name() {
+fn every_control_beside_the_bench_has_a_name_of_its_own() {
     let mut harness = window("spcmm", &[FAST]);
     harness.run();
     let mut controls = 0;
+    let mut names = HashSet::new();
     for node in harness.root().children_recursive() {
         let node = node.accesskit_node();
         let is_control = matches!(
             node.role(),
-            Role::Button | Role::Slider | Role::TextInput | Role::ComboBox | Role::CheckBox | Role::SpinButton
+            Role::Button
+                | Role::Slider
+                | Role::TextInput
+                | Role::ComboBox
+                | Role::CheckBox
+                | Role::SpinButton
+                | Role::Splitter
+                | Role::Image
         );
         controls += usize::from(is_control);
         let named = node.label().is_some_and(|label| !label.trim().is_empty());
         assert!(!is_control || named, "{:?}", node.role());
+        let new = names.insert((node.role(), node.label()));
+        assert!(!is_control || new, "two of role {:?} are called {:?}", node.role(), node.label());
     }
-    assert!(controls > 30, "{controls}");
+    assert!(controls > 60, "{controls}");
 }
 
 /// Says which sweep was asked for, and computes nothing.

@@ -1,7 +1,13 @@
 //! What the box under a plot's pointer says.
 
-use eframe::egui::{self, Shape};
-use egui_kittest::Harness;
+use eframe::egui::{
+    self, Key, Shape,
+    accesskit::{Live, Role},
+};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT as _, Queryable as _},
+};
 use jointplay::app::App;
 use jointplay::simulate::{Frame, Quantity, Simulation};
 
@@ -83,4 +89,32 @@ fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
         }
     }
     assert!(checked >= 7, "{checked}");
+
+    // The same by the keyboard: the words that are read out are those of the box, at the instant that they name.
+    harness.remove_cursor();
+    harness.get_by_role_and_label(Role::Image, "Plot of Normal force").focus();
+    harness.run_steps(2);
+    let mut told = Vec::new();
+    for _ in 0..4 {
+        harness.key_press(Key::ArrowLeft);
+        harness.run_steps(4);
+        let mut images = harness.query_all_by_role(Role::Image);
+        let plot = images.find(|node| node.accesskit_node().is_focused()).expect("has the focus");
+        assert_eq!(plot.accesskit_node().live(), Live::Polite);
+        let said = plot.accesskit_node().label().expect("says the values");
+        let mut texts = Vec::new();
+        harness.output().shapes.iter().for_each(|part| boxes(&part.shape, &mut texts));
+        let [text] = &texts[..] else { panic!("{said}: {texts:?}, {told:?}") };
+        let (time, values) = text.split_once('\n').expect("values below the time");
+        let words = format!("{} at {time}", values.replace('\n', ", "));
+        assert_eq!(said, words.replace(" N", " newtons").replace(" ms", " milliseconds"));
+        let at = time.split(' ').next().and_then(|at| at.parse::<f64>().ok()).expect("a time");
+        let frame = sample(1e-3 * at);
+        let first = values.lines().next().expect("S1").split(' ').filter_map(|word| word.parse::<f64>().ok());
+        let range = first.fold((f64::INFINITY, 0.0_f64), |all, v| (all.0.min(v), all.1.max(v)));
+        let run = frame.joints[0].normal_force.norm();
+        assert!(run >= 0.98 * range.0 && run <= 1.02 * range.1, "{text}: {run}");
+        told.push(at);
+    }
+    assert!(told.windows(2).all(|pair| pair[1] < pair[0]), "{told:?}");
 }

@@ -783,7 +783,7 @@ fn any_channel_is_found_by_name_plotted_and_carried_by_links() {
     for title in ["rod1.pose, mm", "rod1.pose, rad", "*.reaction, N"] {
         harness.get_by_role_and_label(Role::Label, title);
     }
-    harness.get_by_label("gamma");
+    harness.get_by_label("gamma in rod1.pose, rad");
     harness.state_mut().player_mut().run_to(9e-3);
     harness.run();
     let player = harness.state().player();
@@ -999,7 +999,7 @@ fn the_clearance_of_the_past_stays_where_it_was() {
     player.run_to(0.05);
     harness.run();
     // The run before the change is drawn in greys, too.
-    harness.get_all_by_label("— Clearance: 0.3 mm").next().expect("in a legend").click();
+    harness.get_by_label("— Clearance: 0.3 mm in Eccentricity").click();
     harness.run();
     let drawn = picture(&mut harness);
     // Dashed in the colour of weak text: how much of it there is in a row, from one time to another.
