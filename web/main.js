@@ -244,7 +244,7 @@ async function begin(found) {
             if (window !== window.top) HTMLElement.prototype.focus = () => {};
             await page.start(freshCanvas(), backend, laboratory.starts, left ?? wanted(), wishes());
             // What eframe takes typed text by is no stop of its own on the way of Tab.
-            for (const field of document.querySelectorAll('body > input')) field.tabIndex = -1;
+            for (const field of document.querySelectorAll('main > input')) field.tabIndex = -1;
             return null;
         } catch (error) {
             failures.push(`${backend}: ${error?.message ?? error}`);

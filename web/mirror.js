@@ -12,12 +12,15 @@ const KINDS = {
     Button: ['button', {}],
     CheckBox: ['input', { type: 'checkbox' }],
     ComboBox: ['button', { 'aria-haspopup': 'listbox' }],
+    Dialog: ['section', { role: 'dialog' }],
     DisclosureTriangle: ['button', {}],
+    Heading: ['span', { role: 'heading', 'aria-level': 2 }],
     Image: ['div', { role: 'img' }],
     Link: ['div', { role: 'link' }],
     MultilineTextInput: ['textarea', {}],
     ProgressIndicator: ['div', { role: 'progressbar' }],
     RadioButton: ['input', { type: 'radio' }],
+    Region: ['section', {}],
     Slider: ['input', { type: 'range' }],
     SpinButton: ['input', { type: 'number' }],
     Splitter: ['input', { type: 'range' }],
@@ -39,6 +42,8 @@ export class Mirror {
     /** By AccessKit's number: the element, and the widget that it was made after, as text. */
     #shown = new Map();
     #frames = -1;
+    /** What the control that has the focus last said of itself. */
+    #said = '';
 
     constructor(page, box) {
         this.page = page;
@@ -70,11 +75,14 @@ export class Mirror {
             if (shown.get(id)?.element !== element) element.remove();
         }
         this.#shown = shown;
-        let next = this.box.firstElementChild;
-        for (const { element } of shown.values()) {
+        // By the part of the window: the element in the next place.
+        const next = new Map();
+        for (const { element, inside } of shown.values()) {
+            const part = shown.get(inside)?.element ?? this.box;
+            const there = next.has(part) ? next.get(part) : part.querySelector(':scope > [data-id]');
             // What is in its place stays there: a reader may be at it.
-            if (element === next) next = next.nextElementSibling;
-            else this.box.insertBefore(element, next);
+            if (element !== there) part.insertBefore(element, there);
+            next.set(part, element === there ? there.nextElementSibling : there);
         }
         this.#focus(widgets.find(({ focused }) => focused));
     }
@@ -85,7 +93,7 @@ export class Mirror {
         const before = this.#shown.get(widget.id);
         if (before?.text === text) return before;
         const [tag, fixed] = KINDS[widget.role] ?? ['span', {}];
-        let element = before?.role === widget.role ? before.element : null;
+        let element = before?.role === widget.role && before.inside === widget.inside ? before.element : null;
         if (!element) {
             element = document.createElement(tag);
             attributes(element, { ...fixed, id: `mirror-${widget.id}`, tabindex: tag === 'span' ? null : -1 });
@@ -95,7 +103,7 @@ export class Mirror {
         const { style } = element;
         [style.left, style.top, style.width, style.height] = [x0, y0, x1 - x0, y1 - y0].map((length) => `${length}px`);
         describe(element, tag, widget);
-        return { element, text, role: widget.role };
+        return { element, text, role: widget.role, inside: widget.inside };
     }
 
     /** Tells where the keyboard is. */
@@ -103,9 +111,13 @@ export class Mirror {
         const canvas = document.getElementById('laboratory');
         attributes(canvas, { 'aria-activedescendant': widget && `mirror-${widget.id}` });
         // What eframe takes typed text by has no name of its own.
-        for (const field of document.querySelectorAll('body > input')) {
+        for (const field of document.querySelectorAll('main > input')) {
             attributes(field, { 'aria-label': widget?.label ?? 'Typed text' });
         }
+        // As when the cursor of a plot moves.
+        const said = widget?.live ? widget.label : '';
+        if (said && said !== this.#said) document.getElementById('report-aloud').textContent = said;
+        this.#said = said;
     }
 
     #changed(element) {
@@ -128,9 +140,9 @@ function describe(element, tag, { role, label, text, value, min, max, step, on, 
         element.textContent = label;
         return;
     }
-    const name = role === 'ComboBox' && text ? `${label}: ${text}` : label;
+    const name = ['ComboBox', 'Image'].includes(role) && text ? `${label}: ${text}` : label;
     attributes(element, { 'aria-label': name, 'aria-expanded': expanded });
-    if (tag === 'div') {
+    if (tag === 'div' || tag === 'section') {
         const number = role === 'ProgressIndicator' ? value : null;
         attributes(element, { 'aria-disabled': disabled || null, 'aria-valuenow': number });
         return;
@@ -144,7 +156,7 @@ function describe(element, tag, { role, label, text, value, min, max, step, on, 
         element.value = text ?? '';
     } else {
         const own = min === null || max === null ? 'any' : (max - min) / STEPS;
-        attributes(element, { min, max, step: step ?? own, 'aria-valuetext': text ?? String(value) });
+        attributes(element, { min, max, step: step ?? own, 'aria-valuetext': text });
         element.value = value;
         // As the element holds it: a multiple of its step.
         element.dataset.value = element.value;

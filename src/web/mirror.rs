@@ -6,6 +6,8 @@ use std::collections::HashMap;
 use eframe::egui::{self, accesskit};
 use serde_json::{Value, json};
 
+type Nodes<'a> = HashMap<accesskit::NodeId, &'a accesskit::Node>;
+
 /// Keeps what egui last reported about its controls, and what it is to be told next.
 #[derive(Default)]
 pub struct Mirror {
@@ -35,20 +37,25 @@ impl egui::Plugin for Mirror {
 }
 
 impl Mirror {
-    /// Controls and texts in reading order, as JSON: `[{"id", "role", "label", "text", "value", "min", "max", "step", "on",
-    /// "expanded", "disabled", "focusable", "focused", "rect": [x0, y0, x1, y1]}, …]`; places are in CSS pixels of the canvas, `zoom` of
-    /// them to a point. Empty before the first frame.
+    /// Controls, texts and parts of the window in reading order, as JSON: `[{"id", "inside", "role", "label", "text", "value", "min",
+    /// "max", "step", "on", "expanded", "disabled", "live", "focusable", "focused", "rect": [x0, y0, x1, y1]}, …]`; places are in CSS
+    /// pixels of the canvas, `zoom` of them to a point; `inside`: the part of the window. Empty before the first frame.
     pub fn widgets(&self, zoom: f32) -> String {
         let Some(tree) = &self.tree else {
             return String::new();
         };
-        let nodes: HashMap<_, _> = tree.nodes.iter().map(|(id, node)| (*id, node)).collect();
+        let nodes: Nodes<'_> = tree.nodes.iter().map(|(id, node)| (*id, node)).collect();
         let mut widgets = Vec::new();
-        let mut open: Vec<_> = tree.tree.iter().map(|tree| tree.root).collect();
-        while let Some(id) = open.pop() {
+        let mut open: Vec<_> = tree.tree.iter().map(|tree| (tree.root, None)).collect();
+        while let Some((id, part)) = open.pop() {
             let Some(node) = nodes.get(&id) else { continue };
-            open.extend(node.children().iter().rev());
-            widgets.extend(describe(id, node, &nodes, tree.focus, f64::from(zoom)));
+            let own = is_part(node, &nodes).then_some(id).or(part);
+            open.extend(node.children().iter().rev().map(|child| (*child, own)));
+            let widget = describe(id, node, &nodes, tree.focus, f64::from(zoom));
+            widgets.extend(widget.map(|mut widget| {
+                widget["inside"] = part.map(|part| part.0.to_string()).into();
+                widget
+            }));
         }
         Value::Array(widgets).to_string()
     }
@@ -74,15 +81,21 @@ impl Mirror {
     }
 }
 
+/// Whether a node is a named part of the window.
+fn is_part(node: &accesskit::Node, nodes: &Nodes<'_>) -> bool {
+    matches!(node.role(), accesskit::Role::Region | accesskit::Role::Dialog) && label(node, nodes).is_some()
+}
+
 /// A node that stands for something to read or to use.
 fn describe(
     id: accesskit::NodeId,
     node: &accesskit::Node,
-    nodes: &HashMap<accesskit::NodeId, &accesskit::Node>,
+    nodes: &Nodes<'_>,
     focus: accesskit::NodeId,
     zoom: f64,
 ) -> Option<Value> {
-    let bounds = node.bounds()?;
+    // A part of the window has no place of its own.
+    let bounds = node.bounds().or_else(|| is_part(node, nodes).then_some(accesskit::Rect::ZERO))?;
     let rect = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];
     // What can be used is listed without a name, too, so that a test finds it.
     let nameless = || node.supports_action(accesskit::Action::Focus).then_some("");
@@ -100,6 +113,7 @@ fn describe(
         "on": node.toggled().map(|on| on == accesskit::Toggled::True),
         "expanded": node.is_expanded(),
         "disabled": node.is_disabled(),
+        "live": node.live().is_some(),
         "focusable": node.supports_action(accesskit::Action::Focus),
         "focused": id == focus,
         "rect": rect.map(|x| x * zoom),
@@ -107,7 +121,7 @@ fn describe(
 }
 
 /// A control's own name, else that of what labels it (sliders, text fields), else its text.
-fn label<'a>(node: &'a accesskit::Node, nodes: &HashMap<accesskit::NodeId, &'a accesskit::Node>) -> Option<&'a str> {
+fn label<'a>(node: &'a accesskit::Node, nodes: &Nodes<'a>) -> Option<&'a str> {
     let labelling = || {
         node.labelled_by().iter().find_map(|id| {
             let label = nodes.get(id)?;

@@ -15,6 +15,19 @@ const reads = async (lab, role, name) => (await lab.element(role, name)).evaluat
 
 test('without pointer and canvas the most important actions work, and the focus is the same on the canvas and for a screen reader', async () => {
     const lab = await open('play=0', { backend: 'webgl' });
+    // From the start of the page it is not far to the button that plays.
+    await lab.page.evaluate(() => document.activeElement.blur());
+    const stops = [];
+    while (!stops.includes('Play')) {
+        assert.ok(stops.length < 10, `Play is not among the first ten stops: ${stops}`);
+        await lab.key('Tab');
+        stops.push((await lab.widgets()).find(({ focused }) => focused)?.label);
+    }
+    await lab.key('Space');
+    assert.equal((await lab.state()).playing, true);
+    await lab.key('Space');
+    await lab.activate('button', 'Reset');
+
     await lab.activate('button', 'Play');
     assert.equal((await lab.state()).playing, true);
     await lab.activate('button', 'Pause');
@@ -31,8 +44,27 @@ test('without pointer and canvas the most important actions work, and the focus 
     await lab.adjust('slider', 'Timeline, s', { steps: -1 });
     const before = (await lab.state()).shown_s;
     assert.ok(before > 0 && before < impact, `${before} after ${impact}`);
+    await lab.runTo(0.0435);
+    const said = async (name) => (await lab.element('slider', name)).getAttribute('aria-valuetext');
+    assert.equal(await said('Timeline, s'), '43.5 milliseconds');
+    assert.equal(await said('Clearance'), '0.3 millimetres');
+    assert.equal(await said('Friction coefficient'), '0.15');
+    assert.equal(await said('Time scale'), '1 to 50');
+    assert.match(await said('Height of the plots'), /^\d+ percent$/);
     await lab.adjust('slider', 'Timeline, s', { value: 0 });
     assert.equal((await lab.state()).shown_s, 0);
+
+    // A plot is a sentence; with the focus on it arrow keys read its values out.
+    const plot = lab.page.getByRole('img', { name: /^Plot of Normal force: 0 to [\d.]+ milliseconds, from 0 to [\d.]+ newtons, largest in S\d at [\d.]+ milliseconds$/ });
+    await plot.evaluate((element) => element.focus());
+    await lab.key('ArrowRight');
+    await lab.key('ArrowRight');
+    const values = /^S1 [\d. to]+ newtons, S2 [\d. to]+ newtons, S3 [\d. to]+ newtons at [\d.]+ milliseconds$/;
+    const aloud = lab.page.locator('#report-aloud');
+    await lab.until(async () => {
+        await lab.page.evaluate(() => globalThis.jointplay.mirror.follow());
+        return values.test(await aloud.textContent());
+    }, 'the values of a plot are not read out');
 
     await lab.adjust('slider', 'Friction coefficient', { value: 0.5 });
     assert.ok(Math.abs((await lab.state()).changed_parameters['contact.friction'] - 0.5) < 5e-3);
@@ -70,7 +102,7 @@ test('without pointer and canvas the most important actions work, and the focus 
     await lab.close();
 });
 
-test('a screen reader is told what goes on; elements lie where their controls are, have names, and axe finds nothing serious', async () => {
+test('a screen reader is told what goes on; elements lie where their controls are, have names, and axe finds nothing to blame', async () => {
     const [wide, phone] = [{ width: 1280, height: 720 }, { width: 390, height: 780 }];
     const lab = await open('scene=pendulum', { backend: 'webgl', size: phone });
     await lab.until(async () => /Running at time scale 1:5[,. ]/.test(await lab.summary()), 'no summary');
@@ -82,18 +114,28 @@ test('a screen reader is told what goes on; elements lie where their controls ar
     await lab.until(async () => (await aloud.textContent()) === (await lab.summary()), 'what happens is not read out');
     // Outside of the canvas, and not hidden from a screen reader.
     const tree = await lab.page.locator('body').ariaSnapshot();
-    assert.match(tree, /region "What the mechanism is doing"/);
+    for (const part of ['What the mechanism is doing', 'Scene and files', 'Transport', 'The machine']) {
+        assert.ok(tree.includes(`region "${part}"`), `${part} is not in ${tree}`);
+    }
     assert.match(tree, /Paused at/);
 
     // As a script of the page would be kept out by its policy.
     await lab.page.evaluate(`(() => { ${axe} })()`);
+    const clean = async (state) => {
+        await lab.frame(2);
+        await lab.page.evaluate(() => globalThis.jointplay.mirror.follow());
+        const dumb = await lab.page.locator('#mirror [type=range]:not([aria-valuetext])').evaluateAll((all) => all.map(({ outerHTML }) => outerHTML));
+        assert.deepEqual(dumb, [], `no words for a value ${state}`);
+        const { violations } = await lab.page.evaluate(() => globalThis.axe.run());
+        assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`), [], state);
+    };
     for (const size of [phone, wide]) {
         await lab.page.setViewportSize(size);
         await lab.frame(3);
         // The elements follow the controls a moment later.
         let misplaced;
         await lab.until(async () => {
-            const places = await lab.page.evaluate(() => Array.from(document.querySelectorAll('#mirror > [data-id]'), (element) => {
+            const places = await lab.page.evaluate(() => Array.from(document.querySelectorAll('#mirror [data-id]:not(section)'), (element) => {
                 const { left, top, right, bottom } = element.getBoundingClientRect();
                 return [element.dataset.id, element.getAttribute('aria-label'), [left, top, right, bottom]];
             }));
@@ -103,9 +145,22 @@ test('a screen reader is told what goes on; elements lie where their controls ar
         }, () => `elements lie elsewhere than their controls: ${JSON.stringify(misplaced)}`);
         const nameless = (await lab.widgets()).filter(({ label }) => !label.trim());
         assert.deepEqual(nameless.map(({ role, rect }) => `${role} at ${rect}`), []);
-        const found = await lab.page.evaluate(() => globalThis.axe.run());
-        const serious = found.violations.filter(({ impact }) => ['serious', 'critical'].includes(impact));
-        assert.deepEqual(serious.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`), []);
+        await clean(`as opened, ${size.width} pixels wide`);
     }
+    await lab.key('KeyB');
+    await lab.element('heading', 'Chaos bench');
+    await clean('with the bench');
+    await lab.key('F1');
+    await lab.element('dialog', 'Keys');
+    await clean('with a dialog');
+    await lab.key('Escape');
+    await lab.key('F5');
+    await lab.element('button', 'Leave');
+    await clean('as a presentation');
+    await lab.key('F5');
+    await lab.activate('button', 'Lessons');
+    await lab.activate('button', 'Why the first impact comes when it does');
+    await lab.element('region', 'Lesson');
+    await clean('with a lesson');
     await lab.close();
 });
