@@ -79,7 +79,13 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     let page = page.replace("{{build}}", &build).replace("{{wasm_bytes}}", &code.len().to_string());
     let to = scratch.join(PAGE);
     fs::write(&to, page).map_err(|e| failed(&to, &e))?;
-    let keeper = keeper.replace("{{build}}", &build).replace("{{files}}", &integrity(&scratch)?);
+    for file in files(&scratch)? {
+        if file.extension().is_some_and(|ending| ending == "js" || ending == "css") {
+            let text = fs::read_to_string(&file).map_err(|e| failed(&file, &e))?;
+            fs::write(&file, without_comments(&text)).map_err(|e| failed(&file, &e))?;
+        }
+    }
+    let keeper = without_comments(&keeper).replace("{{build}}", &build).replace("{{files}}", &integrity(&scratch)?);
     let to = scratch.join(from.file_name().expect("a file"));
     fs::write(&to, keeper).map_err(|e| failed(&to, &e))?;
     compress_all(&scratch, compress)?;
@@ -87,6 +93,18 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     fs::copy(&from, scratch.join(from.file_name().expect("a file"))).map_err(|e| failed(&from, &e))?;
     remove(folder)?;
     fs::rename(&scratch, folder).map_err(|e| failed(folder, &e))
+}
+
+/// A script or a style sheet without lines that are blank or comments alone: they are for who reads the sources, and weigh 6 kB.
+fn without_comments(text: &str) -> String {
+    let mut inside = false;
+    let code = text.lines().filter(|line| {
+        let line = line.trim();
+        let block = inside || line.starts_with("/*");
+        inside = block && !line.ends_with("*/");
+        !block && !line.is_empty() && !line.starts_with("//")
+    });
+    code.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// A folder that nobody has, on the same disk.
