@@ -3,7 +3,7 @@
 use eframe::egui::{Checkbox, Ui};
 use egui_plot::{GridMark, PlotPoint};
 
-use super::plane::{AxisLabel, plane};
+use super::plane::{AxisLabel, named, plane};
 use super::portrait::title;
 use crate::app::curve::Path;
 use crate::app::layout::reserved;
@@ -83,7 +83,7 @@ pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
     let points: Vec<PlotPoint> =
         distances.iter().map(|[time, distance]| PlotPoint::new(time / size, distance.log10())).collect();
     let ink = ui.visuals().weak_text_color();
-    plane(ui, "divergence", &across, &up, height)
+    let shown = plane(ui, "divergence", &across, &up, height)
         .y_grid_spacer(|input| decades(input.bounds))
         .custom_y_axes(vec![
             egui_plot::AxisHints::new_y()
@@ -95,6 +95,7 @@ pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
         .show(ui, |plot| {
             plot.add(Path::line("Distance", &points, theme::series(5, dark), 1.4));
         });
+    named(&shown, "the distance to the twin", &across, &up);
 }
 
 /// Marks at whole powers of ten, spaced so that there are few.

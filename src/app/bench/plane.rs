@@ -1,10 +1,10 @@
 //! A plot of one quantity over another in the bench: no legend, no dragging, units on the axes.
 
-use eframe::egui::{self, Rangef, Sense, Ui, Vec2b};
-use egui_plot::{AxisHints, GridMark, HoverPosition, Plot};
+use eframe::egui::{self, Rangef, Role, Sense, Ui, Vec2b, WidgetInfo};
+use egui_plot::{AxisHints, GridMark, HoverPosition, Plot, PlotResponse};
 
 use crate::app::plots::{marks, tick};
-use crate::app::value;
+use crate::app::{spoken, value};
 
 /// Name and unit of an axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +36,18 @@ fn with_unit(text: &str, unit: &str, between: &str) -> String {
 fn word(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
     let most = range.start().abs().max(range.end().abs());
     tick(mark.value, mark.step_size, most)
+}
+
+/// Calls `shown`, a plot of `up` over `across`, a plot of `what` for screen readers, and says which ranges are in sight.
+pub fn named<R>(shown: &PlotResponse<R>, what: &str, across: &AxisLabel, up: &AxisLabel) {
+    let bounds = shown.transform.bounds();
+    let range = |axis: &AxisLabel, d: usize| {
+        let [least, most] = [bounds.min()[d], bounds.max()[d]].map(|end| value::number(end, 3));
+        format!("{} from {least} to {}", axis.name, with_unit(&most, &axis.unit, " "))
+    };
+    let name = format!("Plot of {what}");
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
+    spoken::value(&shown.response, &format!("{} over {}", range(up, 1), range(across, 0)));
 }
 
 /// A plot of `up` over `across`, `height` points high and as wide as there is room.

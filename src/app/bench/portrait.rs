@@ -4,7 +4,7 @@ use eframe::egui::{RichText, Slider, SliderClamping, Ui};
 use egui_plot::{PlotPoint, PlotPoints, Points};
 
 use super::coordinate::Coordinate;
-use super::plane::{AxisLabel, plane};
+use super::plane::{AxisLabel, named, plane};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
 use crate::app::layout::reserved;
@@ -44,7 +44,7 @@ impl Portrait {
         );
         let (line, mark) = (theme::series(0, dark), theme::series(1, dark));
         let Self { orbit, sections } = self;
-        plane(ui, "portrait", &across, &up, HEIGHT).show(ui, |plot| {
+        let shown = plane(ui, "portrait", &across, &up, HEIGHT).show(ui, |plot| {
             plot.add(Path::line("Orbit", orbit, line, 1.2));
             let series = PlotPoints::Borrowed(sections);
             plot.points(Points::new("Section", series).color(mark).radius(2.5));
@@ -53,6 +53,7 @@ impl Portrait {
                 plot.points(Points::new("State on show", now).color(line).radius(4.0));
             }
         });
+        named(&shown, "the orbit", &across, &up);
         match player.watch().period().map_err(ToOwned::to_owned) {
             Err(why) => {
                 ui.label(RichText::new(format!("No Poincaré section: {why}")).weak());
@@ -69,10 +70,11 @@ impl Portrait {
             "The state once in each period of the drive, at its phase; a periodic motion is a few points, chaos a cloud. \
              Cleared by a reset and by a changed parameter.",
         );
-        plane(ui, "section", across, up, HEIGHT).show(ui, |plot| {
+        let shown = plane(ui, "section", across, up, HEIGHT).show(ui, |plot| {
             let series = PlotPoints::Borrowed(&self.sections);
             plot.points(Points::new("Section", series).color(mark).radius(2.5));
         });
+        named(&shown, "the sections", across, up);
         ui.horizontal_wrapped(|ui| {
             ui.label("Drive phase");
             let mut degrees = 360.0 * player.watch().phase();
