@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2, pos2, vec2};
 
-use crate::view::{Colour, Cover, DrawList, LEAST_ROOM, Label, LabelKind};
+use crate::view::{Colour, Cover, DrawList, Label, LabelKind};
 
 /// Plates in a picture beyond which further ones are left out, and names without room after which no more are tried.
 pub(super) const MOST_PLATES: usize = 256;
@@ -58,9 +58,12 @@ pub(super) fn text(
     painter.text(at, anchor, text, font, ink)
 }
 
+/// Least edge of a picture that has room for more than the time, points.
+pub(super) const SMALL: f32 = 200.0;
+
 /// Whether a picture is large enough for a legend, names and forces.
 pub fn has_room(rect: Rect) -> bool {
-    rect.width() >= LEAST_ROOM[0] && rect.height() >= LEAST_ROOM[1]
+    rect.size().min_elem() >= SMALL
 }
 
 /// Distance and direction by index.

@@ -13,6 +13,8 @@ const NARROW: f32 = 760.0;
 const SHORT: f32 = 480.0;
 /// Below this width a picture has no room for time and buttons side by side, points.
 const SLIM: f32 = 250.0;
+/// Below this width the picture of a frame in another page shows machine and time alone, points.
+const BARE: f32 = 280.0;
 /// Width of the panel of a lesson beside the picture, points.
 const LESSON: f32 = 340.0;
 
@@ -495,7 +497,8 @@ impl App {
         let options = width("View options");
         let cameras: f32 = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).map(width).sum();
         // The time stands to the left of them.
-        let narrow = area.width() < overlay::plate(0)[0] + cameras + options + 10.0;
+        let gap = ui.spacing().item_spacing.x;
+        let narrow = area.width() < overlay::plate(0)[0] + cameras + options - gap + 10.0;
         // Beside the microscope of a phone the time needs all of the upper edge.
         let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {
@@ -506,6 +509,7 @@ impl App {
             above.push(self.messages_place(ui, inner));
         }
         let mut place = ui.new_child(egui::UiBuilder::new().max_rect(area));
+        self.viewport.bare = self.embedded().is_some() && area.width() < BARE;
         self.viewport.ui(&mut place, &self.player, plain, &above);
         ui.advance_cursor_after_rect(whole);
         if let Some(joint) = self.viewport.take_clicked() {

@@ -5,7 +5,7 @@ use eframe::egui::epaint::RectShape;
 use eframe::egui::{Align2, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
 use super::labels::{self, Places};
-pub(super) use super::labels::{colour, has_room, text};
+pub(super) use super::labels::{SMALL, colour, has_room, text};
 use super::value;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};

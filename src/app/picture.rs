@@ -8,14 +8,15 @@ use super::App;
 use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::layout;
+use super::overlay::SMALL;
 use super::theme;
 use crate::render::RenderError;
-use crate::view::LEAST_ROOM;
 
 /// Height of the plots below the view, points.
 const PLOTS: f32 = 230.0;
-/// A picture of a small view has at least this much more than names and legend need, where its pixels allow it.
-const MORE_ROOM: f32 = 1.1;
+/// Least edge of a picture of the view, points, where its pixels allow it: a small view is drawn with room for its names and
+/// legend.
+const LEAST_EDGE: f32 = 1.1 * SMALL;
 /// Sizes to choose from, as multiples of the size on the screen.
 const TIMES: [u32; 3] = [1, 2, 4];
 /// Range of a typed edge, pixels. The adapter's own limit is reported when it is exceeded.
@@ -104,10 +105,7 @@ impl Picture {
         let readable = screen.min(1.0);
         let room = match self.contents {
             Contents::Window => f32::INFINITY,
-            Contents::View | Contents::Plots => {
-                let room = |edge: usize| pixels[edge] as f32 / (MORE_ROOM * LEAST_ROOM[edge]);
-                room(0).min(room(1))
-            }
+            Contents::View | Contents::Plots => pixels[0].min(pixels[1]) as f32 / LEAST_EDGE,
         };
         (pixels, scale.min(room).max(readable))
     }
@@ -308,6 +306,6 @@ mod tests {
         assert_eq!(of(Some(1), [0, 0], small, 1.0), ([390, 150], 1.0));
         let (pixels, scale) = of(Some(4), [0, 0], small, 1.0);
         assert_eq!(pixels, [1560, 600]);
-        assert!((pixels[1] as f32 / scale - MORE_ROOM * LEAST_ROOM[1]).abs() < 0.1, "{scale}");
+        assert!((pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1, "{scale}");
     }
 }

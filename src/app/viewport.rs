@@ -97,6 +97,8 @@ pub struct Viewport {
     /// What it shows, where another picture is beside it, and the force of the longest arrow in both, N.
     pub title: Option<String>,
     pub(super) common: Option<f32>,
+    /// Machine and time alone: there is no room for more.
+    pub(super) bare: bool,
     /// Where it is shown.
     place: render::Place,
 }
@@ -135,6 +137,7 @@ impl Viewport {
             pace: None,
             title: None,
             common: None,
+            bare: false,
             place: render::Place::Window,
         }
     }
@@ -431,6 +434,8 @@ impl Viewport {
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
         let size = screen.size;
         self.options.theme = if ui.visuals().dark_mode { Theme::Dark } else { Theme::Light };
+        let triad = self.options.triad;
+        self.options.triad &= !self.bare;
 
         let aspect = screen.aspect();
         // Folding the sheet or turning a phone would leave half of the mechanism outside.
@@ -442,7 +447,8 @@ impl Viewport {
             // The first picture of a scene does not move into place.
             let first = self.list.size == [0, 0];
             let mut goal = self.goal.unwrap_or(self.camera);
-            let plates = overlay::plates(rect, 0, &self.options).into_iter().chain(above.iter().copied());
+            let plates = overlay::plates(rect, 0, &self.options).into_iter();
+            let plates = plates.take(if self.bare { 1 } else { usize::MAX }).chain(above.iter().copied());
             let corners = |plate: Rect| [plate.min, plate.max].map(|corner| screen.pixel(corner));
             let plates: Vec<_> = plates.map(corners).collect();
             self.view.fit_around(&mut goal, player.scene(), player.frame(), &self.options, size, &plates);
@@ -489,6 +495,7 @@ impl Viewport {
             card.popup = card.popup.align(align);
             card.show(|ui| describe(ui, player, hit.what));
         }
+        self.options.triad = triad;
     }
 
     /// What is written over the picture; `said`: about ghosts.
@@ -498,8 +505,8 @@ impl Viewport {
         Overlay {
             time: Some(player.pacer.shown()),
             notes: self.title.clone().into_iter().chain(following).chain(said).collect(),
-            legend: true,
-            labels: true,
+            legend: !self.bare,
+            labels: !self.bare,
         }
     }
 

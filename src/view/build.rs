@@ -44,8 +44,8 @@ pub struct SceneView {
     at_start: Vec<DrawnJoint>,
 }
 
-/// Smallest picture with room for more than machine and time, points.
-pub const LEAST_ROOM: [f32; 2] = [280.0, 200.0];
+/// Smallest picture edge that leaves room for the triad, points.
+const SMALLEST_WITH_TRIAD: f32 = 200.0;
 /// Smallest width that leaves room for gravity between axes and legend, points.
 const SMALLEST_WITH_GRAVITY: f32 = 300.0;
 /// Radius of the halo of a joint that was hit, in radii of its socket; and most points that it is wider than that.
@@ -431,7 +431,7 @@ impl SceneView {
         let camera = shot.camera;
         let points = shot.size.map(|n| n as f32 / shot.pixels_per_point);
         // In a small picture it would cover the machine.
-        if points[0] < LEAST_ROOM[0] || points[1] < LEAST_ROOM[1] {
+        if points[0].min(points[1]) < SMALLEST_WITH_TRIAD {
             return;
         }
         let scale = shot.pixels_per_point * camera.metres_per_pixel(shot.size);

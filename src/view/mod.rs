@@ -39,7 +39,7 @@ mod wear;
 mod zones;
 
 pub use arrows::ARROW_LENGTH;
-pub use build::{LEAST_ROOM, SceneView};
+pub use build::SceneView;
 pub use camera::{Camera, Preset};
 pub use cover::Cover;
 pub use draw_list::{
