@@ -498,7 +498,7 @@ impl App {
         let cameras: f32 = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).map(width).sum();
         // The time stands to the left of them.
         let gap = ui.spacing().item_spacing.x;
-        let narrow = area.width() < overlay::plate(0)[0] + cameras + options - gap + 10.0;
+        let narrow = area.width() < overlay::reach(ui.painter()) + cameras + options - gap + 10.0;
         // Beside the microscope of a phone the time needs all of the upper edge.
         let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {

@@ -14,6 +14,9 @@ use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewO
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
 
+/// Size of the time in a picture that has room for it, points.
+const TIME: f32 = 18.0;
+
 /// Longest axis of the legend, as a share of the picture's width.
 const LONGEST_AXIS: f32 = 0.4;
 
@@ -69,7 +72,7 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
     let ink = colour(palette.text);
     let line = |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
     let large = has_room(rect);
-    let (size, small_size, margin) = if large { (18.0, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
+    let (size, small_size, margin) = if large { (TIME, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
     let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
     // The first note says how much the play is magnified: never left out for want of room alone.
     let notes = notes.filter(|note| !note.is_empty());
@@ -88,6 +91,13 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
         at.y += step;
     }
     plate
+}
+
+/// How far from the left edge of a picture any time reaches, points.
+pub fn reach(painter: &Painter) -> f32 {
+    let longest = format!("t = {} ms", "0".repeat(value::LONGEST_TIME - 3));
+    let words = painter.layout_no_wrap(longest, FontId::proportional(TIME), colour(Palette::of(Theme::Light).text));
+    MARGIN + words.size().x + 8.0
 }
 
 /// Approximate width and height of the time with one note per joint, whatever the notes say; points.
