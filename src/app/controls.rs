@@ -70,7 +70,7 @@ impl Controls {
     }
 
     /// What the scene is called.
-    pub fn title(ui: &mut Ui, player: &Player) {
+    pub fn title(&self, ui: &mut Ui, player: &Player) {
         let title = &player.scene().title;
         let label = ui.label(RichText::new(title).small().weak());
         spoken::heading(&label, title);

@@ -4,7 +4,6 @@ use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollAr
 
 #[cfg(not(target_arch = "wasm32"))]
 use super::audience;
-use super::controls::Controls;
 use super::{App, overlay, present, spoken, theme, transport};
 use crate::view::Preset;
 
@@ -253,7 +252,7 @@ impl App {
                     // Room for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
-                    Controls::title(ui, player);
+                    controls.title(ui, player);
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 });
             },

@@ -94,6 +94,56 @@ fn nothing_tells_of_what_is_still_to_come() {
     assert_eq!(player.history().rows(9).len(), 1);
 }
 
+thread_local! {
+    static LOOKS: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };
+}
+
+#[test]
+fn what_is_stepped_between_frames_is_shown_as_it_comes_and_changes_no_bit() {
+    let mut player = player("spcmm");
+    // Each look takes half a millisecond, so that a spell is of some steps.
+    player.clock = || LOOKS.replace(LOOKS.get() + 5e-4);
+    player.pacer.set_scale(0.02);
+    player.set_playing(true);
+    let (mut impacts, mut between, mut longest) = (0, 0, 0);
+    for frame in 0..40 {
+        player.advance(0.06);
+        one_clock(&player);
+        impacts += player.peaks().iter().map(|peak| peak.impacts).sum::<u32>();
+        for spell in 1..=5 {
+            let (steps, shown) = (player.steps(), player.pacer.shown());
+            player.step_between(0.01 * f64::from(spell));
+            assert!(player.pacer.shown() >= shown);
+            one_clock(&player);
+            between += player.steps() - steps;
+            longest = longest.max(player.steps() - steps);
+        }
+        if frame == 20 {
+            // What a script of the page does in the midst of it.
+            player.set_playing(false);
+            let (hash, shown) = (player.simulation().state_hash(), player.pacer.shown());
+            assert_eq!(player.step_between(0.05), None);
+            player.advance(0.06);
+            one_clock(&player);
+            assert_eq!((hash, shown), (player.simulation().state_hash(), player.pacer.shown()));
+            player.set_playing(true);
+        }
+    }
+    player.advance(0.0);
+    impacts += player.peaks().iter().map(|peak| peak.impacts).sum::<u32>();
+    assert!(between > player.steps() / 2, "{between} of {}", player.steps());
+    assert!(longest <= 17, "a spell of 8 ms: {longest}");
+    let mut other = self::player("spcmm");
+    other.run_to(player.pacer.shown());
+    assert_eq!((other.steps(), other.simulation().state_hash()), (player.steps(), player.simulation().state_hash()));
+    let top =
+        |player: &Player| recorded(player, Quantity::NormalForce, 1.0).iter().map(|point| point[1]).fold(0.0, f64::max);
+    assert_eq!(top(&player), top(&other));
+    other.advance(0.0);
+    assert_eq!(impacts, other.peaks().iter().map(|peak| peak.impacts).sum::<u32>());
+    assert!(impacts > 3, "{impacts}");
+}
+
 #[test]
 fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
     let mut player = player("spcmm");
