@@ -445,7 +445,8 @@ impl App {
         let Self { player, controls, accuracy, plots, bench, sheet, viewport, .. } = self;
         let mut of_bench = None;
         ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
-            ui.set_max_width(ui.available_width() - 10.0);
+            // Room for the bar.
+            ui.set_max_width(ui.available_width() - 14.0);
             match sheet {
                 Some(Sheet::Controls) => {
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));

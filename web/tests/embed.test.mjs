@@ -111,7 +111,15 @@ test('the example of the documents works as it stands, keys of no use go to the 
     await lab.until(async () => (await labels()).some((label) => label.includes('did you mean `pendulum`')), 'it is not said');
     assert.ok((await labels()).includes('Clearance'), 'the panels of the link are not there');
     assert.match(bad.url(), /\?embed=controls&scene=pendulun&renderer=webgl$/);
-    await lab.close();
+
+    assert.deepEqual(lab.errors, []);
+    // To a frame without an origin a server that does not allow it gives no module.
+    await lab.page.route('**/main.js*', (route) => route.abort());
+    await course(lab, '<iframe sandbox="allow-scripts" src="{page}?embed" width="320" height="240"></iframe>');
+    const sealed = () => lab.page.frameLocator('iframe').locator('#sealed');
+    await lab.until(async () => (await sealed().count()) > 0 && (await sealed().isVisible()), 'it is not said why nothing shows');
+    assert.match(await sealed().textContent(), /allow-same-origin/);
+    await lab.close({ errors: true });
 });
 
 test('the page around opens, sets, plays and pauses by messages, and hears what happens', async () => {
