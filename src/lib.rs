@@ -7,9 +7,9 @@
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+pub use jointplay_analysis as analysis;
 pub use jointplay_physics::{contact, integrate, jet, mechanism, mesh, scene, simulate, words};
 
-pub mod analysis;
 #[cfg(feature = "gui")]
 pub mod app;
 // The page draws its plots itself, and downloads nothing that it does not use.

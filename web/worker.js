@@ -34,7 +34,7 @@ async function perform({ code, job }) {
     await bindings.perform(job);
 }
 
-/** `code`: the compiled module, which the page has already; `job`: JSON, src/analysis/task.rs. Later on `rest`. */
+/** `code`: the compiled module, which the page has already; `job`: JSON, crates/analysis/src/task.rs. Later on `rest`. */
 addEventListener('message', ({ data }) => {
     if (data.job) return perform(data);
     rest = data.rest;

@@ -3,6 +3,7 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::analysis::grid::Start;
@@ -187,7 +188,7 @@ pub struct SweepArguments {
     #[arg(long, value_name = "PHASE", default_value = "0", allow_hyphen_values = true)]
     pub phase: String,
     /// Where each point starts from.
-    #[arg(long, value_enum, value_name = "START", default_value = "cold")]
+    #[arg(long, value_parser = starts(), value_name = "START", default_value = "cold")]
     pub start: Start,
     /// Leave out the twin runs that measure the largest Lyapunov exponent.
     #[arg(long)]
@@ -478,6 +479,13 @@ fn change(text: &str) -> Result<(String, String), String> {
         }
         _ => Err("expected KEY=VALUE, e.g. contact.clearance=0.5mm".to_owned()),
     }
+}
+
+/// Where a point starts from, by its word.
+fn starts() -> impl TypedValueParser<Value = Start> {
+    let words = Start::ALL.map(|start| PossibleValue::new(start.word()).help(start.meaning()));
+    let of_word = |word: String| Start::ALL.into_iter().find(|start| start.word() == word);
+    PossibleValuesParser::new(words).map(move |word| of_word(word).expect("one of these"))
 }
 
 /// A whole number, also one like `1e3`; too large a number is reported where the period is known.

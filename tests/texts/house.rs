@@ -36,7 +36,7 @@ fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// (module, file name for messages, code without comments and texts) of every file but `lib.rs`.
+/// (module, file name for messages, code without comments and texts) of every file but the `lib.rs` of crates of several floors.
 fn files() -> Vec<(String, String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
@@ -45,6 +45,15 @@ fn files() -> Vec<(String, String, String)> {
         sources(&crate_root, &mut own);
         paths.extend(own.into_iter().map(|path| (path.strip_prefix(&crate_root).unwrap().to_owned(), path)));
     }
+    // A crate of one floor: its root is the module.
+    let analysis = root.join("crates/analysis/src");
+    let mut own = Vec::new();
+    sources(&analysis, &mut own);
+    paths.extend(own.into_iter().map(|path| {
+        let local = path.strip_prefix(&analysis).unwrap();
+        let local = if local == Path::new("lib.rs") { Path::new("mod.rs") } else { local };
+        (Path::new("analysis").join(local), path)
+    }));
     let mut files = Vec::new();
     for (local, path) in paths {
         let first = local.components().next().unwrap().as_os_str();
@@ -53,7 +62,11 @@ fn files() -> Vec<(String, String, String)> {
             continue;
         }
         let text = std::fs::read_to_string(&path).unwrap();
-        files.push((module.to_owned(), local.display().to_string(), code(&text)));
+        let mut code = code(&text);
+        if module == "analysis" {
+            code = code.replace("crate::", "crate::analysis::");
+        }
+        files.push((module.to_owned(), local.display().to_string(), code));
     }
     files
 }

@@ -1,0 +1,127 @@
+//! What each part of the model costs: the same scene with more and less of it.
+
+use super::stretch::time_to;
+use super::{AnalysisError, RunContext, Setting, WorkBudget};
+use jointplay_physics::integrate::System as _;
+use jointplay_physics::mechanism::{Mechanism, Touching};
+use jointplay_physics::scene::{Preset, Scene};
+
+/// Preset used for the runs.
+const PRESET: Preset = Preset::Accurate;
+/// Evaluations per timed batch.
+const BATCH: u32 = 200;
+const BATCHES: u32 = 40;
+
+/// A variation of a built-in scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CostCase {
+    /// Built-in scene.
+    pub scene: &'static str,
+    /// What differs from the unchanged scene.
+    pub label: &'static str,
+    /// The parameter changes.
+    pub changes: &'static [(&'static str, &'static str)],
+    /// Instant at which an evaluation is timed, s: the contacts carry load by then.
+    loaded: f64,
+    /// Simulated time of the run, s.
+    pub span: f64,
+}
+
+const fn spcmm(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> CostCase {
+    CostCase { scene: "spcmm", label, changes, loaded: 0.4, span: 0.4 }
+}
+
+const fn chain(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> CostCase {
+    CostCase { scene: "chain", label, changes, loaded: 2e-3, span: 10e-3 }
+}
+
+/// The variations; the others are compared with the first.
+const PARTS: [CostCase; 11] = [
+    spcmm("3 joints with clearance, with friction, tree", &[]),
+    spcmm("the same without the energy ledger", &[("solver.energy_ledger", "off")]),
+    spcmm("2 joints with clearance", &[("joint.S3.clearance", "0")]),
+    spcmm("1 joint with clearance", &[("joint.S2.clearance", "0"), ("joint.S3.clearance", "0")]),
+    spcmm("all joints ideal", &[("contact.clearance", "0")]),
+    spcmm("3 joints with clearance, without friction", &[("contact.friction", "0")]),
+    spcmm("3 joints with clearance, lagrange", &[("formulation", "lagrange")]),
+    chain("4 links", &[("chain.links", "4")]),
+    chain("16 links", &[("chain.links", "16")]),
+    chain("64 links", &[("chain.links", "64")]),
+    chain("256 links", &[("chain.links", "256")]),
+];
+
+/// Measured cost of a variation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CaseCost {
+    /// The variation.
+    pub part: CostCase,
+    /// Clock seconds per evaluation of its equations.
+    pub evaluation_s: f64,
+    /// Clock seconds per simulated second over `part.span`.
+    pub cost: f64,
+    /// Evaluations in that span.
+    pub evaluations: u64,
+}
+
+/// Measures all variations, with the preset `accurate`.
+///
+/// # Errors
+/// As [`super::work_precision`].
+pub fn model_costs(budget: &WorkBudget, context: &mut RunContext) -> Result<Vec<CaseCost>, AnalysisError> {
+    let parts = PARTS.iter().enumerate();
+    parts.map(|(n, part)| one(part, budget, &mut context.part(n, PARTS.len()))).collect()
+}
+
+fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result<CaseCost, AnalysisError> {
+    let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+    let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
+    let scene = Scene::load(part.scene, &changes)?;
+    let setting = Setting::of_preset(PRESET);
+    let mut simulation = setting.start(&scene)?;
+    // Counts the evaluations up to the end of the span, without a cap; the timed runs below cover the same span.
+    while simulation.time() < part.span {
+        simulation.step_until(part.span)?;
+        context.go_on(0.0)?;
+    }
+    let evaluations = simulation.statistics().evaluations;
+    let seconds = time_to(
+        part.span,
+        &WorkBudget { evaluations: u64::MAX / 2, seconds: f64::INFINITY, ..*budget },
+        context,
+        |_| setting.start(&scene),
+    )?;
+    Ok(CaseCost {
+        part: *part,
+        evaluation_s: evaluation(&setting, &scene, part.loaded, context)?,
+        cost: seconds / part.span,
+        evaluations,
+    })
+}
+
+/// Seconds per evaluation at a new instant: the shortest average over several batches.
+fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunContext) -> Result<f64, AnalysisError> {
+    let mut simulation = setting.start(scene)?;
+    simulation.advance_to(loaded)?;
+    let (t, y) = (simulation.time(), simulation.state());
+    let mut mechanism = Mechanism::new(simulation.running_scene()).map_err(jointplay_physics::simulate::StartError)?;
+    // Starting it determines its rank.
+    mechanism.start().map_err(jointplay_physics::simulate::StartError)?;
+    let joints = 0..mechanism.contacts.len();
+    let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
+    let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
+    let mut dy = vec![0.0; y.len()];
+    let mut shortest = f64::INFINITY;
+    let mut instant = 0.0;
+    for _ in 0..BATCHES {
+        let before = context.now();
+        for _ in 0..BATCH {
+            // Drives are re-evaluated only at a new instant.
+            instant += 1e-15;
+            mechanism.derivative(t + instant, std::hint::black_box(y), &mut dy);
+            std::hint::black_box(&mut dy);
+        }
+        shortest = shortest.min(context.now() - before);
+        context.go_on(1.0)?;
+    }
+    Ok(shortest / f64::from(BATCH))
+}

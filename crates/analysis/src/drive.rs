@@ -1,0 +1,234 @@
+//! The period of a scene's drives, and a running scene as an [`Orbit`].
+
+use super::orbit::Orbit;
+use jointplay_physics::mechanism::periods_of;
+use jointplay_physics::scene::Scene;
+use jointplay_physics::simulate::{Frame, Pose, Simulation, StartError, Stopped};
+
+/// Why a scene has no sections at a fixed drive phase.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoPeriod {
+    /// Nothing that drives it repeats.
+    #[error(
+        "the scene `{scene}` has no drive that repeats, nor a tyre's ground, a motor's target or a load, so there is no phase to \
+         take sections at"
+    )]
+    None {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// Drives with different periods.
+    #[error(
+        "what drives the scene `{scene}` has different periods ({first} s and {second} s): there is no one phase to take \
+         sections at"
+    )]
+    Different {
+        /// Name of the scene.
+        scene: String,
+        /// Period of one drive, s.
+        first: f64,
+        /// Period of another, s.
+        second: f64,
+    },
+}
+
+/// Common period of all drives, of what force elements follow and of harmonic loads of `scene`, s. Drives at rest do not count.
+///
+/// # Errors
+/// A scene without a common period.
+pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
+    let mut period: Option<f64> = None;
+    for own in periods_of(scene) {
+        if !own.is_finite() {
+            continue;
+        }
+        match period {
+            Some(first) if (first / own - 1.0).abs() > 1e-12 => {
+                return Err(NoPeriod::Different { scene: scene.name.clone(), first, second: own });
+            }
+            _ => period = Some(own),
+        }
+    }
+    period.ok_or_else(|| NoPeriod::None { scene: scene.name.clone() })
+}
+
+/// What a section of a scene records: pose and rates of the output body, named as in the rows of a run.
+pub const OBSERVABLES: [&str; 12] = [
+    "x_m",
+    "y_m",
+    "z_m",
+    "alpha_rad",
+    "beta_rad",
+    "gamma_rad",
+    "vx_m_s",
+    "vy_m_s",
+    "vz_m_s",
+    "alpha_rate_rad_s",
+    "beta_rate_rad_s",
+    "gamma_rate_rad_s",
+];
+
+/// Values of a section in the order of [`OBSERVABLES`].
+pub fn observed(pose: &Pose) -> [f64; 12] {
+    let parts = [pose.position, pose.angles, pose.velocity, pose.angle_rates];
+    std::array::from_fn(|i| parts[i / 3][i % 3])
+}
+
+/// A running scene whose sections are the pose of its output body.
+pub struct Machine {
+    simulation: Simulation,
+    frame: Frame,
+}
+
+impl Machine {
+    /// Starts `scene` at t = 0.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn new(scene: &Scene) -> Result<Self, StartError> {
+        Ok(Self::resume(Simulation::new(scene)?))
+    }
+
+    /// Continues a running simulation.
+    pub fn resume(simulation: Simulation) -> Self {
+        Self { simulation, frame: Frame::default() }
+    }
+
+    /// The simulation.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// The simulation, to change a parameter between two sections or read its peaks.
+    pub fn simulation_mut(&mut self) -> &mut Simulation {
+        &mut self.simulation
+    }
+
+    /// All quantities at the latest state.
+    pub fn frame(&mut self) -> &Frame {
+        let now = self.simulation.time();
+        self.simulation.sample(now, &mut self.frame);
+        &self.frame
+    }
+}
+
+/// Why a machine cannot continue.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineError {
+    /// The scene does not start.
+    #[error(transparent)]
+    Start(#[from] StartError),
+    /// The divergence guard stopped it.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+impl Orbit for Simulation {
+    type Stop = Stopped;
+
+    fn time(&self) -> f64 {
+        self.time()
+    }
+
+    fn step_until(&mut self, end: f64) -> Result<(), Stopped> {
+        self.step_until(end)
+    }
+
+    fn step_beside(&mut self, other: &Self) -> Result<(), Stopped> {
+        self.step_beside(other)
+    }
+
+    fn state(&self) -> &[f64] {
+        self.state()
+    }
+
+    fn scales(&self) -> &[f64] {
+        self.scales()
+    }
+
+    fn twin(&self) -> Self {
+        Self::of(&self.snapshot())
+    }
+
+    fn displace(&mut self, offset: &[f64]) {
+        self.displace(offset);
+    }
+
+    fn remember_like(&mut self, other: &Self, part: f64) {
+        self.remember_like(other, part);
+    }
+
+    fn step_like(&mut self, other: &Self) {
+        self.step_like(other);
+    }
+
+    /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
+    fn comparable(&self, twin: &Self) -> bool {
+        (0..self.running_scene().ball_joints.len())
+            .all(|j| self.contact_memory(j).active == twin.contact_memory(j).active)
+    }
+
+    fn observables(&self) -> usize {
+        OBSERVABLES.len()
+    }
+
+    fn observe(&mut self, out: &mut [f64]) {
+        let mut frame = Frame::default();
+        self.sample(self.time(), &mut frame);
+        out.copy_from_slice(&observed(&frame.pose));
+    }
+}
+
+/// As its simulation, with room for what is observed.
+impl Orbit for Machine {
+    type Stop = MachineError;
+
+    fn time(&self) -> f64 {
+        self.simulation.time()
+    }
+
+    fn step_until(&mut self, end: f64) -> Result<(), MachineError> {
+        Ok(self.simulation.step_until(end)?)
+    }
+
+    fn step_beside(&mut self, other: &Self) -> Result<(), MachineError> {
+        Ok(self.simulation.step_beside(&other.simulation)?)
+    }
+
+    fn state(&self) -> &[f64] {
+        self.simulation.state()
+    }
+
+    fn scales(&self) -> &[f64] {
+        self.simulation.scales()
+    }
+
+    fn twin(&self) -> Self {
+        Self::resume(self.simulation.twin())
+    }
+
+    fn displace(&mut self, offset: &[f64]) {
+        self.simulation.displace(offset);
+    }
+
+    fn remember_like(&mut self, other: &Self, part: f64) {
+        self.simulation.remember_like(&other.simulation, part);
+    }
+
+    fn step_like(&mut self, other: &Self) {
+        self.simulation.step_like(&other.simulation);
+    }
+
+    fn comparable(&self, twin: &Self) -> bool {
+        self.simulation.comparable(&twin.simulation)
+    }
+
+    fn observables(&self) -> usize {
+        self.simulation.observables()
+    }
+
+    fn observe(&mut self, out: &mut [f64]) {
+        let values = observed(&self.frame().pose);
+        out.copy_from_slice(&values);
+    }
+}

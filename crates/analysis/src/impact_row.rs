@@ -1,0 +1,42 @@
+//! An impact as a row of a table: the columns of `run --impacts`, and of the file that the window saves.
+
+use jointplay_physics::simulate::Impact;
+
+/// Names of the columns.
+pub const COLUMNS: [&str; 14] = [
+    "joint",
+    "start_s",
+    "end_s",
+    "approach_m_s",
+    "separation_m_s",
+    "restitution_asked",
+    "restitution_law",
+    "restitution_given",
+    "floored",
+    "disturbed",
+    "steps",
+    "deepest_m",
+    "peak_N",
+    "damping_over_elastic",
+];
+
+/// Values of `impact` in the order of [`COLUMNS`], SI units; the joint by its index, from 0.
+pub fn row(impact: &Impact) -> [f64; COLUMNS.len()] {
+    let flag = |is: bool| f64::from(u8::from(is));
+    [
+        impact.joint as f64,
+        impact.start,
+        impact.end,
+        impact.approach_speed,
+        impact.separation_speed,
+        impact.asked,
+        impact.law,
+        impact.achieved(),
+        flag(impact.floored),
+        flag(impact.disturbed),
+        impact.steps as f64,
+        impact.deepest,
+        impact.peak,
+        impact.damping,
+    ]
+}

@@ -1,0 +1,175 @@
+//! The columns of a sweep's result and the order of its values: one fixed-length record per point.
+
+use super::drive::OBSERVABLES;
+use super::exponent::Exponent;
+use super::point::{JointResult, Plan, PointResult};
+use jointplay_physics::scene::Scene;
+
+/// How a point ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// All periods were run.
+    Done,
+    /// The divergence guard stopped it.
+    Diverged,
+    /// The scene did not start.
+    NoStart,
+}
+
+impl Status {
+    /// The number in files.
+    pub fn code(self) -> i64 {
+        match self {
+            Self::Done => 0,
+            Self::Diverged => 1,
+            Self::NoStart => 2,
+        }
+    }
+}
+
+/// One array of the result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Name, with the unit.
+    pub name: String,
+    /// Whether its values are whole numbers.
+    pub whole: bool,
+    /// Whether a point has one value for each kept section instead of one.
+    pub per_section: bool,
+}
+
+/// All arrays of a sweep's result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    columns: Vec<Column>,
+    joints: usize,
+    probe: bool,
+    kept: usize,
+}
+
+/// An array with one value per point: its name, whether it is an integer, and how to read it from a result.
+type OfPoint = (&'static str, bool, fn(&PointResult, Status) -> f64);
+
+const POINT: [OfPoint; 12] = [
+    ("status", true, |_, status| status.code() as f64),
+    ("stopped_at_s", false, |r, _| r.stopped.unwrap_or(f64::NAN)),
+    // A point that did not reach its end has no regime: code -1.
+    ("regime", true, |r, status| match status {
+        Status::Done => r.regime.code() as f64,
+        Status::Diverged | Status::NoStart => -1.0,
+    }),
+    ("period", true, |r, _| r.regime.period() as f64),
+    ("return_distance", false, |r, status| known(status, r.evidence.return_distance)),
+    ("distinct_sections", true, |r, _| r.evidence.distinct as f64),
+    ("zero_one", false, |r, _| r.evidence.zero_one),
+    ("exponent_per_s", false, |r, _| exponent(r, |e| e.value)),
+    ("exponent_standard_error_per_s", false, |r, _| exponent(r, |e| e.standard_error)),
+    ("exponent_bound_per_s", false, |r, status| known(status, r.evidence.exponent_bound)),
+    ("doubts", true, |r, _| f64::from(r.doubts)),
+    ("energy_residual", false, |r, _| r.residual),
+];
+
+/// The same per ball joint, prefixed with the joint's name.
+type OfJoint = (&'static str, bool, fn(&JointResult) -> f64);
+
+const JOINT: [OfJoint; 6] = [
+    ("peak_N", false, |joint| joint.peak),
+    ("peak_kept_N", false, |joint| joint.peak_kept),
+    ("mean_N", false, |joint| joint.mean),
+    ("impacts", true, |joint| joint.impacts as f64),
+    ("impacts_kept", true, |joint| joint.impacts_kept as f64),
+    ("last_separation_s", false, |joint| joint.last_separation.unwrap_or(f64::NAN)),
+];
+
+/// A value that only a point that reached its end has.
+fn known(status: Status, value: f64) -> f64 {
+    if status == Status::Done { value } else { f64::NAN }
+}
+
+fn exponent(result: &PointResult, of: fn(&Exponent) -> f64) -> f64 {
+    result.evidence.exponent.as_ref().map_or(f64::NAN, of)
+}
+
+impl Layout {
+    /// The arrays of a sweep of `scene`.
+    pub fn new(scene: &Scene, plan: &Plan) -> Self {
+        let mut columns = Vec::new();
+        let mut add = |name: &str, whole: bool, per_section: bool| {
+            columns.push(Column { name: name.to_owned(), whole, per_section });
+        };
+        for (name, whole, _) in POINT {
+            add(name, whole, false);
+        }
+        for joint in &scene.ball_joints {
+            for (quantity, whole, _) in JOINT {
+                add(&format!("{}_{quantity}", joint.name), whole, false);
+            }
+        }
+        let probe = scene.output.probe.is_some();
+        if probe {
+            add("probe_error_max_um", false, false);
+            add("probe_error_rms_um", false, false);
+        }
+        add("exponent_running_per_s", false, true);
+        for observable in OBSERVABLES {
+            add(&format!("section_{observable}"), false, true);
+        }
+        Self { columns, joints: scene.ball_joints.len(), probe, kept: plan.periods - plan.discard }
+    }
+
+    /// Arrays in order.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Kept sections per point.
+    pub fn kept(&self) -> usize {
+        self.kept
+    }
+
+    /// Number of values per point in `column`.
+    pub fn values_in(&self, column: &Column) -> usize {
+        if column.per_section { self.kept } else { 1 }
+    }
+
+    /// Number of values in a record.
+    pub fn record_length(&self) -> usize {
+        self.columns.iter().map(|c| self.values_in(c)).sum()
+    }
+
+    /// Offset of array `column` in a record.
+    pub fn offset(&self, column: usize) -> usize {
+        self.columns[..column].iter().map(|c| self.values_in(c)).sum()
+    }
+
+    /// Appends the record of a point; `None` is a point that could not start.
+    pub fn append(&self, result: Option<&PointResult>, record: &mut Vec<f64>) {
+        let unknown;
+        let (status, result) = match result {
+            Some(result) if result.stopped.is_some() => (Status::Diverged, result),
+            Some(result) => (Status::Done, result),
+            None => {
+                unknown = PointResult::empty(self.joints);
+                (Status::NoStart, &unknown)
+            }
+        };
+        let start = record.len();
+        record.extend(POINT.iter().map(|(.., of)| of(result, status)));
+        for joint in &result.joints {
+            record.extend(JOINT.iter().map(|(.., of)| of(joint)));
+        }
+        if self.probe {
+            let (largest, rms) = result.probe.unwrap_or((f64::NAN, f64::NAN));
+            record.extend([largest * 1e6, rms * 1e6]);
+        }
+        let exponent = result.evidence.exponent.as_ref();
+        let running = exponent.map_or(&[][..], |e| &e.running);
+        record.extend((0..self.kept).map(|k| running.get(k).copied().unwrap_or(f64::NAN)));
+        let width = OBSERVABLES.len();
+        for i in 0..width {
+            let value = |k: usize| result.sections.get(k * width + i).copied();
+            record.extend((0..self.kept).map(|k| value(k).unwrap_or(f64::NAN)));
+        }
+        debug_assert_eq!(record.len() - start, self.record_length());
+    }
+}

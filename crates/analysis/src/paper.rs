@@ -1,0 +1,430 @@
+//! What Sheng & Chen show, print and say in sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that
+//! it names. Nothing is tuned to match; the paper omits one dimension and contradicts itself in places.
+
+mod quantity;
+
+use std::f64::consts::PI;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+pub use quantity::{Agreement, Comparison, FigureValue};
+
+use jointplay_physics::words::words;
+
+/// Clearance (mm) and friction coefficient of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(from = "(f64, f64)")]
+pub struct Case {
+    /// Clearance of all three joints, mm.
+    pub clearance: f64,
+    /// Friction coefficient.
+    pub friction: f64,
+}
+
+impl From<(f64, f64)> for Case {
+    fn from((clearance, friction): (f64, f64)) -> Self {
+        Self { clearance, friction }
+    }
+}
+
+impl Case {
+    /// The changes that turn the default scene into this case.
+    pub fn changes(self) -> [(String, String); 2] {
+        Series::ALL.map(|series| {
+            let SeriesRow { key, unit, .. } = series.row();
+            let value = format!("{} {unit}", series.of(self));
+            (key.clone(), value.trim_end().to_owned())
+        })
+    }
+}
+
+/// Runs that differ in a single parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Series {
+    /// Figures 5 to 10 and 18 to 20.
+    Clearance,
+    /// Figures 11 to 16 and 21 to 23.
+    Friction,
+}
+
+words!(Series {
+    Clearance => "clearance",
+    Friction => "friction",
+});
+
+impl Series {
+    /// Its row of the table.
+    pub fn row(self) -> &'static SeriesRow {
+        &PAPER.series[self as usize]
+    }
+
+    /// Its runs, in ascending order of the parameter.
+    pub fn cases(self) -> [Case; 3] {
+        self.row().runs
+    }
+
+    /// A value of its parameter as legends and tables name it.
+    pub fn name(self, value: impl std::fmt::Display) -> String {
+        self.row().value.replace("{}", &value.to_string())
+    }
+
+    /// What distinguishes a run from the others of the series.
+    pub fn run_name(self, case: Case) -> String {
+        self.name(self.of(case))
+    }
+
+    /// Value of its parameter in a run.
+    pub fn of(self, case: Case) -> f64 {
+        match self {
+            Self::Clearance => case.clearance,
+            Self::Friction => case.friction,
+        }
+    }
+
+    /// `count` values between two ends, as `sweep --vary` takes them.
+    pub fn vary(self, [from, to]: [f64; 2], count: usize) -> String {
+        let SeriesRow { key, unit, .. } = self.row();
+        format!("{key}={from}{unit}..{to}{unit}:{count}")
+    }
+}
+
+/// Parameter and runs of a [`Series`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeriesRow {
+    /// Key of the parameter.
+    pub key: String,
+    /// Its name on an axis.
+    pub label: String,
+    /// Unit of its values here.
+    pub unit: String,
+    /// How a value, `{}`, is written beside others.
+    pub value: String,
+    /// The runs, in ascending order of the parameter.
+    pub runs: [Case; 3],
+    /// Smallest and largest value of the diagrams over the parameter.
+    pub range: [f64; 2],
+}
+
+/// Changes to the default scene for the paper's runs.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// Prefix of its file names.
+    pub prefix: String,
+    /// Title.
+    pub title: String,
+    /// Keys and values.
+    pub changes: Vec<(String, String)>,
+}
+
+/// What the paper's runs are computed with.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variants {
+    /// The model of this program.
+    pub corrected: Variant,
+    /// Friction uses (13) as printed.
+    pub printed: Variant,
+    /// The latter, each with a second change.
+    pub combinations: Vec<Variant>,
+}
+
+/// One of the two coordinates plotted in the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Coordinate {
+    /// Position, m.
+    X,
+    /// Angle, rad.
+    Beta,
+}
+
+words!(Coordinate {
+    X => "x",
+    Beta => "beta",
+});
+
+impl Coordinate {
+    /// Its index among the coordinates of the output body.
+    pub const fn index(self) -> usize {
+        [0, 4][self as usize]
+    }
+
+    /// Amplitude of the coordinate (m or rad) or of its `nth` derivative in the ideal motion.
+    pub fn amplitude(self, nth: usize) -> f64 {
+        let rate = 2.0 * PI / PAPER.period;
+        PAPER.amplitudes[self as usize] * [1.0, rate, rate * rate][nth]
+    }
+}
+
+/// Curves to compare with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Curves {
+    /// The runs with different clearances.
+    Clearance,
+    /// The runs with different friction.
+    Friction,
+    /// The same run in two formulations that share no equations of motion.
+    Formulations,
+}
+
+/// Sections to compare with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sections {
+    /// Sections of the paper's three runs.
+    Runs,
+    /// Sections at all values of a sweep from cold starts.
+    Sweep,
+}
+
+/// A number printed in the paper.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// Figure it belongs to.
+    pub figure: String,
+    /// The run.
+    #[serde(rename = "run")]
+    pub case: Case,
+    /// The quantity measured.
+    pub quantity: FigureValue,
+    /// The value given in the text of section 4.2, SI units.
+    pub value: f64,
+}
+
+/// A peak of Figure 17, whose run the paper does not name, SI units.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verification {
+    /// Part of the figure, such as `17e`.
+    pub figure: String,
+    /// The quantity measured.
+    pub quantity: FigureValue,
+    /// From the paper's own program.
+    pub own: f64,
+    /// From the commercial program it is compared with.
+    pub commercial: f64,
+}
+
+/// What a figure shows. Columns are named as in [`super::reproduction::COLUMNS`].
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Shows {
+    /// Columns of three runs over the whole period, and while the balls bounce.
+    Response {
+        /// The runs.
+        to: Series,
+        /// Columns of the upper charts.
+        whole: Vec<String>,
+        /// Columns of the lower charts.
+        early: Vec<String>,
+    },
+    /// The contact forces of a run.
+    Forces(Case),
+    /// Columns of two formulations and the ideal motion.
+    Verification(Vec<String>),
+    /// Divergence of the formulations, and constraint violation.
+    Drift,
+    /// Phase portraits, settled and during impacts.
+    Portraits(Series),
+    /// Sections of three runs.
+    Sections(Series),
+    /// Sections of a sweep, with their spread and hysteresis.
+    Bifurcation(Series),
+    /// Largest Lyapunov exponents of a sweep.
+    Exponents(Series),
+    /// A grid over clearance and friction.
+    Map,
+    /// Tip error against clearance.
+    Probe,
+}
+
+/// A figure of the paper, or an additional one.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Figure {
+    /// Name in files: `figure-` and two digits for a figure of the paper.
+    pub name: String,
+    /// Heading.
+    pub heading: String,
+    /// Caption.
+    pub caption: String,
+    /// What is drawn.
+    pub shows: Shows,
+    /// Figures whose largest forces are tabulated below it.
+    #[serde(default)]
+    pub strongest_of: Vec<String>,
+}
+
+impl Figure {
+    /// Whether `figure`, such as `6a`, is a part of this figure.
+    pub fn contains(&self, figure: &str) -> bool {
+        let number = figure.trim_end_matches(char::is_alphabetic);
+        self.name == format!("figure-{number:0>2}")
+    }
+}
+
+/// A section of the page.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Section {
+    /// Name in links.
+    pub id: String,
+    /// Heading.
+    pub title: String,
+    /// Its figures.
+    #[serde(rename = "figure")]
+    pub figures: Vec<Figure>,
+}
+
+/// What must hold here for a statement to count as confirmed, as [`super::reproduction::Findings::statements`] judges it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[allow(missing_docs, reason = "fields read as the sentences of the table")]
+pub enum Test {
+    /// In a run, a coordinate deviates from the ideal motion by a small fraction of its amplitude.
+    StaysNearIdeal { coordinate: Coordinate, run: Case },
+    /// A quantity grows from run to run.
+    Grows { of: FigureValue, with: Series },
+    /// All quantities said to grow do grow.
+    AllGrow(Series),
+    /// One quantity exceeds another in every run.
+    Exceeds { of: FigureValue, that: FigureValue, over: Series },
+    /// A quantity has its extreme in the middle run.
+    NoRule { of: FigureValue, with: Series },
+    /// One quantity varies by a larger fraction of its mean than another.
+    DiffersMore { of: FigureValue, than: FigureValue, with: Series },
+    /// A quantity varies more over one series than over the other.
+    ChangesMoreWith { of: FigureValue, with: Series, than: Series },
+    /// No ball leaves its socket after a given instant, s.
+    Steady { after: f64, over: Series },
+    /// A joint, counted from 1, has the largest peak force in a run.
+    Hardest { joint: usize, run: Case },
+    /// Curves stay close to each other and to the ideal motion from a given instant (s) on.
+    Coincide {
+        curves: Curves,
+        #[serde(default)]
+        ideal: bool,
+        columns: Vec<String>,
+        from: f64,
+    },
+    /// Two formulations stay close, relative to the largest deviation from the ideal motion.
+    FormulationsAgree(Vec<Coordinate>),
+    /// Settled curves stay close to each other.
+    PortraitsCoincide { of: Coordinate, over: Series },
+    /// Settled curves do not close and, if `growing`, are further from closing the larger the parameter.
+    PortraitsWide {
+        of: Coordinate,
+        over: Series,
+        #[serde(default)]
+        growing: bool,
+    },
+    /// The last sections of three runs are in ascending order.
+    SectionsAscend { of: Coordinate, over: Series },
+    /// The sections of three runs spread, increasingly from run to run.
+    SectionsSpread { of: Coordinate, over: Series },
+    /// Sections are denser towards their centre.
+    SectionsCrowd(Series),
+    /// Sections barely move over a series.
+    SectionsStay { of: Sections, over: Series },
+    /// Sections agree at every value of a sweep.
+    SectionsRepeat { of: Coordinate, over: Series },
+    /// Three runs are quasi-periodic.
+    QuasiPeriodic(Series),
+    /// Every value of a sweep gives motion of period one.
+    AllPeriodic(Series),
+    /// The first value of a sweep is periodic, the last chaotic.
+    PeriodicToChaotic(Series),
+    /// The upper half of a sweep has more chaotic values.
+    ChaosGrows(Series),
+    /// Every value of a sweep is chaotic, or none.
+    ChaosAllOrNone(Series),
+}
+
+/// A statement of the paper in words.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Claim {
+    /// Where in the paper it is made.
+    pub place: String,
+    /// The statement, paraphrased.
+    pub says: String,
+    /// The test applied to it.
+    pub test: Test,
+}
+
+/// Everything compared with the paper, in its order.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Paper {
+    /// Period of trajectory (59), s: simulated time of the runs of section 4.2.
+    pub period: f64,
+    /// Amplitudes of x (m) and of beta (rad) in trajectory (59).
+    pub amplitudes: [f64; 2],
+    /// The paper's output step, s.
+    pub sampling: f64,
+    /// Every run that the figures need, once each; first the nominal one.
+    pub runs: Vec<Case>,
+    /// Runs that differ in a single parameter, in the order of [`Series`].
+    pub series: [SeriesRow; 2],
+    /// What they are computed with.
+    pub variants: Variants,
+    /// Numbers from a named run.
+    #[serde(rename = "number")]
+    pub numbers: Vec<Published>,
+    /// Numbers from an unnamed run.
+    pub verification: Vec<Verification>,
+    /// Figures.
+    #[serde(rename = "section")]
+    pub sections: Vec<Section>,
+    /// Statements.
+    #[serde(rename = "statement")]
+    pub statements: Vec<Claim>,
+}
+
+/// The parsed table.
+pub static PAPER: LazyLock<Paper> = LazyLock::new(|| {
+    let text = include_str!("../../../assets/paper.toml");
+    toml::from_str(text).expect("a test reads it")
+});
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_belongs_to_a_run_and_to_a_figure() {
+        let figures = || PAPER.sections.iter().flat_map(|s| &s.figures);
+        for published in &PAPER.numbers {
+            assert!(PAPER.runs.contains(&published.case), "{published:?}");
+            assert!(published.value > 0.0);
+            let of = figures().filter(|f| f.contains(&published.figure));
+            assert_eq!(of.count(), 1, "{published:?}");
+        }
+        assert_eq!((PAPER.numbers.len(), PAPER.statements.len()), (51, 52));
+    }
+
+    #[test]
+    fn the_runs_of_a_series_are_equally_spaced_and_among_all_runs() {
+        for series in Series::ALL {
+            let runs = series.cases();
+            assert!(series.row().key.ends_with(series.word()));
+            assert!(runs.iter().all(|run| PAPER.runs.contains(run)), "{series}");
+            let [a, b, c] = runs.map(|run| series.of(run));
+            assert!(a < b && (a + c - 2.0 * b).abs() < 1e-12, "{series}");
+        }
+        assert_eq!(Series::Clearance.vary([0.01, 1.0], 100), "contact.clearance=0.01mm..1mm:100");
+        assert_eq!(Series::Friction.run_name(PAPER.runs[0]), "friction 0.2");
+    }
+
+    #[test]
+    fn rates_are_held_against_the_amplitude_of_the_rate() {
+        let beta = [0, 1, 2].map(|nth| Coordinate::Beta.amplitude(nth));
+        assert_eq!(beta, [0.025, 0.025 * PI, 0.025 * (PI * PI)]);
+    }
+}

@@ -1,0 +1,176 @@
+//! Quantities that the paper reports of a run, and its numbers beside this program's.
+
+use serde::{Deserialize, Deserializer, de::Error as _};
+
+use super::{Coordinate, Coordinate::Beta, Coordinate::X, Published};
+use crate::response::{Extremes, Response};
+use jointplay_physics::words::{Words as _, words};
+
+/// A quantity that a figure shows of a run, as one number in SI units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "their words say it")]
+pub enum FigureValue {
+    DeviationX,
+    DeviationBeta,
+    RateX,
+    RateBeta,
+    AccelerationX,
+    AccelerationBeta,
+    Normal1,
+    Normal2,
+    Normal3,
+    Strongest,
+    LastSeparation,
+}
+
+words!(FigureValue {
+    DeviationX => "largest deviation of x",
+    DeviationBeta => "largest deviation of beta",
+    RateX => "largest velocity in x",
+    RateBeta => "largest angular rate of beta",
+    AccelerationX => "largest acceleration in x",
+    AccelerationBeta => "largest acceleration of beta",
+    Normal1 => "largest contact force in S1",
+    Normal2 => "largest contact force in S2",
+    Normal3 => "largest contact force in S3",
+    Strongest => "largest contact force of any joint",
+    LastSeparation => "last separation",
+});
+
+impl<'de> Deserialize<'de> for FigureValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        Self::of_word(&word).ok_or_else(|| D::Error::unknown_variant(&word, Self::WORDS))
+    }
+}
+
+impl FigureValue {
+    /// Contact forces, joint by joint.
+    pub const NORMAL: [Self; 3] = [Self::Normal1, Self::Normal2, Self::Normal3];
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::DeviationX => "m",
+            Self::DeviationBeta => "rad",
+            Self::RateX => "m/s",
+            Self::RateBeta => "rad/s",
+            Self::AccelerationX => "m/s²",
+            Self::AccelerationBeta => "rad/s²",
+            Self::Normal1 | Self::Normal2 | Self::Normal3 | Self::Strongest => "N",
+            Self::LastSeparation => "s",
+        }
+    }
+
+    fn of_extremes(self, extremes: &Extremes) -> Option<f64> {
+        let at = |values: &[f64], coordinate: Coordinate| Some(values[coordinate.index()]);
+        let normal = |joint: usize| extremes.normal.get(joint).copied();
+        match self {
+            Self::DeviationX => at(&extremes.deviation, X),
+            Self::DeviationBeta => at(&extremes.deviation, Beta),
+            Self::RateX => at(&extremes.rate, X),
+            Self::RateBeta => at(&extremes.rate, Beta),
+            Self::AccelerationX => at(&extremes.acceleration, X),
+            Self::AccelerationBeta => at(&extremes.acceleration, Beta),
+            Self::Normal1 => normal(0),
+            Self::Normal2 => normal(1),
+            Self::Normal3 => normal(2),
+            Self::Strongest => extremes.normal.iter().copied().reduce(f64::max),
+            Self::LastSeparation => None,
+        }
+    }
+
+    /// Value in continuous time; NaN where undefined.
+    pub fn of(self, response: &Response) -> f64 {
+        let value = match self {
+            Self::LastSeparation => {
+                let last = response.last_separation.iter().flatten();
+                last.copied().reduce(f64::max)
+            }
+            _ => self.of_extremes(&response.full),
+        };
+        value.unwrap_or(f64::NAN)
+    }
+
+    /// Value at the paper's sampling; `None` where sampling does not matter.
+    pub fn sampled(self, response: &Response) -> Option<f64> {
+        self.of_extremes(&response.sampled)
+    }
+}
+
+/// How close two numbers are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Agreement {
+    /// Within 10 % of the paper's.
+    Agrees,
+    /// Between half and twice the paper's.
+    Near,
+    /// Further off.
+    Differs,
+}
+
+words!(Agreement {
+    Agrees => "agrees within 10 %",
+    Near => "within a factor of 2",
+    Differs => "differs",
+});
+
+impl Agreement {
+    /// From the ratio of a number to the paper's.
+    pub fn of(ratio: f64) -> Self {
+        if (0.9..=1.1).contains(&ratio) {
+            Self::Agrees
+        } else if (0.5..=2.0).contains(&ratio) {
+            Self::Near
+        } else {
+            Self::Differs
+        }
+    }
+}
+
+/// A number of the paper with this program's counterpart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// The paper's number.
+    pub published: &'static Published,
+    /// This program's, in continuous time.
+    pub full: f64,
+    /// As a solver with the paper's output step would report it; `None` where sampling does not matter.
+    pub sampled: Option<f64>,
+}
+
+impl Comparison {
+    /// Continuous-time value over the paper's.
+    pub fn ratio(&self) -> f64 {
+        self.full / self.published.value
+    }
+
+    /// Sampled value over the paper's.
+    pub fn sampled_ratio(&self) -> Option<f64> {
+        self.sampled.map(|value| value / self.published.value)
+    }
+
+    /// Judged in continuous time: impacts are so short that samples catch their peaks only by chance.
+    pub fn agreement(&self) -> Agreement {
+        Agreement::of(self.ratio())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ratios_have_their_words() {
+        for (ratio, word) in [
+            (1.0, Agreement::Agrees),
+            (0.89, Agreement::Near),
+            (2.0, Agreement::Near),
+            (2.1, Agreement::Differs),
+            (0.3, Agreement::Differs),
+            (f64::NAN, Agreement::Differs),
+        ] {
+            assert_eq!(Agreement::of(ratio), word, "{ratio}");
+        }
+    }
+}

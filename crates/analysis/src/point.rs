@@ -1,0 +1,341 @@
+//! One point of a sweep: a scene run through its periods, and what is recorded of it.
+
+use super::drive::{Machine, MachineError, OBSERVABLES};
+use super::orbit::Orbit;
+use super::regime::{Evidence, Regime, classify};
+use super::section::{Schedule, SectionRun};
+use jointplay_physics::scene::{Scene, Solver, Value};
+use jointplay_physics::simulate::{Effect, Peak};
+
+/// Largest number of samples per period for the means and the tip error.
+const SAMPLES: f64 = 400.0;
+/// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: at a tolerance of 1e-6 10 nm
+/// in a machine with balls of 10 mm. So small that the two part only where one grazes, and well above what two runs differ by that
+/// take the same steps: the last iteration of an implicit step.
+const OVER_TOLERANCE: f64 = 1.0;
+const SEPARATIONS: (f64, f64) = (1e-6, 1e-5);
+/// Loosest tolerance at which a run keeps so near the motion of its scene that they have the same exponent.
+pub const LOOSEST_FOR_EXPONENT: f64 = 1e-5;
+/// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and
+/// a stiff contact turns coordinate errors into larger rate errors.
+const RESOLUTION: [f64; 2] = [10.0, 100.0];
+/// Used as the tolerance of a fixed-step method.
+const FIXED_STEP: f64 = 1e-5;
+
+/// How long a point runs and where its sections lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Drive periods, including those discarded.
+    pub periods: usize,
+    /// Initial periods that are a transient.
+    pub discard: usize,
+    /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
+    pub phase: f64,
+    /// Whether a twin run measures the largest Lyapunov exponent.
+    pub exponent: bool,
+}
+
+/// Result for one ball joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointResult {
+    /// Largest normal force of all periods, in continuous time, N.
+    pub peak: f64,
+    /// Largest normal force of the kept periods, N.
+    pub peak_kept: f64,
+    /// Mean normal force over the kept periods, N.
+    pub mean: f64,
+    /// Contacts begun in all periods.
+    pub impacts: u64,
+    /// Contacts begun in the kept periods.
+    pub impacts_kept: u64,
+    /// Time from the point's start to the last separation, if any, s.
+    pub last_separation: Option<f64>,
+}
+
+/// Result of a point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointResult {
+    /// Time at which the divergence guard stopped it, s from its start; `None` if it did not.
+    pub stopped: Option<f64>,
+    /// Ball joints in scene order.
+    pub joints: Vec<JointResult>,
+    /// Largest and root-mean-square distance of the probe tip from the ideal tip over the kept periods, m; `None` where
+    /// the scene has no such reference.
+    pub probe: Option<(f64, f64)>,
+    /// Kind of motion.
+    pub regime: Regime,
+    /// Evidence for the regime.
+    pub evidence: Evidence,
+    /// Reasons not to trust it: bit k for one of the kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
+    pub doubts: u32,
+    /// Unaccounted energy over what the machine held and lost, since the run's start; NaN without a ledger.
+    pub residual: f64,
+    /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
+    pub sections: Vec<f64>,
+}
+
+/// A point being computed.
+pub struct PointRun {
+    watch: SectionRun<Machine>,
+    plan: Plan,
+    period: f64,
+    resolution: Vec<f64>,
+    started: f64,
+    impacts_at_start: Vec<u64>,
+    impacts_at_discard: Vec<u64>,
+    peaks: Vec<Peak>,
+    transient_peaks: Vec<f64>,
+    means: Means,
+}
+
+impl PointRun {
+    /// Starts `scene` at t = 0.
+    ///
+    /// # Errors
+    /// A scene that cannot start.
+    pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, MachineError> {
+        // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
+        let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
+        Ok(Self::begin(Machine::new(scene)?, plan, period, part * period))
+    }
+
+    /// Continues from the latest section of another point with some parameters changed; `None` if a change takes effect
+    /// only on reset, or the scene does not accept it.
+    pub fn follow(mut machine: Machine, changes: &[(&str, Value)], plan: Plan, period: f64) -> Option<Self> {
+        for (key, value) in changes {
+            if machine.simulation_mut().set_value(key, value) != Ok(Effect::Now) {
+                return None;
+            }
+        }
+        let first = machine.time() + period;
+        Some(Self::begin(machine, plan, period, first))
+    }
+
+    fn begin(mut machine: Machine, plan: Plan, period: f64, first: f64) -> Self {
+        let solver = machine.simulation().running_scene().solver;
+        let tolerance = tolerance_of(&solver);
+        let schedule = Schedule { first, interval: period, sections: plan.periods, discard: plan.discard };
+        // The motion of a purely kinematic scene has no neighbours.
+        let twin = plan.exponent && !machine.simulation().mechanism().is_kinematic();
+        let separation = twin.then(|| separation(tolerance));
+        let mut peaks = Vec::new();
+        let simulation = machine.simulation_mut();
+        if simulation.time() > 0.0 {
+            simulation.take_peaks(&mut peaks);
+        }
+        let impacts = simulation.statistics().impacts.clone();
+        let joints = impacts.len();
+        let started = simulation.time();
+        let mut run = Self {
+            resolution: resolution(simulation.running_scene(), tolerance),
+            means: Means::new(joints, period / SAMPLES),
+            watch: SectionRun::new(machine, schedule, separation),
+            plan,
+            period,
+            started,
+            impacts_at_discard: impacts.clone(),
+            impacts_at_start: impacts,
+            peaks,
+            transient_peaks: vec![0.0; joints],
+        };
+        if run.plan.discard == 0 {
+            run.begin_keeping();
+        }
+        run
+    }
+
+    /// Time of the first section, including discarded ones, s.
+    pub fn first(&self) -> f64 {
+        self.watch.schedule().first
+    }
+
+    /// Whether it started from the scene's own initial state.
+    pub fn is_cold(&self) -> bool {
+        self.started == 0.0
+    }
+
+    /// Whether all periods have been run.
+    pub fn is_done(&self) -> bool {
+        self.watch.is_done()
+    }
+
+    /// Number of sections taken, including discarded ones.
+    pub fn taken(&self) -> usize {
+        self.watch.taken()
+    }
+
+    /// Kept sections so far, in the order of [`OBSERVABLES`].
+    pub fn sections(&self) -> &[f64] {
+        self.watch.sections()
+    }
+
+    /// The running scene.
+    pub fn machine(&self) -> &Machine {
+        self.watch.orbit()
+    }
+
+    /// One step of the scene.
+    ///
+    /// # Errors
+    /// The divergence guard: the point has diverged.
+    pub fn step(&mut self) -> Result<(), MachineError> {
+        let at_section = self.watch.step()?;
+        if self.watch.taken() < self.plan.discard {
+            return Ok(());
+        }
+        if at_section && self.watch.taken() == self.plan.discard {
+            self.begin_keeping();
+        } else {
+            self.means.look(self.watch.orbit_mut(), at_section);
+        }
+        Ok(())
+    }
+
+    /// Ends the transient and starts keeping.
+    fn begin_keeping(&mut self) {
+        let machine = self.watch.orbit_mut();
+        let simulation = machine.simulation_mut();
+        simulation.take_peaks(&mut self.peaks);
+        for (largest, peak) in self.transient_peaks.iter_mut().zip(&self.peaks) {
+            *largest = peak.normal;
+        }
+        self.impacts_at_discard.clone_from(&simulation.statistics().impacts);
+        self.means.begin(machine);
+    }
+
+    /// The result, and the scene in the state of the latest section for the next point to follow.
+    pub fn finish(mut self) -> (PointResult, Machine) {
+        let simulation = self.watch.orbit_mut().simulation_mut();
+        simulation.take_peaks(&mut self.peaks);
+        let doubts = simulation.doubts().iter().fold(0, |bits, doubt| bits | 1 << doubt.kind());
+        let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.share());
+        let statistics = simulation.statistics();
+        let span = self.means.span;
+        let joints = (0..self.peaks.len())
+            .map(|j| JointResult {
+                peak: self.peaks[j].normal.max(self.transient_peaks[j]),
+                peak_kept: self.peaks[j].normal,
+                mean: self.means.normal[j] / span,
+                impacts: statistics.impacts[j] - self.impacts_at_start[j],
+                impacts_kept: statistics.impacts[j] - self.impacts_at_discard[j],
+                last_separation: statistics.last_separation[j]
+                    .filter(|&time| time > self.started)
+                    .map(|time| time - self.started),
+            })
+            .collect();
+        let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
+        let probe = known.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
+        let exponent = self.watch.exponent().and_then(|benettin| benettin.result());
+        let sections = self.watch.sections().to_vec();
+        let (regime, evidence) = classify(&sections, &self.resolution, self.period, exponent);
+        let result = PointResult { stopped: None, joints, probe, regime, evidence, doubts, residual, sections };
+        (result, self.watch.into_orbit())
+    }
+
+    /// Result of a point that the divergence guard stopped: only the time.
+    pub fn stopped(self) -> PointResult {
+        PointResult {
+            stopped: Some(self.machine().time() - self.started),
+            ..PointResult::empty(self.transient_peaks.len())
+        }
+    }
+}
+
+impl PointResult {
+    /// A result in which nothing is known.
+    pub fn empty(joints: usize) -> Self {
+        let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
+        let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
+        let (doubts, residual) = (0, f64::NAN);
+        let joints = vec![unknown; joints];
+        Self { stopped: None, joints, probe: None, regime, evidence, doubts, residual, sections: Vec::new() }
+    }
+}
+
+/// Relative tolerance that the errors of a run are like.
+fn tolerance_of(solver: &Solver) -> f64 {
+    if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP }
+}
+
+/// Separation of a twin from a run with this tolerance, in units of the scales.
+fn separation(tolerance: f64) -> f64 {
+    (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1)
+}
+
+/// The same of the twin of a run of `scene`.
+pub fn separation_of(scene: &Scene) -> f64 {
+    separation(tolerance_of(&scene.solver))
+}
+
+/// Smallest differences that distinguish two sections of `scene`, in the order of [`OBSERVABLES`]: the tolerance times
+/// its scales and a factor.
+pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
+    let length = scene.length_scale();
+    let of_group = [length, 0.1, length / 0.1, 1.0];
+    (0..OBSERVABLES.len()).map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3]).collect()
+}
+
+/// Time averages by the trapezoidal rule.
+struct Means {
+    least: f64,
+    latest: f64,
+    span: f64,
+    /// Integral of the normal force per ball joint, N s, and its value at the latest sample.
+    normal: Vec<f64>,
+    normal_now: Vec<f64>,
+    /// Integral of the squared tip error, m^2 s, and its magnitude at the latest sample.
+    probe_square: f64,
+    probe_now: Option<f64>,
+    probe_largest: f64,
+    probe_lost: bool,
+}
+
+impl Means {
+    fn new(joints: usize, least: f64) -> Self {
+        Self {
+            least,
+            latest: f64::NAN,
+            span: 0.0,
+            normal: vec![0.0; joints],
+            normal_now: vec![0.0; joints],
+            probe_square: 0.0,
+            probe_now: None,
+            probe_largest: 0.0,
+            probe_lost: false,
+        }
+    }
+
+    fn begin(&mut self, machine: &mut Machine) {
+        self.latest = machine.time();
+        self.take(machine, 0.0);
+    }
+
+    /// Takes a sample if the latest one is old enough.
+    fn look(&mut self, machine: &mut Machine, at_section: bool) {
+        let ago = machine.time() - self.latest;
+        if ago >= self.least || (at_section && ago > 0.0) {
+            self.latest = machine.time();
+            self.take(machine, ago);
+        }
+    }
+
+    fn take(&mut self, machine: &mut Machine, h: f64) {
+        let frame = machine.frame();
+        self.span += h;
+        let values = self.normal.iter_mut().zip(&mut self.normal_now);
+        for ((sum, now), joint) in values.zip(&frame.joints) {
+            let force = joint.normal_force.norm();
+            *sum += 0.5 * h * (*now + force);
+            *now = force;
+        }
+        // If the ideal motion ends on the way, there is no mean over the whole span.
+        self.probe_lost |= frame.probe_error.is_none();
+        if let Some(error) = frame.probe_error.filter(|_| !self.probe_lost) {
+            let size = error.norm();
+            let before = self.probe_now.unwrap_or(size);
+            self.probe_square += 0.5 * h * (before * before + size * size);
+            self.probe_largest = self.probe_largest.max(size);
+            self.probe_now = Some(size);
+        }
+    }
+}

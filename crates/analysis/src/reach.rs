@@ -1,0 +1,170 @@
+//! Speed goals of the program: three spans of the default scene, each with the speed required of it.
+
+use super::reference_solution::{MeanForces, done};
+use super::stretch::{advance_capped, time_to};
+use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
+use jointplay_physics::scene::Scene;
+use jointplay_physics::simulate::Simulation;
+
+/// Tolerance of the automatic pair that is to reach them.
+const TOLERANCE: f64 = 1e-5;
+/// Tolerance of the reference run for the settled forces.
+const CONVERGED: f64 = 1e-10;
+/// Allowed relative error, where there is one.
+const ALLOWED: f64 = 0.01;
+/// Number of instants over which settled forces are averaged.
+const SAMPLES: u32 = 3000;
+
+/// One of the three spans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// 0 to 1 s, impacts included.
+    FirstSecond,
+    /// 1 s to 4 s, contacts settled.
+    Settled,
+    /// 0 to 10 s with all joints ideal.
+    Ideal,
+}
+
+impl Goal {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::FirstSecond, Self::Settled, Self::Ideal];
+
+    /// Display name.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::FirstSecond => "first second, impacts included",
+            Self::Settled => "settled, 1 s to 4 s",
+            Self::Ideal => "all joints ideal, 10 s",
+        }
+    }
+
+    /// What its error measures.
+    pub fn error_of(self) -> &'static str {
+        match self {
+            Self::FirstSecond => "peaks of the first six impacts",
+            Self::Settled => "mean contact forces",
+            Self::Ideal => "-",
+        }
+    }
+
+    /// Required simulated seconds per clock second.
+    pub fn asked(self) -> f64 {
+        match self {
+            Self::FirstSecond => 40.0,
+            Self::Settled => 300.0,
+            Self::Ideal => 2000.0,
+        }
+    }
+
+    fn span(self) -> (f64, f64) {
+        match self {
+            Self::FirstSecond => (0.0, 1.0),
+            Self::Settled => (1.0, 4.0),
+            Self::Ideal => (0.0, 10.0),
+        }
+    }
+}
+
+/// A measured result.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// The goal.
+    pub goal: Goal,
+    /// The method.
+    pub setting: Setting,
+    /// Simulated seconds per clock second.
+    pub speed: f64,
+    /// Speed of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved, so that the stepper
+    /// does not matter.
+    pub baseline: Option<f64>,
+    /// Relative error; `None` where nothing is approximated.
+    pub error: Option<f64>,
+}
+
+impl Reach {
+    /// Whether the goal is met.
+    pub fn met(&self) -> bool {
+        self.speed >= self.goal.asked() && self.error.is_none_or(|error| error <= ALLOWED)
+    }
+}
+
+/// Measures the three spans of `scene`, the default scene.
+///
+/// # Errors
+/// As [`super::work_precision`].
+pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<Reach>, AnalysisError> {
+    let goals = Goal::ALL.iter().enumerate();
+    goals
+        .map(|(n, goal)| {
+            let mut scene = scene.clone();
+            if *goal == Goal::Ideal {
+                scene.set("contact.clearance", "0")?;
+            }
+            one(&scene, *goal, &mut context.part(n, Goal::ALL.len()))
+        })
+        .collect()
+}
+
+fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, AnalysisError> {
+    let setting = Setting::automatic(TOLERANCE);
+    let baseline = Setting::baseline();
+    let integrates = !setting.start(scene)?.mechanism().is_kinematic();
+    let budget = WorkBudget { measured: 0.5, ..WorkBudget::REFERENCE };
+    let (from, to) = goal.span();
+    let speed = |setting: &Setting, context: &mut RunContext| {
+        let start = run_to(setting, scene, from, context, |_| {})?.snapshot();
+        let seconds = time_to(to, &budget, context, |_| Ok(Simulation::of(&start)))?;
+        Ok::<_, AnalysisError>((to - from) / seconds)
+    };
+    // Timed before and after the baseline, so that a load that sets in between slows both.
+    let first = speed(&setting, &mut context.part(0, 4))?;
+    let baseline = if integrates { Some(speed(&baseline, &mut context.part(1, 4))?) } else { None };
+    let second = speed(&setting, &mut context.part(2, 4))?;
+    let mut last = context.part(3, 4);
+    let error = match goal {
+        Goal::FirstSecond => {
+            let reference = ReferenceSolution::new(scene, &mut last)?;
+            let (_, errors, _) = reference.impacts_of(&setting, &budget, &mut last)?;
+            errors.peak
+        }
+        Goal::Settled => {
+            let converged = Setting::reference(CONVERGED);
+            let expected = mean_forces(&converged, scene, (from, to), &mut last)?;
+            let means = mean_forces(&setting, scene, (from, to), &mut last)?;
+            let pairs = means.iter().zip(&expected);
+            pairs.map(|(mean, expected)| (mean / expected - 1.0).abs()).reduce(f64::max)
+        }
+        Goal::Ideal => None,
+    };
+    Ok(Reach { goal, setting, speed: first.max(second), baseline, error })
+}
+
+/// Runs from the start to `end`; `seen` is called after every step.
+fn run_to(
+    setting: &Setting,
+    scene: &Scene,
+    end: f64,
+    context: &mut RunContext,
+    mut seen: impl FnMut(&mut Simulation),
+) -> Result<Simulation, AnalysisError> {
+    let mut simulation = setting.start(scene)?;
+    let look = |simulation: &mut Simulation| {
+        seen(simulation);
+        false
+    };
+    let ended = advance_capped(&mut simulation, end, &WorkBudget::REFERENCE, context, look)?;
+    done(ended)?;
+    Ok(simulation)
+}
+
+fn mean_forces(
+    setting: &Setting,
+    scene: &Scene,
+    span: (f64, f64),
+    context: &mut RunContext,
+) -> Result<Vec<f64>, AnalysisError> {
+    let mut forces = MeanForces::new(scene, span, SAMPLES);
+    run_to(setting, scene, span.1, context, |simulation| forces.see(simulation))?;
+    Ok(forces.means)
+}

@@ -1,0 +1,100 @@
+//! Sweeps that are ready to run: one click of the chaos bench, and each says beforehand what it will show.
+
+use super::grid::Start;
+use super::source::SceneSource;
+use super::sweep_task::SweepTask;
+use jointplay_physics::scene::{Scene, SceneError};
+
+/// A sweep over a built-in scene.
+#[derive(Debug, PartialEq, Eq)]
+pub struct ReadySweep {
+    /// What the button says.
+    pub name: &'static str,
+    /// What its diagram will show, in a sentence (`tests/physics/ready_sweeps.rs`).
+    pub shows: &'static str,
+    /// The built-in scene.
+    pub scene: &'static str,
+    /// What is changed in it.
+    pub changes: &'static [(&'static str, &'static str)],
+    /// The varied parameter.
+    pub key: &'static str,
+    /// Its first and its last value, with their unit.
+    pub from: &'static str,
+    #[allow(missing_docs)]
+    pub to: &'static str,
+    /// Number of values.
+    pub values: usize,
+    /// Drive periods per value, including those discarded; forty kept ones tell chaos without an exponent.
+    pub periods: usize,
+    /// Of these, the transient.
+    pub discard: usize,
+}
+
+/// All of them.
+pub const READY: [ReadySweep; 3] = [
+    ReadySweep {
+        name: "Road to chaos",
+        shows: "The four-bar, its crank at 21 to 45 rad/s: every turn is alike until the balls knock, at 24. From there on chaos, but \
+                for two regular windows: at 27 every turn is alike again, at 29 every second one.",
+        scene: "four-bar",
+        // The members of `automatic` err by different parts of the tolerance: with it the exponent of a regular motion is known
+        // to a third of 1/s only.
+        changes: &[("solver.method", "radau5")],
+        key: "parameter.speed",
+        from: "21 rad/s",
+        to: "45 rad/s",
+        values: 25,
+        periods: 80,
+        discard: 40,
+    },
+    ReadySweep {
+        name: "Friction ends chaos",
+        shows: "The driven slider-crank, friction 0 to 0.016: chaos up to about 0.004, every turn alike from about 0.006.",
+        scene: "slider-crank-driven",
+        changes: &[],
+        key: "contact.friction",
+        from: "0",
+        to: "0.016",
+        values: 17,
+        periods: 60,
+        discard: 20,
+    },
+    ReadySweep {
+        name: "Clearance alone does not cause chaos",
+        shows: "The paper's machine, clearance 0.01 to 1 mm: with its friction every period is alike, and nothing is chaotic.",
+        scene: "spcmm",
+        changes: &[],
+        key: "contact.clearance",
+        from: "0.01 mm",
+        to: "1 mm",
+        values: 12,
+        periods: 30,
+        discard: 10,
+    },
+];
+
+impl ReadySweep {
+    /// Its scene.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn scene(&self) -> Result<Scene, SceneError> {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = self.changes.iter().map(own).collect();
+        Scene::load(self.scene, &changes)
+    }
+
+    /// The sweep over `scene`, with its sections at the start of the drive period.
+    pub fn task(&self, scene: &Scene) -> SweepTask {
+        let Self { key, from, to, values, .. } = self;
+        SweepTask {
+            scene: SceneSource::of(scene),
+            vary: vec![format!("{key}={from}..{to}:{values}")],
+            periods: self.periods,
+            discard: self.discard,
+            phase: 0.0,
+            start: Start::Cold,
+            exponent: false,
+        }
+    }
+}

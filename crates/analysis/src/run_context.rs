@@ -1,0 +1,78 @@
+//! What an analysis needs from outside: a clock, and permission to continue.
+
+use std::ops::ControlFlow;
+
+use jointplay_physics::scene::SceneError;
+use jointplay_physics::simulate::{ChangeError, StartError, Stopped};
+
+/// Clock and progress callback from the caller of an analysis: the command line, a background thread, a worker in a browser.
+pub struct RunContext<'a> {
+    clock: &'a mut dyn FnMut() -> f64,
+    progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
+    /// Current part of the whole, as fractions.
+    from: f64,
+    to: f64,
+}
+
+impl<'a> RunContext<'a> {
+    /// `clock` returns seconds from any origin; `progress` receives the fraction done, 0 to 1, some thousand times, and
+    /// may cancel.
+    pub fn new(clock: &'a mut dyn FnMut() -> f64, progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>) -> Self {
+        Self { clock, progress, from: 0.0, to: 1.0 }
+    }
+
+    /// Seconds on the clock.
+    pub(super) fn now(&mut self) -> f64 {
+        (self.clock)()
+    }
+
+    /// Reports how much of the current part is done.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Cancelled`] if it may not continue.
+    pub(super) fn go_on(&mut self, done: f64) -> Result<(), AnalysisError> {
+        let fraction = self.from + (self.to - self.from) * done.clamp(0.0, 1.0);
+        match (self.progress)(fraction) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(AnalysisError::Cancelled),
+        }
+    }
+
+    /// The context of one of `parts` equal parts of the current one.
+    pub fn part(&mut self, index: usize, parts: usize) -> RunContext<'_> {
+        let share = (self.to - self.from) / parts.max(1) as f64;
+        let from = self.from + share * index as f64;
+        RunContext { clock: &mut *self.clock, progress: &mut *self.progress, from, to: from + share }
+    }
+}
+
+/// Why an analysis has no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AnalysisError {
+    /// The caller cancelled it.
+    #[error("cancelled")]
+    Cancelled,
+    /// The scene does not start.
+    #[error(transparent)]
+    Start(#[from] StartError),
+    /// A setting that the scene, or the simulation of it, does not accept.
+    #[error(transparent)]
+    Setting(#[from] ChangeError),
+    /// The divergence guard stopped the reference run.
+    #[error("the reference run cannot be made: {0}")]
+    Stopped(#[from] Stopped),
+    /// The reference run reached the cap on work.
+    #[error(
+        "the reference run takes more than {evaluations} evaluations of the equations: the scene is too large to be measured"
+    )]
+    TooLong {
+        /// The cap.
+        evaluations: u64,
+    },
+}
+
+impl From<SceneError> for AnalysisError {
+    fn from(error: SceneError) -> Self {
+        Self::Setting(error.into())
+    }
+}

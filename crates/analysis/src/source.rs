@@ -1,0 +1,79 @@
+//! A scene in transferable form for a thread or worker, and why a task has no result.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::AnalysisError;
+use super::grid::RangeError;
+use super::sweep::SweepError;
+use jointplay_physics::scene::{Scene, SceneError};
+
+/// A scene in transferable form: text and changes, from which it is parsed again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneSource {
+    /// The TOML text.
+    pub text: String,
+    /// Its file, for messages.
+    pub file: Option<String>,
+    /// Changed parameters, as a user writes them.
+    pub changes: Vec<(String, String)>,
+    /// Texts of the files that it names.
+    pub beside: BTreeMap<String, String>,
+}
+
+impl SceneSource {
+    /// The source of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        let texts = scene.source.beside.iter();
+        Self {
+            text: scene.source.text.clone(),
+            file: scene.source.file.clone(),
+            changes: scene.changes.clone(),
+            beside: texts.map(|(name, text)| (name.clone(), text.to_string())).collect(),
+        }
+    }
+
+    /// Parses the scene.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn scene(&self) -> Result<Scene, SceneError> {
+        let texts = self.beside.iter();
+        let beside = texts.map(|(name, text)| (name.clone(), text.as_str().into())).collect();
+        Scene::parse_with(&self.text, self.file.as_deref(), &beside, &self.changes)
+    }
+}
+
+/// Why there is no result.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum TaskFault {
+    #[error("cancelled")]
+    Cancelled,
+    #[error(transparent)]
+    Analysis(Box<AnalysisError>),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    #[error("drive phase {0}: allowed 0 to below 1 period")]
+    Phase(f64),
+    #[error(
+        "{points} points with {kept} kept sections each are more than the window draws ({most} sections): take fewer values or \
+         periods, or run `jointplay sweep`"
+    )]
+    TooManySections { points: usize, kept: usize, most: usize },
+    #[error("no preset is called {0}")]
+    NoPreset(String),
+}
+
+impl From<AnalysisError> for TaskFault {
+    fn from(error: AnalysisError) -> Self {
+        match error {
+            AnalysisError::Cancelled => Self::Cancelled,
+            other => Self::Analysis(Box::new(other)),
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! A stretch of stepping under a cap on work, timed piece by piece.
+
+use std::fmt::Display;
+
+use serde::{Serialize, Serializer};
+
+use super::{AnalysisError, RunContext};
+use jointplay_physics::scene::{BallJoint, Scene};
+use jointplay_physics::simulate::{Simulation, StartError, Stopped};
+
+/// Steps between two checks of the clock, the cap and cancellation.
+const STEPS_IN_A_PIECE: u32 = 32;
+/// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs are enough.
+const FEWEST_RUNS: usize = 3;
+const MOST_RUNS: usize = 40;
+const LONG: f64 = 4.0;
+
+/// How much work an analysis may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorkBudget {
+    /// Evaluations of the equations after which a run is capped.
+    pub evaluations: u64,
+    /// Clock seconds after which it is capped, too: the linear algebra of implicit methods is no evaluation.
+    pub seconds: f64,
+    /// Seconds to measure for each run, by repeating it.
+    pub measured: f64,
+    /// Step sizes of the fixed-step methods, s.
+    pub steps: &'static [f64],
+    /// Tolerances of the adaptive methods.
+    pub tolerances: &'static [f64],
+}
+
+impl WorkBudget {
+    /// A coarse grid within seconds.
+    pub const QUICK: Self = Self {
+        evaluations: 400_000,
+        seconds: 0.5,
+        measured: 0.02,
+        steps: &[50e-6, 20e-6, 10e-6, 5e-6, 2e-6],
+        tolerances: &[1e-3, 1e-4, 1e-6, 1e-8],
+    };
+    /// The whole grid within minutes.
+    pub const FULL: Self = Self {
+        evaluations: 4_000_000,
+        seconds: 2.0,
+        measured: 0.1,
+        steps: &[1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6],
+        tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
+    };
+    /// More loose joints than these make runs long.
+    const MANY: usize = 8;
+
+    /// For `scene`: runs of many loose joints are capped earlier, at the same steps and tolerances.
+    #[must_use]
+    pub fn of(self, scene: &Scene) -> Self {
+        let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
+        if scene.ball_joints.iter().filter(loose).count() <= Self::MANY {
+            return self;
+        }
+        Self {
+            evaluations: self.evaluations.min(Self::QUICK.evaluations),
+            seconds: self.seconds.min(1.5),
+            measured: self.measured.min(Self::QUICK.measured),
+            ..self
+        }
+    }
+
+    /// Cap for the reference, on which everything else depends.
+    pub(super) const REFERENCE: Self = Self { evaluations: 40_000_000, seconds: f64::INFINITY, ..Self::FULL };
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum End {
+    /// It reached its end.
+    Reached,
+    /// It reached the cap on work.
+    Capped,
+    /// The divergence guard stopped it.
+    #[serde(serialize_with = "as_words")]
+    Stopped(Stopped),
+    /// The method refused the scene, say one too large for its matrices; in files it is stopped, too.
+    #[serde(rename = "stopped", serialize_with = "as_words")]
+    Refused(StartError),
+}
+
+impl End {
+    /// Why it was stopped or refused, if it was.
+    pub fn fault(&self) -> Option<&dyn Display> {
+        match self {
+            Self::Reached | Self::Capped => None,
+            Self::Stopped(why) => Some(why),
+            Self::Refused(why) => Some(why),
+        }
+    }
+}
+
+fn as_words<S: Serializer>(fault: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(fault)
+}
+
+/// Steps `simulation` to exactly `end`; `seen` is called after every step and returns whether that is enough.
+pub(super) fn advance_capped(
+    simulation: &mut Simulation,
+    end: f64,
+    budget: &WorkBudget,
+    context: &mut RunContext,
+    mut seen: impl FnMut(&mut Simulation) -> bool,
+) -> Result<End, AnalysisError> {
+    run_until_timed(simulation, end, budget, context, &mut Vec::new(), &mut seen)
+}
+
+/// The same; `pieces` keeps the shortest time so far of each piece, s.
+fn run_until_timed(
+    simulation: &mut Simulation,
+    end: f64,
+    budget: &WorkBudget,
+    context: &mut RunContext,
+    pieces: &mut Vec<f64>,
+    seen: &mut impl FnMut(&mut Simulation) -> bool,
+) -> Result<End, AnalysisError> {
+    let most = simulation.statistics().evaluations + budget.evaluations;
+    let deadline = context.now() + budget.seconds;
+    for piece in 0.. {
+        let before = context.now();
+        let outcome = some_steps(simulation, end, seen);
+        let now = context.now();
+        match pieces.get_mut(piece) {
+            Some(shortest) => *shortest = shortest.min(now - before),
+            None => pieces.push(now - before),
+        }
+        match outcome {
+            Ok(true) => return Ok(End::Reached),
+            Ok(false) => {}
+            Err(stopped) => return Ok(End::Stopped(stopped)),
+        }
+        context.go_on(0.0)?;
+        if simulation.statistics().evaluations > most || now > deadline {
+            return Ok(End::Capped);
+        }
+    }
+    unreachable!("pieces are counted for ever")
+}
+
+/// Steps one piece; whether `end` is reached or `seen` has returned true.
+fn some_steps(
+    simulation: &mut Simulation,
+    end: f64,
+    seen: &mut impl FnMut(&mut Simulation) -> bool,
+) -> Result<bool, Stopped> {
+    for _ in 0..STEPS_IN_A_PIECE {
+        if simulation.time() >= end {
+            return Ok(true);
+        }
+        simulation.step_until(end)?;
+        if seen(simulation) {
+            return Ok(true);
+        }
+    }
+    Ok(simulation.time() >= end)
+}
+
+/// Seconds to step to `end`: the sum of the shortest times of all pieces, so that other load on the machine counts as
+/// little as possible. Every run starts from what `start` returns; the time for that does not count.
+pub(super) fn time_to(
+    end: f64,
+    budget: &WorkBudget,
+    context: &mut RunContext,
+    mut start: impl FnMut(&mut RunContext) -> Result<Simulation, AnalysisError>,
+) -> Result<f64, AnalysisError> {
+    let mut pieces = Vec::new();
+    let mut measured = 0.0;
+    for run in 0..MOST_RUNS {
+        let mut simulation = start(context)?;
+        let before = context.now();
+        run_until_timed(&mut simulation, end, budget, context, &mut pieces, &mut |_| false)?;
+        measured += context.now() - before;
+        let long = measured >= LONG * budget.measured && run > 0;
+        if long || (measured >= budget.measured && run + 1 >= FEWEST_RUNS) {
+            break;
+        }
+    }
+    Ok(pieces.iter().sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use jointplay_physics::scene::Scene;
+
+    #[test]
+    fn work_is_capped_and_can_be_broken_off() {
+        let scene = Scene::load("spcmm", &[]).expect("built in");
+        let small = WorkBudget { evaluations: 500, ..WorkBudget::QUICK };
+        let mut clock = || 0.0;
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut go_on = |_: f64| ControlFlow::Continue(());
+        let mut context = RunContext::new(&mut clock, &mut go_on);
+        let end = advance_capped(&mut simulation, 1.0, &small, &mut context, |_| false);
+        assert_eq!(end, Ok(End::Capped));
+        let evaluations = simulation.statistics().evaluations;
+        assert!((501..1500).contains(&evaluations), "{evaluations}");
+
+        let mut looks = 0;
+        let mut stop = |_: f64| {
+            looks += 1;
+            if looks > 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let mut context = RunContext::new(&mut clock, &mut stop);
+        let end = advance_capped(&mut simulation, 1.0, &WorkBudget::FULL, &mut context, |_| false);
+        assert_eq!(end, Err(AnalysisError::Cancelled));
+    }
+
+    #[test]
+    fn a_run_takes_the_time_of_its_shortest_pieces() {
+        let scene = Scene::load("pendulum", &[]).expect("built in");
+        // A clock that advances by 1 s per reading, but by 100 s if the reading falls on a busy moment.
+        let (mut time, mut look) = (0.0, 0);
+        let mut clock = || {
+            look += 1;
+            time += if look % 17 == 0 { 100.0 } else { 1.0 };
+            time
+        };
+        let mut go_on = |_: f64| ControlFlow::Continue(());
+        let mut context = RunContext::new(&mut clock, &mut go_on);
+        let budget = WorkBudget { measured: 1e6, seconds: 1e9, ..WorkBudget::QUICK };
+        let mut steps = 0;
+        let seconds = time_to(5e-3, &budget, &mut context, |_| {
+            let mut simulation = Simulation::new(&scene)?;
+            while simulation.step_until(5e-3).is_ok() && simulation.time() < 5e-3 {}
+            steps = simulation.statistics().steps;
+            Ok(Simulation::new(&scene)?)
+        })
+        .expect("runs");
+        assert_eq!(seconds, (steps as f64 / f64::from(STEPS_IN_A_PIECE)).ceil());
+    }
+}

@@ -1,0 +1,371 @@
+//! Cases whose answers are known from outside the program: a table (`assets/validation/cases.toml`), the right values, and ours.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use jointplay_physics::scene::{Scene, SceneError, evaluate};
+use jointplay_physics::simulate::{Frame, Impact, NoChannel, Reading, Simulation, StartError, Stopped, chosen_columns};
+
+/// A run of a scene, and what is known of it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Title.
+    pub title: String,
+    /// The scene, by name.
+    pub scene: String,
+    /// Keys and values that are changed in it.
+    #[serde(default)]
+    pub changes: Vec<(String, String)>,
+    /// Length of the run, s.
+    pub duration: f64,
+    /// Where the data and the answer come from.
+    pub source: String,
+    /// What is compared.
+    #[serde(rename = "check")]
+    pub checks: Vec<Check>,
+}
+
+/// A quantity, its right value, and how far ours may be from it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Check {
+    /// The quantity in words.
+    pub quantity: String,
+    /// SI unit; empty for a ratio.
+    pub unit: String,
+    /// How it is read from the run.
+    pub measure: Measure,
+    /// Its right value.
+    pub right: Right,
+    /// Largest difference allowed, in `unit`.
+    pub bound: f64,
+}
+
+/// How a quantity is read from a run. Channels are those of `run --channels`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Measure {
+    /// A channel at the end of the run.
+    End(String),
+    /// A channel at an instant.
+    At {
+        /// Its name.
+        channel: String,
+        /// The instant, s.
+        time: f64,
+    },
+    /// Largest absolute value of a channel at the ends of steps.
+    Largest {
+        /// Its name.
+        channel: String,
+        /// From when on, s.
+        from: f64,
+    },
+    /// Mean interval at which a channel rises through a level.
+    Period {
+        /// Its name.
+        channel: String,
+        /// The level, SI unit.
+        level: f64,
+    },
+    /// A property of an impact.
+    Impact {
+        /// Number of the impact among those of the run, from 1.
+        number: usize,
+        /// Which property.
+        property: ImpactProperty,
+    },
+}
+
+/// A property of an impact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ImpactProperty {
+    /// When it begins, s.
+    Start,
+    /// Approach speed, m/s.
+    Approach,
+    /// Largest normal force, N.
+    Peak,
+    /// Separation speed over approach speed.
+    Restitution,
+}
+
+impl ImpactProperty {
+    fn of(self, impact: &Impact) -> f64 {
+        match self {
+            Self::Start => impact.start,
+            Self::Approach => impact.approach_speed,
+            Self::Peak => impact.peak,
+            Self::Restitution => impact.achieved(),
+        }
+    }
+}
+
+/// A right value and its origin.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Right {
+    /// Printed in the source of the case, SI unit.
+    Published(f64),
+    /// From an independent model, by table and key of `assets/validation/models.toml`.
+    Model(String),
+    /// A closed form, as an expression.
+    Formula(String),
+}
+
+/// Results of the independent models (`tests/reference/validation/models.py`), SI units.
+static MODELS: LazyLock<BTreeMap<String, BTreeMap<String, f64>>> = LazyLock::new(|| {
+    let text = include_str!("../../../assets/validation/models.toml");
+    toml::from_str(text).expect("a test reads it")
+});
+
+impl Right {
+    /// The value, SI unit.
+    ///
+    /// # Panics
+    /// If the embedded tables do not have it: a test reads every one.
+    pub fn value(&self) -> f64 {
+        match self {
+            Self::Published(value) => *value,
+            Self::Model(name) => {
+                let (case, key) = name.split_once('.').expect("table and key");
+                MODELS[case][key]
+            }
+            Self::Formula(text) => {
+                let value = evaluate(text, &[]);
+                value.unwrap_or_else(|error| panic!("{text}: {error}")).value()
+            }
+        }
+    }
+}
+
+/// All cases, in the order of the page.
+pub static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Table {
+        case: Vec<Case>,
+    }
+    let table: Result<Table, _> = toml::from_str(include_str!("../../../assets/validation/cases.toml"));
+    table.expect("a test reads it").case
+});
+
+/// Why a case has no result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ValidationError {
+    /// The scene, or a change of it.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// It does not start.
+    #[error(transparent)]
+    Start(#[from] StartError),
+    /// It stopped before its end.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// A channel that it does not have.
+    #[error(transparent)]
+    Channel(#[from] NoChannel),
+}
+
+/// The right value of a check, and ours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// The right value, SI unit.
+    pub right: f64,
+    /// Ours; not a number if the run does not show it.
+    pub ours: f64,
+    /// Largest difference allowed.
+    pub bound: f64,
+}
+
+impl Comparison {
+    /// Ours less the right value.
+    pub fn difference(&self) -> f64 {
+        self.ours - self.right
+    }
+
+    /// Whether the difference is within the bound.
+    pub fn holds(&self) -> bool {
+        self.difference().abs() <= self.bound
+    }
+}
+
+impl Case {
+    /// Runs the scene and compares every quantity.
+    ///
+    /// # Errors
+    /// A scene that does not load, start or run to the end.
+    pub fn compare(&self) -> Result<Vec<Comparison>, ValidationError> {
+        let scene = Scene::load(&self.scene, &self.changes)?;
+        let mut run = Run { simulation: Simulation::new(&scene)?, frame: Frame::default() };
+        let mut watches = Vec::with_capacity(self.checks.len());
+        for check in &self.checks {
+            watches.push(Watch::new(&check.measure, self.duration, &mut run)?);
+        }
+        let mut impacts = Vec::new();
+        while run.simulation.time() < self.duration {
+            run.simulation.step_until(self.duration)?;
+            run.simulation.take_impacts(&mut impacts);
+            for watch in &mut watches {
+                watch.follow(&mut run);
+            }
+        }
+        let pairs = self.checks.iter().zip(&watches);
+        let compare = |(check, watch): (&Check, &Watch)| Comparison {
+            right: check.right.value(),
+            ours: watch.result(&impacts),
+            bound: check.bound,
+        };
+        Ok(pairs.map(compare).collect())
+    }
+}
+
+struct Run {
+    simulation: Simulation,
+    frame: Frame,
+}
+
+impl Run {
+    /// A channel at an instant within the latest step.
+    fn read(&mut self, reading: Reading, time: f64) -> f64 {
+        self.simulation.sample(time, &mut self.frame);
+        reading.read(&self.frame).unwrap_or(f64::NAN)
+    }
+
+    fn reading(&mut self, channel: &str) -> Result<Reading, NoChannel> {
+        self.simulation.sample(self.simulation.time(), &mut self.frame);
+        let (_, readings) = chosen_columns(self.simulation.scene(), &self.frame, &[channel.to_owned()])?;
+        // The first is the time.
+        let [_, reading] = readings[..] else { panic!("{channel} is more than one channel") };
+        Ok(reading)
+    }
+}
+
+/// A measure while the run goes.
+enum Watch {
+    At { reading: Reading, time: f64, value: f64 },
+    Largest { reading: Reading, from: f64, value: f64 },
+    Period { reading: Reading, level: f64, before: f64, first: f64, last: f64, intervals: u32 },
+    Impact { number: usize, property: ImpactProperty },
+}
+
+impl Watch {
+    fn new(measure: &Measure, duration: f64, run: &mut Run) -> Result<Self, NoChannel> {
+        let at = |reading, time, run: &mut Run| {
+            let value = if time == 0.0 { run.read(reading, 0.0) } else { f64::NAN };
+            Self::At { reading, time, value }
+        };
+        Ok(match measure {
+            Measure::End(channel) => at(run.reading(channel)?, duration, run),
+            Measure::At { channel, time } => at(run.reading(channel)?, *time, run),
+            Measure::Largest { channel, from } => {
+                Self::Largest { reading: run.reading(channel)?, from: *from, value: f64::NAN }
+            }
+            Measure::Period { channel, level } => {
+                let reading = run.reading(channel)?;
+                let before = run.read(reading, 0.0);
+                Self::Period { reading, level: *level, before, first: f64::NAN, last: f64::NAN, intervals: 0 }
+            }
+            Measure::Impact { number, property } => Self::Impact { number: *number, property: *property },
+        })
+    }
+
+    /// Reads the latest step.
+    fn follow(&mut self, run: &mut Run) {
+        let (start, end) = (run.simulation.step_start(), run.simulation.time());
+        match self {
+            Self::At { reading, time, value } if start < *time && *time <= end => *value = run.read(*reading, *time),
+            // The first one takes the place of NaN.
+            Self::Largest { reading, from, value } if *from <= end => *value = value.max(run.read(*reading, end).abs()),
+            Self::Period { reading, level, before, first, last, intervals } => {
+                let now = run.read(*reading, end);
+                if *before < *level && *level <= now {
+                    let (mut below, mut above) = (start, end);
+                    // To the last bit.
+                    loop {
+                        let middle = 0.5 * (below + above);
+                        if middle <= below || above <= middle {
+                            break;
+                        }
+                        *(if run.read(*reading, middle) < *level { &mut below } else { &mut above }) = middle;
+                    }
+                    if first.is_nan() {
+                        *first = above;
+                    } else {
+                        *intervals += 1;
+                    }
+                    *last = above;
+                }
+                *before = now;
+            }
+            _ => {}
+        }
+    }
+
+    fn result(&self, impacts: &[Impact]) -> f64 {
+        match self {
+            Self::At { value, .. } | Self::Largest { value, .. } => *value,
+            // Not a number without an interval.
+            Self::Period { first, last, intervals, .. } => (last - first) / f64::from(*intervals),
+            Self::Impact { number, property } => impacts.get(number - 1).map_or(f64::NAN, |impact| property.of(impact)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jointplay_physics::scene::BENCHMARKS;
+
+    #[test]
+    fn every_benchmark_has_a_case_and_every_case_a_right_value() {
+        for name in BENCHMARKS {
+            assert!(CASES.iter().any(|case| case.scene == name), "{name}");
+        }
+        for check in CASES.iter().flat_map(|case| &case.checks) {
+            assert!(check.right.value().is_finite() && check.bound > 0.0, "{check:?}");
+        }
+    }
+
+    #[test]
+    fn every_number_of_the_models_is_compared() {
+        let used = |name: &str| {
+            let checks = CASES.iter().flat_map(|case| &case.checks);
+            checks.into_iter().any(|check| matches!(&check.right, Right::Model(own) if own == name))
+        };
+        for (case, numbers) in &*MODELS {
+            for key in numbers.keys() {
+                assert!(used(&format!("{case}.{key}")), "{case}.{key}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_machine_misses_its_bound() {
+        let pendulum = CASES.iter().find(|case| case.scene == "simple-pendulum").expect("a case");
+        let mut wrong = pendulum.clone();
+        wrong.changes.push(("gravity.z".to_owned(), "-9.81001 m/s^2".to_owned()));
+        let compare = |case: &Case| case.compare().expect("it runs");
+        assert!(compare(pendulum).iter().all(Comparison::holds));
+        assert!(!compare(&wrong).iter().any(Comparison::holds));
+    }
+
+    #[test]
+    fn what_a_run_does_not_show_does_not_hold() {
+        let pendulum = CASES.iter().find(|case| case.scene == "simple-pendulum").expect("a case");
+        for measure in [
+            Measure::Impact { number: 1, property: ImpactProperty::Peak },
+            Measure::Period { channel: "pivot.angle".to_owned(), level: 10.0 },
+            Measure::At { channel: "pivot.angle".to_owned(), time: 11.0 },
+        ] {
+            let mut case = pendulum.clone();
+            case.checks.truncate(1);
+            case.checks[0].measure = measure;
+            assert!(!case.compare().expect("it runs")[0].holds(), "{case:?}");
+        }
+    }
+}
