@@ -121,11 +121,11 @@ impl Accuracy {
     /// Reasons to doubt the result, in a space of fixed height.
     fn doubts_ui(&self, ui: &mut Ui, player: &Player) {
         // A doubt already shown beside a control is not repeated.
-        let said = player.warnings();
+        let said: Vec<&str> = player.warnings().collect();
         let doubts = player.simulation().doubts().into_iter();
         let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
         let none = if doubts.is_empty() { "No warnings so far" } else { "No warnings but those beside the controls" };
-        doubts.retain(|doubt| !said.contains(doubt));
+        doubts.retain(|doubt| !said.contains(&&**doubt));
         reserved(ui, "doubts", DOUBTS, |ui| {
             if let Some(problem) = &self.problem {
                 theme::error(ui, problem);

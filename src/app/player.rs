@@ -16,7 +16,7 @@ use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::presets::too_slow;
 use crate::analysis::section::Schedule;
-use crate::scene::{SOLVER_KEYS, Scene, Value};
+use crate::scene::{SOLVER_KEYS, Scene, Value, Warning};
 use crate::simulate::{
     ChangeError, Channels, ContactState, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS,
     Simulation, StartError, Stopped, Wear,
@@ -46,7 +46,7 @@ pub struct Player {
     /// The scene as its file gives it.
     original: Scene,
     /// What is allowed but may not do what the user expects.
-    warnings: Vec<String>,
+    warnings: Vec<Known>,
     playing: bool,
     /// Time runs backwards while it plays.
     backwards: bool,
@@ -129,11 +129,26 @@ const LEAST_MEASURED: f64 = 1e-3;
 /// Most instants recorded within one long step.
 const MOST_RECORDED: f64 = 64.0;
 
-/// The warnings of a scene, in sentences.
-fn sentences(scene: &Scene) -> Vec<String> {
-    let warnings = scene.warnings().into_iter();
-    let slow = too_slow(scene).map(|slow| slow.to_string());
-    warnings.map(|warning| warning.to_string()).chain(slow).collect()
+/// What to know about a scene before it runs.
+struct Known {
+    /// As [`Warning::key`].
+    key: Option<&'static str>,
+    sentence: String,
+}
+
+impl Known {
+    /// All of `scene`.
+    fn of(scene: &Scene) -> Vec<Self> {
+        let known = |warning: Warning| Self { key: warning.key(), sentence: warning.to_string() };
+        let slow = too_slow(scene).map(|slow| Self { key: Some("solver.preset"), sentence: slow.to_string() });
+        scene.warnings().into_iter().map(known).chain(slow).collect()
+    }
+
+    /// Whether it is about `key`, the scene's or a ball joint's.
+    fn is_about(&self, key: &str) -> bool {
+        let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
+        self.key.is_some_and(|own| own == last.unwrap_or(key))
+    }
 }
 
 impl Player {
@@ -151,7 +166,7 @@ impl Player {
             pacer: Pacer::default(),
             clock: wall,
             original,
-            warnings: sentences(scene),
+            warnings: Known::of(scene),
             playing: false,
             backwards: false,
             stopped: None,
@@ -207,7 +222,7 @@ impl Player {
             simulation: run(&self.simulation),
             unchanged: self.unchanged.as_ref().map(|unchanged| Box::new(run(unchanged))),
             original: self.original.clone(),
-            warnings: self.warnings.clone(),
+            warnings: Known::of(self.wanted()),
             playing: false,
             backwards: false,
             stopped: self.stopped.clone(),
@@ -773,7 +788,7 @@ impl Player {
     }
 
     fn after_change(&mut self) {
-        self.warnings = sentences(self.wanted());
+        self.warnings = Known::of(self.wanted());
         self.watch.begin(self.simulation.running_scene(), self.simulation.time());
         self.settling = Settling::new(self.simulation.running_scene());
         // Where the run is taken again, it has begun only later.
@@ -794,20 +809,14 @@ impl Player {
         self.wanted().changes.iter().any(|(key, _)| self.is_waiting(key))
     }
 
-    /// What is allowed but may not do what the user expects.
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
+    /// What is allowed but may not do what the user expects, in sentences.
+    pub fn warnings(&self) -> impl Iterator<Item = &str> {
+        self.warnings.iter().map(|known| &*known.sentence)
     }
 
     /// What to know about the present value of `key`, if anything.
     pub fn warning(&self, key: &str) -> Option<&str> {
-        let last = key.rsplit('.').next().unwrap_or(key);
-        let of_joint = format!(": {last} ");
-        let of_scene = format!("{key} ");
-        self.warnings
-            .iter()
-            .find(|warning| warning.contains(&of_joint) || warning.starts_with(&of_scene))
-            .map(String::as_str)
+        self.warnings.iter().find(|known| known.is_about(key)).map(|known| &*known.sentence)
     }
 
     /// Value that the scene's file gives `key`.

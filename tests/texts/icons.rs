@@ -10,6 +10,30 @@ use crate::documents::root;
 /// Background of the icon where none shows through, as on a phone.
 const GROUND: [u8; 3] = [0x14, 0x17, 0x1c];
 
+/// The picture as a PNG file of as many colours as it has: half as large, of a page that has to be loaded.
+fn with_palette(picture: &Pixmap) -> Vec<u8> {
+    let mut colours: Vec<[u8; 3]> = Vec::new();
+    let mut indices = Vec::new();
+    for pixel in picture.pixels() {
+        assert_eq!(pixel.alpha(), 255);
+        let colour = [pixel.red(), pixel.green(), pixel.blue()];
+        let known = colours.iter().position(|known| *known == colour);
+        indices.push(known.unwrap_or(colours.len()) as u8);
+        if known.is_none() {
+            colours.push(colour);
+        }
+    }
+    assert!(colours.len() <= 256, "{}", colours.len());
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, picture.width(), picture.height());
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_palette(colours.concat());
+    encoder.set_filter(png::Filter::NoFilter);
+    encoder.set_compression(png::Compression::High);
+    encoder.write_header().and_then(|mut writer| writer.write_image_data(&indices)).expect("in memory");
+    file
+}
+
 #[test]
 fn the_icon_is_drawn_from_the_svg() {
     let svg = fs::read_to_string(root().join("web/icon.svg")).expect("there");
@@ -22,7 +46,7 @@ fn the_icon_is_drawn_from_the_svg() {
     let margin = 0.14 * edge as f32;
     let scale = (edge as f32 - 2.0 * margin) / tree.size().width();
     resvg::render(&tree, Transform::from_translate(margin, margin).pre_scale(scale, scale), &mut picture.as_mut());
-    let drawn = picture.encode_png().expect("fits");
+    let drawn = with_palette(&picture);
     let path = root().join(format!("web/icon-{edge}.png"));
     if std::env::var_os("UPDATE_PAGES").is_some() {
         fs::write(&path, &drawn).expect("writable");

@@ -4,7 +4,7 @@
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
-use super::{FINEST_BIN, Player, sentences};
+use super::{FINEST_BIN, Known, Player};
 use crate::app::log::Event;
 use crate::app::paths::Paths;
 use crate::app::settled::Settling;
@@ -279,7 +279,7 @@ impl Player {
         self.watch.go_to(now);
         self.settling = Settling::new(self.simulation.running_scene());
         self.forget_peaks();
-        self.warnings = sentences(self.wanted());
+        self.warnings = Known::of(self.wanted());
         if anew {
             self.keyframes.forget_fine();
             let channels = self.history.channels();

@@ -158,9 +158,22 @@ impl Warning {
         WarningKind(std::mem::discriminant(self), doubt)
     }
 
+    /// Key of the parameter that it is about: `solver.step`, or without a section one that ball joints may have of their own.
+    pub fn key(&self) -> Option<&'static str> {
+        match self {
+            Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
+            Self::Doubt(Doubt::Clearance { .. }) => Some("clearance"),
+            Self::Doubt(Doubt::PrintedFriction { .. }) => Some("friction_velocity"),
+            Self::Doubt(Doubt::Step { .. }) => Some("solver.step"),
+            Self::Doubt(Doubt::Tolerance { .. }) => Some("solver.tolerance"),
+            Self::StiffFriction { .. } => Some("slip_speed_high"),
+            Self::Doubt(Doubt::MoreJoints) | Self::MeshUnit { .. } => None,
+        }
+    }
+
     /// Whether other `[solver]` settings would remove it.
     pub fn is_about_solver(&self) -> bool {
-        matches!(self, Self::Doubt(Doubt::Step { .. } | Doubt::Tolerance { .. }))
+        self.key().is_some_and(|key| key.starts_with("solver."))
     }
 }
 
