@@ -96,31 +96,26 @@ fn nothing_tells_of_what_is_still_to_come() {
 
 #[test]
 fn a_warning_stands_beside_the_parameter_that_it_is_about() {
-    let cases: [(&[(&str, &str)], &str, Option<&str>); 5] = [
-        (&[("contact.restitution", "0.3")], "contact.restitution", Some("joint.S2.restitution")),
-        (&[("joint.S2.clearance", "0.01 mm")], "contact.clearance", Some("joint.S2.clearance")),
-        (
-            &[("contact.slip_speed_low", "0.1 um/s"), ("contact.slip_speed_high", "0.5 um/s")],
-            "contact.slip_speed_high",
-            Some("joint.S1.slip_speed_high"),
-        ),
-        (&[("solver.method", "rk4"), ("solver.step", "50 us")], "solver.step", None),
-        (&[("solver.tolerance", "1e-2")], "solver.tolerance", None),
-    ];
-    for (changes, key, other) in cases {
+    let check = |changes: &[(&str, &str)], key: &str, of_joint: Option<&str>| {
         let mut player = player("spcmm");
         assert!(player.warnings().next().is_none());
         for (key, value) in changes {
             player.set(key, value).expect("in range");
         }
-        for key in [Some(key), other].into_iter().flatten() {
+        for key in [Some(key), of_joint].into_iter().flatten() {
             let said = player.warning(key).unwrap_or_else(|| panic!("nothing about {key}"));
             assert!(said.contains(key.rsplit('.').next().unwrap_or(key)), "{key}: {said}");
         }
         for silent in ["contact.friction", "gravity.x", "solver.preset"] {
             assert_eq!(player.warning(silent), None, "{key}");
         }
-    }
+    };
+    check(&[("contact.restitution", "0.3")], "contact.restitution", Some("joint.S2.restitution"));
+    check(&[("joint.S2.clearance", "0.01 mm")], "contact.clearance", Some("joint.S2.clearance"));
+    let slow = [("contact.slip_speed_low", "0.1 um/s"), ("contact.slip_speed_high", "0.5 um/s")];
+    check(&slow, "contact.slip_speed_high", Some("joint.S1.slip_speed_high"));
+    check(&[("solver.method", "rk4"), ("solver.step", "50 us")], "solver.step", None);
+    check(&[("solver.tolerance", "1e-2")], "solver.tolerance", None);
 }
 
 thread_local! {
