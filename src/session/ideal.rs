@@ -1,0 +1,406 @@
+//! The ideal motion beside the run: the same scene with every ball joint closed, under the same drives and gravity. It is
+//! computed only while shown, up to the displayed instant, and does not affect the run.
+
+use super::clock::Clock;
+use crate::scene::{Output, Scene, Vec3};
+use crate::simulate::{Frame, Simulation, Snapshot, StartError, Stopped, closed};
+use crate::view::output_point;
+
+/// States kept to go back to; at this number every second one is dropped.
+const KEPT: usize = 32;
+/// Initial interval between them, s.
+const APART: f64 = 1e-2;
+/// While the run is recorded, the ideal motion follows it if less than this behind, s, in at most this many steps.
+const NEAR: f64 = 0.02;
+const STEPS: u32 = 512;
+/// Stepping budget per frame on the way to the displayed instant, s.
+const BUDGET: f64 = 4e-3;
+
+/// Gravity of a run over time: the changes to the run that a motion computed beside it must follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gravity {
+    /// Start time, s, and value, m/s^2, in order.
+    since: Vec<(f64, Vec3)>,
+}
+
+impl Gravity {
+    /// Constant from the start.
+    pub fn new(gravity: Vec3) -> Self {
+        Self { since: vec![(f64::NEG_INFINITY, gravity)] }
+    }
+
+    /// The run has taken a step from `start`, s, under `gravity`; later entries belong to another future and are dropped.
+    /// Returns whether there were any, or whether the gravity is new.
+    pub fn observe(&mut self, start: f64, gravity: Vec3) -> bool {
+        let kept = self.since.partition_point(|(time, _)| *time <= start);
+        let forgets = kept < self.since.len();
+        self.since.truncate(kept.max(1));
+        let last = self.since.len() - 1;
+        if self.since[last].1 == gravity {
+            return forgets;
+        }
+        if self.since[last].0 == start {
+            self.since[last].1 = gravity;
+        } else {
+            self.since.push((start, gravity));
+        }
+        true
+    }
+
+    fn at(&self, time: f64) -> Vec3 {
+        let known = self.since.partition_point(|(since, _)| *since <= time);
+        self.since[known.max(1) - 1].1
+    }
+
+    /// Time of the next change after `time`, s.
+    fn next(&self, time: f64) -> f64 {
+        let known = self.since.partition_point(|(since, _)| *since <= time);
+        self.since.get(known).map_or(f64::INFINITY, |next| next.0)
+    }
+}
+
+/// The ideal motion of a scene.
+pub struct Ideal {
+    output: Output,
+    motion: Result<Motion, StartError>,
+}
+
+struct Motion {
+    simulation: Simulation,
+    /// At the latest requested instant that was reached.
+    frame: Frame,
+    /// In order of time; the first is the start.
+    kept: Vec<(f64, Snapshot)>,
+    apart: f64,
+    stopped: Option<Stopped>,
+}
+
+impl Ideal {
+    /// Of `scene`, at its start. If its loops do not close, or it is too large with closed joints, [`Self::fault`] says so.
+    pub fn new(scene: &Scene) -> Self {
+        let motion = Simulation::new(&closed(scene)).map(|mut simulation| {
+            let mut frame = Frame::default();
+            simulation.sample(simulation.time(), &mut frame);
+            Motion {
+                kept: vec![(simulation.time(), simulation.snapshot())],
+                simulation,
+                frame,
+                apart: APART,
+                stopped: None,
+            }
+        });
+        Self { output: scene.output.clone(), motion }
+    }
+
+    /// Advances to `time`, s, to which the run is recorded, if that is near.
+    pub(crate) fn follow(&mut self, time: f64, gravity: &Gravity) {
+        if let Ok(motion) = &mut self.motion
+            && time - motion.simulation.time() < NEAR
+        {
+            let mut left = STEPS;
+            motion.place(time, gravity, || {
+                left = left.saturating_sub(1);
+                left > 0
+            });
+        }
+    }
+
+    /// Advances to `time`, s, within the budget of a frame.
+    pub(crate) fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
+        if let Ok(motion) = &mut self.motion
+            && motion.frame.time != time
+        {
+            let start = clock();
+            motion.place(time, gravity, || clock() - start < BUDGET);
+        }
+    }
+
+    /// Gravity has changed at `time`, s, or the run branched there.
+    pub(crate) fn forget_after(&mut self, time: f64) {
+        if let Ok(motion) = &mut self.motion {
+            motion.kept.retain(|(kept, _)| *kept <= time);
+            if motion.simulation.time() > time {
+                motion.go_back(time);
+            }
+        }
+    }
+
+    /// The frame at `time`, s; `None` if that was not reached.
+    pub fn frame(&self, time: f64) -> Option<&Frame> {
+        let motion = self.motion.as_ref().ok()?;
+        (motion.frame.time == time).then_some(&motion.frame)
+    }
+
+    /// Whether it still has to reach `time`, s.
+    pub fn is_behind(&self, time: f64) -> bool {
+        let motion = self.motion.as_ref();
+        motion.is_ok_and(|motion| motion.frame.time != time && motion.stopped.is_none())
+    }
+
+    /// Output point of the run in `frame` minus the ideal one at that time, m; `None` if that time was not reached.
+    pub fn output_error(&self, frame: &Frame) -> Option<Vec3> {
+        let ideal = self.frame(frame.time)?;
+        Some(output_point(&self.output, frame)? - output_point(&self.output, ideal)?)
+    }
+
+    /// Why there is none, or none after some time.
+    pub fn fault(&self) -> Option<String> {
+        match &self.motion {
+            Err(error) => Some(format!("with ideal joints, {error}")),
+            Ok(motion) => motion.stopped.as_ref().map(|stopped| {
+                let time = super::value::time(stopped.time);
+                format!("with ideal joints, {} at {time}", stopped.fault)
+            }),
+        }
+    }
+}
+
+impl Motion {
+    /// Samples the state at `time`, s, into the frame, if it may take the steps needed to get there.
+    fn place(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
+        if time < self.simulation.step_start() {
+            self.go_back(time);
+        }
+        while self.simulation.time() < time {
+            if self.stopped.is_some() || !may_step() {
+                return;
+            }
+            let now = self.simulation.time();
+            self.keep(now);
+            let force = gravity.at(now);
+            if self.simulation.running_scene().gravity != force {
+                self.simulation.set_gravity(force);
+            }
+            self.stopped = self.simulation.step_until(gravity.next(now)).err();
+        }
+        self.simulation.sample(time, &mut self.frame);
+    }
+
+    /// Keeps the present state if the last one kept is old enough.
+    fn keep(&mut self, now: f64) {
+        let newest = self.kept.last().map_or(f64::NEG_INFINITY, |kept| kept.0);
+        if now < newest + self.apart {
+            return;
+        }
+        if self.kept.len() == KEPT {
+            let mut keep = false;
+            self.kept.retain(|_| {
+                keep = !keep;
+                keep
+            });
+            self.apart *= 2.0;
+        }
+        self.kept.push((now, self.simulation.snapshot()));
+    }
+
+    /// Restores the latest state kept at or before `time`, s.
+    fn go_back(&mut self, time: f64) {
+        let known = self.kept.partition_point(|(kept, _)| *kept <= time);
+        let Some((_, snapshot)) = self.kept.get(known.max(1) - 1) else {
+            return;
+        };
+        self.simulation.restore(snapshot);
+        self.stopped = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::BUILT_IN;
+    use crate::session::player::Player;
+    use crate::simulate::Quantity;
+
+    fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        Scene::load(name, &changes).expect("built in")
+    }
+
+    fn reach(player: &mut Player) {
+        for _ in 0..10_000 {
+            player.place_ghost();
+            if !player.is_ideal_behind() {
+                return;
+            }
+        }
+        panic!("never comes there");
+    }
+
+    /// The output point of `scene` at `time`, by a run of its own.
+    fn alone(scene: &Scene, output: &Output, time: f64) -> Vec3 {
+        let mut frame = Frame::default();
+        let mut run = Simulation::new(scene).expect("starts");
+        run.advance_to(time).expect("runs");
+        run.sample(time, &mut frame);
+        output_point(output, &frame).expect("has a body")
+    }
+
+    #[test]
+    fn the_error_is_that_of_two_runs_apart_and_costs_the_run_no_bit() {
+        for name in BUILT_IN {
+            let scene = scene(name, &[]);
+            let [mut with, mut without] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
+            with.set_ideal(true);
+            // Many loose joints take their time.
+            let part = if scene.ball_joints.len() > 3 { 0.4 } else { 1.0 };
+            for (turn, time) in [0.013, 0.03, 0.021_3].map(|time| part * time).into_iter().enumerate() {
+                if turn == 2 {
+                    // Back, and another way there.
+                    with.reset().expect("starts");
+                    without.reset().expect("starts");
+                }
+                with.run_to(time);
+                without.run_to(time);
+                reach(&mut with);
+                assert_eq!(with.simulation().state_hash(), without.simulation().state_hash(), "{name}");
+                let error = with.ideal().expect("on").output_error(with.frame());
+                let error = error.unwrap_or_else(|| panic!("{name}: none at {time}"));
+                let time = with.frame().time;
+                let two = alone(&scene, &scene.output, time) - alone(&closed(&scene), &scene.output, time);
+                let off = (error - two).norm();
+                assert!(off < 1e-12 + 1e-9 * two.norm(), "{name}: {off:e}");
+                assert!(two.norm() > 1e-6, "{name}: {two:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_probe_s_own_reference_says_the_same_and_the_record_has_it() {
+        let mut player = Player::new(&scene("spcmm", &[])).expect("starts");
+        player.set_ideal(true);
+        player.run_to(0.02);
+        reach(&mut player);
+        let error = player.ideal().expect("on").output_error(player.frame());
+        let probe = player.frame().probe_error.expect("has a closed form");
+        assert!((error.expect("came there") - probe).norm() < 1e-9);
+        let channel = player.channels().tip_error();
+        assert_eq!(player.channels().list()[channel].quantity, Quantity::TipError);
+        let mut bins = Vec::new();
+        player.history().bins(channel, 0.0, 0.02, 4000, &mut bins);
+        assert!(bins.len() > 50, "{}", bins.len());
+        let last = bins[bins.len() - 1];
+        assert!((last.greatest - probe.norm()).abs() < 2e-6 * probe.norm() + 1e-9);
+        player.set_ideal(false);
+        player.run_to(0.03);
+        let before = bins.len();
+        bins.clear();
+        player.history().bins(channel, 0.0, 0.02, 4000, &mut bins);
+        assert!(bins.len() <= before + 1, "what was not computed is not drawn");
+    }
+
+    #[test]
+    fn it_goes_back_with_the_run_and_feels_its_gravity() {
+        let changes = [("joint.B.clearance", "0"), ("joint.C.clearance", "0.1 mm")];
+        let scene = scene("slider-crank", &changes);
+        let mut player = Player::new(&scene).expect("starts");
+        player.set_ideal(true);
+        player.run_to(0.05);
+        reach(&mut player);
+        let change = player.simulation().time();
+        player.set("gravity.z", "0").expect("in range");
+        player.run_to(0.12);
+        reach(&mut player);
+        let time = player.frame().time;
+        let there = |player: &Player| {
+            let ideal = player.ideal().expect("on").frame(player.frame().time);
+            output_point(&scene.output, ideal.expect("came there")).expect("has a body")
+        };
+        let mut other = Simulation::new(&closed(&scene)).expect("starts");
+        let mut frame = Frame::default();
+        while other.time() < change {
+            other.step_until(change).expect("runs");
+        }
+        let mut weightless = scene.gravity;
+        weightless.z = 0.0;
+        other.set_gravity(weightless);
+        other.advance_to(time).expect("runs");
+        other.sample(time, &mut frame);
+        let expected = output_point(&scene.output, &frame).expect("has a body");
+        let off = (there(&player) - expected).norm();
+        assert!(off < 1e-9, "{off:e}");
+        // Switched on late, it still knows of the change.
+        player.set_ideal(false);
+        player.set_ideal(true);
+        reach(&mut player);
+        assert_eq!(there(&player), expected);
+        // Single steps back.
+        for _ in 0..20 {
+            player.single_step();
+        }
+        reach(&mut player);
+        for _ in 0..20 {
+            player.step_back();
+            reach(&mut player);
+        }
+        let time = player.frame().time;
+        other.advance_to(time).expect("runs");
+        let mut straight = Simulation::new(&closed(&scene)).expect("starts");
+        while straight.time() < change {
+            straight.step_until(change).expect("runs");
+        }
+        straight.set_gravity(weightless);
+        straight.advance_to(time).expect("runs");
+        straight.sample(time, &mut frame);
+        let expected = output_point(&scene.output, &frame).expect("has a body");
+        assert!((there(&player) - expected).norm() < 1e-9);
+    }
+
+    #[test]
+    fn states_kept_to_go_back_to_are_bounded_and_lead_everywhere() {
+        let scene = scene("pendulum", &[]);
+        let mut ideal = Ideal::new(&scene);
+        let gravity = Gravity::new(scene.gravity);
+        let at = |ideal: &mut Ideal, time: f64| {
+            let motion = ideal.motion.as_mut().expect("starts");
+            motion.place(time, &gravity, || true);
+            assert!(motion.kept.len() <= KEPT);
+            output_point(&scene.output, ideal.frame(time).expect("came there")).expect("a body")
+        };
+        let times: Vec<f64> = (0..60).map(|k| 0.05 * f64::from(k)).collect();
+        let forth: Vec<Vec3> = times.iter().map(|time| at(&mut ideal, *time)).collect();
+        for (time, there) in times.iter().zip(&forth).rev() {
+            assert_eq!(at(&mut ideal, *time), *there, "bit by bit at {time}");
+        }
+    }
+
+    #[test]
+    fn a_scene_that_does_not_close_says_so() {
+        // A rod between two sockets that are farther apart than its balls, by less than the play.
+        let text = crate::scene::built_in_text("pendulum").expect("built in");
+        let second = "
+            [[ball_joint]]
+            name = \"S2\"
+            socket = { body = \"world\", at = \"0 0 -200.2 mm\" }
+            ball = { body = \"rod\", at = \"0 0 -100 mm\" }
+            opening = [0, -1, 0]
+        ";
+        let text = text.replace("-30 deg", "0 deg") + second;
+        let scene = Scene::parse(&text, None, &[]).expect("reads");
+        let mut player = Player::new(&scene).expect("has play enough");
+        player.set_ideal(true);
+        player.run_to(0.01);
+        player.place_ghost();
+        let ideal = player.ideal().expect("on");
+        let fault = ideal.fault().expect("cannot close");
+        assert!(fault.contains("ball joint S"), "{fault}");
+        assert!(!player.is_ideal_behind() && ideal.output_error(player.frame()).is_none());
+    }
+
+    #[test]
+    fn gravity_is_that_of_the_way_that_the_run_took() {
+        let g = |z: f64| Vec3::new(0.0, 0.0, z);
+        let mut gravity = Gravity::new(g(-9.81));
+        assert!(!gravity.observe(0.0, g(-9.81)));
+        assert!(gravity.observe(1.0, g(-5.0)));
+        assert!(!gravity.observe(1.5, g(-5.0)));
+        assert!(gravity.observe(2.0, g(0.0)));
+        assert_eq!(gravity.at(0.5), g(-9.81));
+        assert_eq!((gravity.at(1.0), gravity.next(1.0)), (g(-5.0), 2.0));
+        // Back to 0.9: what came after is gone.
+        assert!(gravity.observe(0.9, g(-9.81)));
+        assert_eq!((gravity.at(3.0), gravity.next(0.0)), (g(-9.81), f64::INFINITY));
+        assert!(gravity.observe(1.2, g(1.0)) && gravity.observe(1.2, g(2.0)));
+        assert_eq!(gravity.at(1.2), g(2.0));
+    }
+}

@@ -1,0 +1,306 @@
+//! What was done to a run since its start: enough to take the same steps again and get the same bits.
+//!
+//! A change happens between two steps, so the number of steps taken says exactly when. Sampling and drawing never change a step
+//! and are not logged.
+
+use crate::analysis::section::Schedule;
+use crate::scene::{SOLVER_KEYS, Scene, Value, Vec3};
+use crate::simulate::{ChangeError, Effect, Pull, Simulation};
+
+/// Largest stiffness in N/m, and damping in N s/m, of a hand in a log.
+const STIFFEST: f64 = 1e9;
+
+/// What happened between two steps.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A parameter was given a value, as a user writes it.
+    Set {
+        /// Key.
+        key: String,
+        /// Value.
+        value: String,
+    },
+    /// A parameter was reset to the value in the scene's file.
+    Original {
+        /// Key.
+        key: String,
+    },
+    /// From here on steps end at `first`, at `first + interval`, and so on, at `sections` instants, s.
+    Sections {
+        /// The first.
+        first: Number,
+        /// From one to the next.
+        interval: Number,
+        /// How many.
+        sections: u64,
+    },
+    /// The user pulled, or let go.
+    Pull(Option<Pulled>),
+    /// A step was tried and the divergence guard refused it.
+    Stop,
+}
+
+impl Event {
+    /// A change of `key` to `value`.
+    pub fn set(key: &str, value: &str) -> Self {
+        Self::Set {
+            key: key.to_owned(),
+            // One line per event: line breaks count as spaces.
+            value: value.split_whitespace().collect::<Vec<_>>().join(" "),
+        }
+    }
+
+    /// Makes the change in `run`; `original` is the scene as its file gives it. Sections and a refused step change nothing: they are
+    /// for whoever steps the run.
+    ///
+    /// # Errors
+    /// As [`Simulation::set`]; nothing has changed then.
+    pub fn apply(&self, run: &mut Simulation, original: &Scene) -> Result<Effect, ChangeError> {
+        match self {
+            Self::Set { key, value } => {
+                let effect = run.set(key, value)?;
+                if key == "solver.preset" {
+                    // A preset chosen live must take effect: it replaces solver keys set by name before.
+                    for by_name in SOLVER_KEYS {
+                        run.set_value(by_name, &Value::Unset)?;
+                    }
+                }
+                Ok(effect)
+            }
+            Self::Original { key } => run.set_value(key, &original.get(key)?),
+            Self::Pull(pulled) => run.pull(pulled.map(Pull::from)).map(|()| Effect::Now),
+            Self::Sections { .. } | Self::Stop => Ok(Effect::Now),
+        }
+    }
+
+    /// The instants at which steps end from here on.
+    pub fn schedule(&self) -> Option<Schedule> {
+        let Self::Sections { first, interval, sections } = self else {
+            return None;
+        };
+        Some(Schedule {
+            first: first.0,
+            interval: interval.0,
+            sections: usize::try_from(*sections).unwrap_or(usize::MAX),
+            discard: 0,
+        })
+    }
+
+    /// Description of the event.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Set { key, value } => format!("{key} = {value}"),
+            Self::Original { key } => format!("{key} as in the scene file"),
+            Self::Sections { sections, .. } => format!("{sections} sections of a sweep"),
+            Self::Pull(Some(_)) => "pulled".to_owned(),
+            Self::Pull(None) => "let go".to_owned(),
+            Self::Stop => "stopped".to_owned(),
+        }
+    }
+}
+
+/// A pull: the body, and the numbers of a [`Pull`]: point, hand, stiffness, damping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pulled {
+    body: usize,
+    numbers: [Number; 8],
+}
+
+impl From<Pull> for Pulled {
+    fn from(pull: Pull) -> Self {
+        let (p, h) = (pull.point, pull.hand);
+        let numbers = [p.x, p.y, p.z, h.x, h.y, h.z, pull.stiffness, pull.damping];
+        Self { body: pull.body, numbers: numbers.map(Number) }
+    }
+}
+
+impl From<Pulled> for Pull {
+    fn from(pulled: Pulled) -> Self {
+        let [px, py, pz, hx, hy, hz, stiffness, damping] = pulled.numbers.map(|n| n.0);
+        Self { body: pulled.body, point: Vec3::new(px, py, pz), hand: Vec3::new(hx, hy, hz), stiffness, damping }
+    }
+}
+
+/// A finite number that is compared by its bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Number(pub f64);
+
+impl PartialEq for Number {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.to_bits() == other.0.to_bits()
+    }
+}
+
+impl Eq for Number {}
+
+/// An event and the number of steps taken before it since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Accepted steps before it.
+    pub steps: u64,
+    /// What happened.
+    pub event: Event,
+}
+
+/// The start of a run and every event since.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Log {
+    /// Changes of the scene's file that the run started with, in order.
+    pub base: Vec<(String, String)>,
+    /// Events in order.
+    pub entries: Vec<Entry>,
+}
+
+impl Log {
+    /// An empty log of a run that starts with these changes.
+    pub fn new(base: &[(String, String)]) -> Self {
+        Self { base: base.to_vec(), entries: Vec::new() }
+    }
+
+    /// Adds a change of `key` to `value`.
+    pub fn set(&mut self, steps: u64, key: &str, value: &str) {
+        self.push(steps, Event::set(key, value));
+    }
+
+    /// Adds an event.
+    pub fn push(&mut self, steps: u64, event: Event) {
+        self.entries.push(Entry { steps, event });
+    }
+
+    /// The entries as text: a line each, with the steps since the line before.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut before = 0;
+        for entry in &self.entries {
+            let steps = entry.steps.saturating_sub(before);
+            before = entry.steps;
+            text.push_str(&match &entry.event {
+                Event::Set { key, value } => format!("{steps} {key}={value}\n"),
+                Event::Original { key } => format!("{steps} {key}\n"),
+                Event::Sections { first, interval, sections } => {
+                    format!("{steps} |{} {} {sections}\n", first.0, interval.0)
+                }
+                Event::Pull(None) => format!("{steps} @\n"),
+                Event::Pull(Some(pulled)) => {
+                    let numbers = pulled.numbers.map(|number| number.0.to_string());
+                    format!("{steps} @{} {}\n", pulled.body, numbers.join(" "))
+                }
+                Event::Stop => format!("{steps} !\n"),
+            });
+        }
+        text
+    }
+
+    /// Reads what [`Self::text`] wrote.
+    ///
+    /// # Errors
+    /// The line that is not an entry.
+    pub fn read(base: Vec<(String, String)>, text: &str) -> Result<Self, String> {
+        let mut log = Self { base, entries: Vec::new() };
+        let mut before = 0_u64;
+        for line in text.lines() {
+            let wrong = || {
+                let start: String = line.chars().take(60).collect();
+                format!("`{start}` is not a line of a log")
+            };
+            let (steps, what) = line.split_once(' ').ok_or_else(wrong)?;
+            let more: u64 = steps.parse().map_err(|_| wrong())?;
+            before = before.checked_add(more).ok_or_else(wrong)?;
+            if what.is_empty() {
+                return Err(wrong());
+            }
+            if let Some(text) = what.strip_prefix('|') {
+                log.push(before, read_sections(text).ok_or_else(wrong)?);
+                continue;
+            }
+            if let Some(text) = what.strip_prefix('@') {
+                log.push(before, read_pull(text).ok_or_else(wrong)?);
+                continue;
+            }
+            log.push(
+                before,
+                match what.split_once('=') {
+                    Some((key, value)) => Event::Set { key: key.to_owned(), value: value.to_owned() },
+                    None if what == "!" => Event::Stop,
+                    None => Event::Original { key: what.to_owned() },
+                },
+            );
+        }
+        Ok(log)
+    }
+}
+
+/// Reads `FIRST INTERVAL SECTIONS`.
+fn read_sections(text: &str) -> Option<Event> {
+    let mut parts = text.split(' ');
+    let mut number = || {
+        let value = parts.next()?.parse::<f64>().ok()?;
+        (value.is_finite() && value > 0.0).then_some(Number(value))
+    };
+    let (first, interval) = (number()?, number()?);
+    let sections = parts.next()?.parse().ok()?;
+    parts.next().is_none().then_some(Event::Sections { first, interval, sections })
+}
+
+/// Reads `BODY` and eight numbers, or nothing.
+fn read_pull(text: &str) -> Option<Event> {
+    if text.is_empty() {
+        return Some(Event::Pull(None));
+    }
+    let (body, rest) = text.split_once(' ')?;
+    let numbers: Option<Vec<Number>> = rest
+        .split(' ')
+        .map(|part| part.parse::<f64>().ok())
+        .map(|value| value.filter(|value| value.is_finite()).map(Number))
+        .collect();
+    let numbers: [Number; 8] = numbers?.try_into().ok()?;
+    let soft = numbers[6..].iter().all(|n| (0.0..=STIFFEST).contains(&n.0));
+    let body = body.parse().ok()?;
+    soft.then_some(Event::Pull(Some(Pulled { body, numbers })))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_survives_as_text() {
+        let mut log = Log::new(&[("contact.friction".to_owned(), "0.2".to_owned())]);
+        log.set(0, "contact.clearance", " 0.5\n mm");
+        log.set(120, "joint.S1.clearance", "0.4 mm");
+        let key = "contact.clearance".to_owned();
+        log.push(120, Event::Original { key });
+        let sections = Event::Sections { first: Number(0.1 + 0.2), interval: Number(2.0), sections: 30 };
+        log.push(130, sections);
+        let pull = Pull {
+            body: 3,
+            point: Vec3::new(0.1, -1e-300, 0.0),
+            hand: Vec3::new(1.0 / 3.0, 2.0, 1e22),
+            stiffness: 700.5,
+            damping: 0.0,
+        };
+        log.push(131, Event::Pull(Some(pull.into())));
+        log.push(140, Event::Pull(None));
+        log.push(7_000_000_000, Event::Stop);
+        let text = log.text();
+        assert_eq!(text.lines().next(), Some("0 contact.clearance=0.5 mm"));
+        assert_eq!(Log::read(log.base.clone(), &text), Ok(log));
+        for bad in [
+            "x a=b",
+            "12",
+            "12 ",
+            "-1 a=b",
+            "1 a=b\n18446744073709551615 a=b",
+            "1 |2 2",
+            "1 |0 2 3",
+            "1 |1 NaN 3",
+            "1 |1 2 3 4",
+            "1 @0 1 2 3",
+            "1 @0 1 2 3 4 5 6 -7 8",
+            "1 @0 1 2 3 4 5 inf 7 8",
+            "1 @0 1 2 3 4 5 6 7 1e10",
+        ] {
+            assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
+        }
+    }
+}

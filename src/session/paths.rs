@@ -1,0 +1,167 @@
+//! The recent path of each ball in its socket, drawn by the microscope.
+
+use crate::scene::{Mat3, Scene};
+use crate::simulate::{Frame, RECORDED_JOINTS};
+
+/// Points kept of each ball joint.
+const KEPT: usize = 4096;
+/// A ball that has moved by less than this fraction of its clearance counts as unmoved.
+const GRAIN: f32 = 1e-3;
+
+/// Where a ball's centre was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// s.
+    pub time: f64,
+    /// From the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
+    pub place: [f32; 3],
+}
+
+/// The latest path of each of the first [`RECORDED_JOINTS`] ball joints.
+#[derive(Clone, Default)]
+pub struct Paths {
+    joints: Vec<Path>,
+}
+
+#[derive(Clone)]
+struct Path {
+    /// The body that carries the socket; `None` is the world.
+    carrier: Option<usize>,
+    points: Vec<Point>,
+}
+
+/// Axes of body `body` as columns; those of the world for `None`.
+pub fn axes_of(frame: &Frame, body: Option<usize>) -> Mat3 {
+    body.and_then(|body| frame.bodies.get(body)).map_or_else(Mat3::identity, |motion| motion.rotation)
+}
+
+impl Paths {
+    /// Empty paths for `scene`.
+    pub fn new(scene: &Scene) -> Self {
+        let joints = scene.ball_joints.iter().take(RECORDED_JOINTS);
+        let path = |joint: &crate::scene::BallJoint| Path { carrier: joint.socket.body, points: Vec::new() };
+        Self { joints: joints.map(path).collect() }
+    }
+
+    /// Records an instant of the run. One earlier than the latest begins another future: what came after it is dropped.
+    pub fn record(&mut self, frame: &Frame) {
+        for (path, joint) in self.joints.iter_mut().zip(&frame.joints) {
+            let points = &mut path.points;
+            while points.last().is_some_and(|last| last.time > frame.time) {
+                points.pop();
+            }
+            let here = axes_of(frame, path.carrier).tr_mul(&joint.eccentricity);
+            let place = [here.x as f32, here.y as f32, here.z as f32];
+            let grain = GRAIN * joint.clearance as f32;
+            let moved = |last: &Point| {
+                let squares = last.place.iter().zip(&place).map(|(a, b)| (a - b) * (a - b));
+                squares.sum::<f32>() > grain * grain
+            };
+            // In an ideal joint the ball cannot move.
+            if joint.clearance <= 0.0 || !points.last().is_none_or(moved) {
+                continue;
+            }
+            if points.len() == KEPT {
+                // Half at once: shifting all of them for every point would be too costly.
+                points.drain(..KEPT / 2);
+            }
+            let time = frame.time;
+            points.push(Point { time, place });
+        }
+    }
+
+    /// The path of ball joint `joint` from `from` to `to`, s, the oldest point first; empty where none is recorded.
+    pub fn between(&self, joint: usize, from: f64, to: f64) -> &[Point] {
+        let Some(path) = self.joints.get(joint) else {
+            return &[];
+        };
+        let start = path.points.partition_point(|point| point.time < from);
+        let end = path.points.partition_point(|point| point.time <= to);
+        &path.points[start..end.max(start)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::player::Player;
+    use crate::simulate::Simulation;
+
+    const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
+    fn player(scene: &str) -> Player {
+        let scene = Scene::load(scene, &[]).expect("built in");
+        Player::new(&scene).expect("starts")
+    }
+
+    #[test]
+    fn a_path_is_where_the_run_had_the_ball_seen_from_its_socket() {
+        // The crank turns the socket of B; slider-crank has a clearance at C alone, so that B is ideal and stays where it is.
+        let changes = [("joint.B.clearance".to_owned(), "0.3 mm".to_owned())];
+        let scene = Scene::load("slider-crank", &changes).expect("built in");
+        let mut player = Player::new(&scene).expect("starts");
+        player.run_to(0.05);
+        let mut other = Simulation::new(&scene).expect("starts");
+        let mut frame = Frame::default();
+        for (joint, spec) in scene.ball_joints.iter().enumerate() {
+            let points = player.paths().between(joint, ALL.0, ALL.1);
+            assert!(points.len() > 100, "{}: {}", spec.name, points.len());
+            assert!(points.is_sorted_by(|a, b| a.time < b.time));
+        }
+        let points = player.paths().between(0, ALL.0, ALL.1);
+        let (mut at, mut turned) = (0, 0.0_f64);
+        while at < points.len() {
+            let point = points[at];
+            while other.time() < point.time {
+                other.step().expect("runs");
+            }
+            other.sample(point.time, &mut frame);
+            let joint = &frame.joints[0];
+            let carrier = axes_of(&frame, scene.ball_joints[0].socket.body);
+            let seen = carrier * crate::scene::Vec3::from(point.place.map(f64::from));
+            let off = (seen - joint.eccentricity).norm();
+            assert!(off < 1e-9, "{off:e} m at {} s", point.time);
+            turned = turned.max((carrier - Mat3::identity()).norm());
+            at += 7;
+        }
+        assert!(turned > 0.1, "the socket turns: {turned}");
+    }
+
+    #[test]
+    fn what_lies_ahead_of_a_step_back_is_forgotten_and_memory_is_bounded() {
+        let mut player = player("spcmm");
+        player.run_to(8.6e-3);
+        // The rest of the displayed step is recorded by the next.
+        player.single_step();
+        player.step_back();
+        let shown = player.pacer.shown();
+        let before = player.paths().between(0, ALL.0, shown).to_vec();
+        for _ in 0..30 {
+            player.single_step();
+        }
+        let shown = player.pacer.shown();
+        assert!(player.paths().between(0, ALL.0, ALL.1).len() > before.len());
+        for _ in 0..30 {
+            player.step_back();
+        }
+        let now = player.pacer.shown();
+        assert_eq!(player.paths().between(0, ALL.0, now), before);
+        player.set("contact.friction", "0.5").expect("in range");
+        player.run_to(shown);
+        let points = player.paths().between(0, ALL.0, ALL.1);
+        assert!(points.is_sorted_by(|a, b| a.time < b.time));
+        assert_eq!(points[..before.len()], before);
+
+        let mut paths = Paths::new(player.scene());
+        let mut frame = player.frame().clone();
+        for step in 0..20_000 {
+            frame.time = f64::from(step) * 1e-5;
+            frame.joints[0].eccentricity.x = 1e-4 * f64::from(step % 3);
+            paths.record(&frame);
+            assert!(paths.between(0, ALL.0, ALL.1).len() <= KEPT);
+        }
+        assert_eq!(paths.between(0, 0.19999, ALL.1).len(), 1);
+        // A ball at rest is one point.
+        assert!(paths.between(1, ALL.0, ALL.1).len() == 1);
+    }
+}

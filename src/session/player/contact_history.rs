@@ -1,0 +1,165 @@
+//! When each ball joint was free, slid or crept.
+
+use crate::simulate::{ContactState, Frame};
+
+/// Most state changes kept for all joints together; beyond that the older half is dropped.
+const KEPT: usize = 200_000;
+
+/// The contact states of a run over time. A stretch recorded again after going back is kept once.
+#[derive(Clone, Debug, Default)]
+pub struct ContactHistory {
+    /// By ball joint: start time, s, and state.
+    joints: Vec<Vec<(f64, ContactState)>>,
+    changes: usize,
+    from: f64,
+    to: f64,
+}
+
+impl ContactHistory {
+    /// Begins a new run at `time`, s.
+    pub(super) fn begin(&mut self, time: f64) {
+        self.joints.clear();
+        self.changes = 0;
+        (self.from, self.to) = (time, f64::NEG_INFINITY);
+    }
+
+    /// Records the next instant of the run.
+    pub(super) fn record(&mut self, frame: &Frame) {
+        if frame.time <= self.to {
+            return;
+        }
+        self.to = frame.time;
+        self.joints.resize_with(frame.joints.len(), Vec::new);
+        for (states, now) in self.joints.iter_mut().zip(&frame.joints) {
+            if states.last().is_none_or(|(_, state)| *state != now.state) {
+                states.push((frame.time, now.state));
+                self.changes += 1;
+            }
+        }
+        if self.changes > KEPT {
+            self.forget_half();
+        }
+    }
+
+    fn forget_half(&mut self) {
+        let middle = 0.5 * (self.from + self.to);
+        self.from = middle;
+        for states in &mut self.joints {
+            let gone = states.partition_point(|(time, _)| *time <= middle);
+            states.drain(..gone.saturating_sub(1));
+            if let Some(first) = states.first_mut() {
+                first.0 = first.0.max(middle);
+            }
+        }
+        self.changes = self.joints.iter().map(Vec::len).sum();
+    }
+
+    /// Forgets what came after `time`, s.
+    pub(super) fn cut(&mut self, time: f64) {
+        for states in &mut self.joints {
+            states.truncate(states.partition_point(|(from, _)| *from <= time));
+        }
+        self.changes = self.joints.iter().map(Vec::len).sum();
+        self.to = self.to.min(time);
+    }
+
+    /// Number of ball joints.
+    pub fn joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Time from which the states are known, s.
+    pub fn known_from(&self) -> f64 {
+        self.from
+    }
+
+    /// The states of ball joint `joint` between two times, s: start, end, state.
+    pub fn states(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, ContactState)> {
+        let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
+        let first = states.partition_point(|(time, _)| *time <= from);
+        let all = states[first.saturating_sub(1)..].iter().enumerate();
+        let at = first.saturating_sub(1);
+        all.take_while(move |(_, (time, _))| *time < to).map(move |(index, (time, state))| {
+            let next = states.get(at + index + 1);
+            (*time, next.map_or(self.to, |next| next.0), *state)
+        })
+    }
+
+    /// Times between two given ones, s, at which ball joint `joint` came into contact.
+    pub fn touches(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
+        let first = states.partition_point(|(time, _)| *time < from);
+        let pairs = states[first.saturating_sub(1)..].windows(2);
+        let touches = |pair: &&[(f64, ContactState)]| {
+            pair[0].1 == ContactState::Free && matches!(pair[1].1, ContactState::Slip | ContactState::Creep)
+        };
+        pairs
+            .filter(touches)
+            .map(|pair| pair[1].0)
+            .filter(move |time| *time >= from)
+            .take_while(move |time| *time <= to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::JointReport;
+
+    fn frame(time: f64, state: ContactState) -> Frame {
+        Frame { time, joints: vec![JointReport { state, ..JointReport::default() }], ..Frame::default() }
+    }
+
+    fn history() -> ContactHistory {
+        use ContactState::{Creep, Free, Slip};
+        let mut history = ContactHistory::default();
+        history.begin(0.0);
+        let states = [Free, Free, Slip, Creep, Free, Slip, Slip];
+        for (index, state) in states.into_iter().enumerate() {
+            history.record(&frame(index as f64, state));
+        }
+        history
+    }
+
+    #[test]
+    fn states_follow_one_another_without_gaps() {
+        use ContactState::{Creep, Free, Slip};
+        let history = history();
+        let all: Vec<_> = history.states(0, 0.0, 9.0).collect();
+        let expected = [(0.0, 2.0, Free), (2.0, 3.0, Slip), (3.0, 4.0, Creep), (4.0, 5.0, Free), (5.0, 6.0, Slip)];
+        assert_eq!(all, expected);
+        let part: Vec<_> = history.states(0, 2.5, 3.5).collect();
+        assert_eq!(part, expected[1..3]);
+        assert_eq!(history.states(1, 0.0, 9.0).count(), 0);
+    }
+
+    #[test]
+    fn touches_are_found_and_a_second_time_changes_nothing() {
+        let mut history = history();
+        for _ in 0..2 {
+            let touches: Vec<f64> = history.touches(0, 0.0, 9.0).collect();
+            assert_eq!(touches, [2.0, 5.0]);
+            history.record(&frame(1.0, ContactState::Creep));
+        }
+        history.cut(2.5);
+        assert_eq!(history.touches(0, 2.1, 9.0).next(), None);
+        history.record(&frame(3.0, ContactState::Free));
+        history.record(&frame(4.0, ContactState::Creep));
+        assert_eq!(history.touches(0, 2.1, 9.0).next(), Some(4.0));
+    }
+
+    #[test]
+    fn a_long_run_forgets_its_oldest_states_and_says_from_when_it_knows() {
+        let mut history = ContactHistory::default();
+        history.begin(0.0);
+        for index in 0..=KEPT + 10 {
+            let state = if index % 2 == 0 { ContactState::Free } else { ContactState::Slip };
+            history.record(&frame(index as f64, state));
+        }
+        let from = history.known_from();
+        assert!(from > 0.4 * KEPT as f64);
+        let (start, ..) = history.states(0, 0.0, 1e9).next().expect("kept");
+        assert_eq!(start, from);
+        assert!(history.changes <= KEPT / 2 + 12);
+    }
+}

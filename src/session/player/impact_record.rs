@@ -1,0 +1,415 @@
+//! The impacts of a run from their beginning on: how hard each struck and when, and once it is over what `run --impacts` writes of it.
+
+use std::collections::VecDeque;
+
+use crate::scene::Vec3;
+use crate::simulate::{Impact, Peak, Simulation};
+
+/// Most impacts kept; beyond that the oldest are dropped.
+const KEPT: usize = 20_000;
+
+/// How long after its beginning the end of an impact is waited for, s. Of one that lasts longer, as of a ball that comes to rest
+/// on its wall, the peak is that of this time.
+pub const LONGEST_IMPACT: f64 = 10e-3;
+
+/// Among so many of the latest impacts the last to end is sought.
+const RECENT: usize = 64;
+
+/// Instants of a record and of an impact differ by this, relative.
+const ROUNDING: f64 = 1e-12;
+
+/// The largest normal force of an impact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Top {
+    /// When, s.
+    pub time: f64,
+    /// Force on the ball, N, world axes.
+    pub force: Vec3,
+}
+
+/// An impact.
+#[derive(Clone, Debug)]
+pub struct RecordedImpact {
+    /// Ball joint.
+    pub joint: usize,
+    /// When it began, s: as long as it is not over, to within a step.
+    pub start: f64,
+    /// When the ball left its wall, s; infinite while it touches, and until its next impact if a change took the wall away.
+    pub end: f64,
+    /// Its largest force.
+    pub top: Top,
+    /// Numbers of the steps with which it began, and with which its end was known.
+    steps: [u64; 2],
+    impact: Option<Impact>,
+}
+
+impl RecordedImpact {
+    /// All that is known of it once it is over; `None` before, and if a change of the contact ended it.
+    pub fn finished(&self) -> Option<&Impact> {
+        self.impact.as_ref()
+    }
+
+    /// Whether it had begun by `time`, s.
+    fn begun(&self, time: f64) -> bool {
+        self.start <= time + ROUNDING * time.abs()
+    }
+}
+
+/// The impacts of a run in the order in which they began. Steps taken again after going back add none.
+#[derive(Clone, Debug, Default)]
+pub struct ImpactRecord {
+    all: VecDeque<RecordedImpact>,
+    dropped: u64,
+    /// Largest force so far of the impact under way, by joint.
+    under_way: Vec<Option<Top>>,
+    /// Accepted steps up to which all is recorded, and beginning and end of the latest of them, s.
+    steps: u64,
+    latest_step: [f64; 2],
+    /// Those that ended with the latest step.
+    ended: Vec<Impact>,
+}
+
+impl ImpactRecord {
+    /// Begins a new run; `peaks` tell of the impacts that begin with it.
+    pub(super) fn begin(&mut self, peaks: &[Peak]) {
+        *self = Self { under_way: vec![None; peaks.len()], ..Self::default() };
+        for (joint, peak) in peaks.iter().enumerate().filter(|(_, peak)| begins(peak)) {
+            self.add(joint, peak);
+        }
+    }
+
+    /// Records the latest step with its `peaks`; to be called after every step.
+    pub(super) fn record(&mut self, simulation: &mut Simulation, peaks: &[Peak]) {
+        let mut ended = std::mem::take(&mut self.ended);
+        ended.clear();
+        simulation.take_impacts(&mut ended);
+        let steps = simulation.statistics().steps;
+        if steps > self.steps {
+            self.steps = steps;
+            self.latest_step = [simulation.step_start(), simulation.time()];
+            for (joint, peak) in peaks.iter().enumerate() {
+                self.record_joint(joint, peak, ended.iter().find(|impact| impact.joint == joint));
+            }
+        }
+        self.ended = ended;
+    }
+
+    fn record_joint(&mut self, joint: usize, peak: &Peak, ended: Option<&Impact>) {
+        let begins = begins(peak);
+        // What ends began with an earlier step, or with this one.
+        let (before, now) = match ended {
+            Some(impact) if begins && impact.start >= self.latest_step[0] => (None, ended),
+            _ => (ended, None),
+        };
+        if let Some(impact) = before {
+            self.raise(joint, peak);
+            self.end(joint, impact.end, Some(impact));
+        }
+        if begins {
+            self.add(joint, peak);
+        }
+        self.raise(joint, peak);
+        if let Some(impact) = now {
+            self.end(joint, impact.end, Some(impact));
+        }
+    }
+
+    fn add(&mut self, joint: usize, peak: &Peak) {
+        // Without a force yet, it begins where the step ends.
+        let start = self.latest_step[usize::from(peak.normal <= 0.0)];
+        // A change has taken the wall away from the one before.
+        self.end(joint, start, None);
+        if self.all.len() == KEPT {
+            self.all.pop_front();
+            self.dropped += 1;
+        }
+        let top = Top { time: start, force: Vec3::zeros() };
+        self.under_way[joint] = Some(top);
+        let steps = [self.steps, u64::MAX];
+        self.all.push_back(RecordedImpact { joint, start, end: f64::INFINITY, top, steps, impact: None });
+    }
+
+    /// Takes the force of the latest step for the impact of `joint` under way.
+    fn raise(&mut self, joint: usize, peak: &Peak) {
+        let Some(top) = &mut self.under_way[joint] else {
+            return;
+        };
+        if peak.normal <= top.force.norm() || peak.time < top.time {
+            return;
+        }
+        *top = Top { time: peak.time, force: peak.normal_force };
+        let top = *top;
+        let own = self.all.iter_mut().rev().find(|impact| impact.joint == joint);
+        if let Some(own) = own.filter(|own| top.time <= own.start + LONGEST_IMPACT) {
+            own.top = top;
+        }
+    }
+
+    /// The contact of `joint` ended at `time`, s, as `impact` if it was one until then.
+    fn end(&mut self, joint: usize, time: f64, impact: Option<&Impact>) {
+        let Some(top) = self.under_way[joint].take() else {
+            return;
+        };
+        let Some(at) = self.all.iter().rposition(|own| own.joint == joint && own.end.is_infinite()) else {
+            return;
+        };
+        let Some(mut own) = self.all.remove(at) else {
+            return;
+        };
+        (own.end, own.steps[1], own.impact) = (time, self.steps, impact.copied());
+        if let Some(impact) = impact {
+            (own.start, own.top) = (impact.start, top);
+        }
+        // Another may have begun earlier in the same step.
+        let at = self.all.partition_point(|other| other.start <= own.start);
+        self.all.insert(at, own);
+    }
+
+    /// Forgets what came after `time`, s, and step number `steps`.
+    pub(super) fn cut(&mut self, time: f64, steps: u64) {
+        self.all.retain(|impact| impact.steps[0] <= steps);
+        self.under_way.fill(None);
+        for impact in &mut self.all {
+            if impact.steps[1] > steps {
+                (impact.end, impact.steps[1], impact.impact) = (f64::INFINITY, u64::MAX, None);
+                if impact.top.time > time {
+                    impact.top = Top { time: impact.start, force: Vec3::zeros() };
+                }
+                self.under_way[impact.joint] = Some(impact.top);
+            }
+        }
+        self.steps = self.steps.min(steps);
+        self.latest_step = self.latest_step.map(|end| end.min(time));
+    }
+
+    /// All that are kept, in order, with their numbers in the run, from 1.
+    fn numbered(&self) -> impl DoubleEndedIterator<Item = (u64, &RecordedImpact)> {
+        let first = self.dropped + 1;
+        self.all.iter().enumerate().map(move |(at, impact)| (first + at as u64, impact))
+    }
+
+    /// The impacts that had ended by `time`, s, with their numbers in the run, from 1.
+    pub fn until(&self, time: f64) -> impl DoubleEndedIterator<Item = (u64, &RecordedImpact, &Impact)> {
+        let ended = self.numbered().filter(move |(_, impact)| impact.end <= time);
+        ended.filter_map(|(number, own)| Some((number, own, own.finished()?)))
+    }
+
+    /// The impacts of ball joint `joint`, or of any, that had begun by `time`, s, and whose end is known; the latest first.
+    pub fn latest(&self, joint: Option<usize>, time: f64) -> impl Iterator<Item = &Impact> {
+        let begun = self.all.iter().rev().filter(move |impact| impact.begun(time) && is_of(joint, impact));
+        begun.filter_map(RecordedImpact::finished)
+    }
+
+    /// Of the latest impacts that had begun by `time`, s, the one that ended last, but not after `end`, s.
+    pub fn last_ended(&self, time: f64, end: f64) -> Option<&Impact> {
+        let ended = self.latest(None, time).filter(|impact| impact.end <= end);
+        ended.take(RECENT).max_by(|a, b| a.end.total_cmp(&b.end))
+    }
+
+    /// The impact under way at `time`, s, once its peak is known, but no ball that rests: of ball joint `joint`, or of any; of several the one that has its
+    /// peak then, or else the one that began last.
+    pub fn under_way(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {
+        let touching = || {
+            let own = self.numbered().rev().filter(move |(_, impact)| is_of(joint, impact));
+            let touches = move |impact: &RecordedImpact| match impact.end {
+                end if end.is_infinite() => time <= impact.start + LONGEST_IMPACT,
+                end => time <= end,
+            };
+            own.filter(move |(_, impact)| impact.begun(time) && touches(impact) && !self.is_open(impact))
+        };
+        touching().find(|(_, impact)| impact.top.time == time).or_else(|| touching().next())
+    }
+
+    /// Whether the peak of `impact` may still be to come.
+    fn is_open(&self, impact: &RecordedImpact) -> bool {
+        impact.end.is_infinite() && self.latest_step[1] <= impact.start + LONGEST_IMPACT
+    }
+
+    /// The first peak after `time`, s, of an impact of ball joint `joint`, or of any. `None` as long as an earlier one may come;
+    /// with `at_once` what is known so far.
+    pub fn next_peak(&self, joint: Option<usize>, time: f64, at_once: bool) -> Option<f64> {
+        let own = || self.all.iter().filter(|impact| is_of(joint, impact));
+        let peaks = own().map(|impact| impact.top.time).filter(|peak| *peak > time);
+        let next = peaks.min_by(f64::total_cmp)?;
+        let open = own().any(|impact| self.is_open(impact) && impact.start <= next);
+        (at_once || !open).then_some(next)
+    }
+
+    /// The last peak before `time`, s, of an impact of ball joint `joint`, or of any.
+    pub fn previous_peak(&self, joint: Option<usize>, time: f64) -> Option<f64> {
+        // A force that is largest in the latest step may still rise.
+        let rises = |impact: &RecordedImpact| self.is_open(impact) && impact.top.time >= self.latest_step[0];
+        let own = self.all.iter().filter(|impact| is_of(joint, impact) && !rises(impact));
+        own.map(|impact| impact.top.time).filter(|peak| *peak < time).max_by(f64::total_cmp)
+    }
+
+    /// The peaks after `from` and up to `to`, s, with the ball joint of each.
+    pub fn peaks(&self, from: f64, to: f64) -> impl Iterator<Item = (usize, Top)> {
+        let within = move |top: &Top| top.time > from && top.time <= to && top.force != Vec3::zeros();
+        self.all.iter().map(|impact| (impact.joint, impact.top)).filter(move |(_, top)| within(top))
+    }
+
+    /// Number of impacts that are no longer kept.
+    pub fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+/// Whether an impact begins in the step of `peak`. A ball that comes to its wall without any speed does not strike it.
+fn begins(peak: &Peak) -> bool {
+    peak.impacts > 0 && peak.approach_speed > 0.0
+}
+
+fn is_of(joint: Option<usize>, impact: &RecordedImpact) -> bool {
+    joint.is_none_or(|joint| joint == impact.joint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seconds of a step.
+    const STEP: f64 = 1e-3;
+
+    /// Peak of a step, N, at the end of step `k`; `speed`: an impact begins with it.
+    fn peak(k: u64, force: f64, speed: Option<f64>) -> Peak {
+        Peak {
+            normal: force,
+            time: if force > 0.0 { k as f64 * STEP } else { 0.0 },
+            normal_force: Vec3::new(force, 0.0, 0.0),
+            impacts: u32::from(speed.is_some()),
+            approach_speed: speed.unwrap_or(0.0),
+            ..Peak::default()
+        }
+    }
+
+    /// The steps of one joint each: its forces, N, from step `k` on; the first begins an impact, and the last ends it if it `ends`.
+    fn contact(record: &mut ImpactRecord, joint: usize, k: u64, forces: &[f64], ends: bool) {
+        let last = k + forces.len() as u64 - 1;
+        for (now, force) in (k..).zip(forces) {
+            (record.steps, record.latest_step) = (now, [(now - 1) as f64 * STEP, now as f64 * STEP]);
+            let [start, end] = [k as f64 * STEP, last as f64 * STEP];
+            let impact = Impact { joint, start, end, ..Impact::default() };
+            let ended = Some(&impact).filter(|_| ends && now == last);
+            record.record_joint(joint, &peak(now, *force, (now == k).then_some(0.1)), ended);
+        }
+    }
+
+    fn record() -> ImpactRecord {
+        let mut record = ImpactRecord::default();
+        record.begin(&[Peak::default(); 2]);
+        contact(&mut record, 0, 2, &[0.0, 5.0, 9.0, 4.0], true);
+        contact(&mut record, 1, 7, &[0.0, 3.0, 1.0, 6.0, 2.0], true);
+        record
+    }
+
+    #[test]
+    fn impacts_have_their_numbers_and_peaks_and_are_found_both_ways() {
+        let mut record = record();
+        let numbers = |record: &ImpactRecord, time| record.until(time).map(|(number, ..)| number).collect::<Vec<_>>();
+        assert_eq!(numbers(&record, 4e-3), [0; 0]);
+        assert_eq!(numbers(&record, 5e-3), [1]);
+        assert_eq!(numbers(&record, 1.0), [1, 2]);
+        // The one that is hit again has its larger peak.
+        assert_eq!(
+            [record.next_peak(None, 0.0, false), record.next_peak(None, 4e-3, false)],
+            [Some(4e-3), Some(10e-3)]
+        );
+        assert_eq!(record.next_peak(Some(1), 0.0, false), Some(10e-3));
+        assert_eq!(record.next_peak(None, 10e-3, true), None);
+        assert_eq!([record.previous_peak(None, 1.0), record.previous_peak(None, 10e-3)], [Some(10e-3), Some(4e-3)]);
+        assert_eq!(record.previous_peak(Some(1), 10e-3), None);
+        let at = |joint, time| record.under_way(joint, time).map(|(number, _)| number);
+        assert_eq!([at(None, 2e-3), at(None, 6e-3), at(Some(0), 9e-3), at(None, 9e-3)], [Some(1), None, None, Some(2)]);
+        let peaks: Vec<(usize, f64)> = record.peaks(0.0, 9.9e-3).map(|(joint, top)| (joint, top.force.x)).collect();
+        assert_eq!(peaks, [(0, 9.0)]);
+        assert_eq!(record.latest(None, 8e-3).next().map(|impact| impact.joint), Some(1));
+        assert_eq!(record.latest(Some(0), 8e-3).count(), 1);
+        // Taken again after going back, steps would add nothing; in another future they do.
+        record.cut(8e-3, 8);
+        assert_eq!(numbers(&record, 1.0), [1]);
+        assert_eq!(record.next_peak(None, 4e-3, false), None, "it is under way again");
+        contact(&mut record, 0, 9, &[0.0, 1.0, 0.5], true);
+        record.record_joint(
+            1,
+            &peak(12, 8.0, None),
+            Some(&Impact { joint: 1, start: 7e-3, end: 12e-3, ..Impact::default() }),
+        );
+        assert_eq!(numbers(&record, 1.0), [1, 2, 3]);
+        assert_eq!(record.previous_peak(None, 1.0), Some(12e-3));
+    }
+
+    #[test]
+    fn of_several_the_one_with_its_peak_then_is_meant_and_else_the_one_that_began_last() {
+        let mut record = ImpactRecord::default();
+        record.begin(&[Peak::default(); 2]);
+        // Both in the steps 1 to 5.
+        for k in 1..=5_u64 {
+            (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
+            for (joint, top) in [(0, 2), (1, 4)] {
+                let impact = Impact { joint, start: STEP, end: 5e-3, ..Impact::default() };
+                let force = if k == 1 { 0.0 } else { 9.0 - k.abs_diff(top) as f64 };
+                record.record_joint(joint, &peak(k, force, (k == 1).then_some(0.1)), Some(&impact).filter(|_| k == 5));
+            }
+        }
+        let at = |time| record.under_way(None, time).map(|(_, impact)| impact.joint);
+        assert_eq!([at(2e-3), at(3e-3), at(4e-3)], [Some(0), Some(1), Some(1)]);
+    }
+
+    #[test]
+    fn a_ball_that_comes_to_rest_has_the_peak_of_its_first_moments_and_one_that_leaves_late_that_of_all() {
+        let mut record = ImpactRecord::default();
+        record.begin(&[Peak::default()]);
+        let mut forces = vec![0.0, 5.0, 8.0];
+        forces.resize(8, 3.0);
+        contact(&mut record, 0, 1, &forces, false);
+        // Its end may still be near.
+        assert_eq!((record.next_peak(None, 0.0, false), record.next_peak(None, 0.0, true)), (None, Some(3e-3)));
+        assert_eq!((record.previous_peak(None, 1.0), record.previous_peak(None, 3e-3)), (Some(3e-3), None));
+        assert!(record.under_way(None, 2e-3).is_none());
+        for k in 9..40 {
+            (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
+            record.record_joint(0, &peak(k, if k == 30 { 9.0 } else { 4.0 }, None), None);
+        }
+        assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
+        assert!(record.under_way(None, 35e-3).is_none(), "it rests");
+        let (_, lasting) = record.under_way(None, 9e-3).expect("it touches");
+        assert!(lasting.finished().is_none() && lasting.top.force.x == 8.0);
+        (record.steps, record.latest_step) = (40, [39e-3, 40e-3]);
+        let impact = Impact { start: 1e-3, end: 40e-3, peak: 9.0, ..Impact::default() };
+        record.record_joint(0, &peak(40, 1.0, None), Some(&impact));
+        assert_eq!(record.next_peak(None, 0.0, false), Some(30e-3));
+    }
+
+    #[test]
+    fn a_force_that_still_rises_is_no_peak_yet_and_one_without_an_end_ends_with_the_next() {
+        let mut record = ImpactRecord::default();
+        // One begins with the run.
+        record.begin(&[peak(0, 0.0, Some(0.1))]);
+        assert_eq!((record.next_peak(None, 0.0, false), record.previous_peak(None, 1.0)), (None, None));
+        for k in 1..=3 {
+            (record.steps, record.latest_step) = (k, [(k - 1) as f64 * STEP, k as f64 * STEP]);
+            record.record_joint(0, &peak(k, k as f64, None), None);
+            assert_eq!((record.next_peak(None, 0.0, false), record.previous_peak(None, 1.0)), (None, None));
+        }
+        contact(&mut record, 0, 6, &[0.0, 2.0, 1.0], true);
+        assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
+        assert_eq!(record.until(1.0).count(), 1);
+        assert!(record.under_way(None, 7e-3).is_some_and(|(number, _)| number == 2));
+        // Without any speed nothing strikes.
+        record.record_joint(0, &peak(20, 1.0, Some(0.0)), None);
+        assert_eq!(record.next_peak(None, 8e-3, true), None);
+    }
+
+    #[test]
+    fn so_many_are_kept_and_the_oldest_go() {
+        let mut record = ImpactRecord::default();
+        record.begin(&[Peak::default()]);
+        for k in 0..KEPT as u64 + 7 {
+            contact(&mut record, 0, 3 * k + 1, &[0.0, 2.0, 1.0], true);
+        }
+        assert_eq!((record.all.len(), record.dropped()), (KEPT, 7));
+        assert_eq!(record.until(f64::INFINITY).map(|(number, ..)| number).next(), Some(8));
+        assert!(KEPT * size_of::<RecordedImpact>() < 5_000_000);
+    }
+}

@@ -1,0 +1,202 @@
+//! Whether the motion of a run relative to its drives has ended.
+//!
+//! - A scene with moving drives has settled when every ball with play has, over the last eighth of the drives' period, stayed
+//!   in contact, moved in its socket by no more than [`STILL`] of the clearance (at that rate, hardly once across its play in a
+//!   period), and borne the same load within [`LOAD`]. If motion resumes after such a stretch, the next one must last a whole
+//!   period: where the ball crosses its play once per turn, it is quiet in between.
+//! - A scene without a moving drive is at rest when no point of a body has moved by more than [`STILL`] of the least clearance
+//!   for [`REST`]. A pendulum stands still at the end of each swing, but not for so long.
+//! - A scene without play never settles: nothing in it rattles.
+//!
+//! All of this is judged from the frames of the run.
+
+use crate::analysis::drive::{NoPeriod, drive_period};
+use crate::scene::{Scene, Vec3};
+use crate::simulate::{ContactState, Frame, JointReport};
+
+/// Fraction of the period over which a driven scene is watched.
+const PART: f64 = 1.0 / 8.0;
+/// How long a scene without drives is watched, s.
+const REST: f64 = 0.5;
+/// Largest displacement of a ball, or of a point of a body, meanwhile, in clearances.
+const STILL: f64 = 0.15;
+/// Largest relative change of a contact force meanwhile.
+const LOAD: f64 = 0.25;
+/// Instants kept per stretch.
+const KEPT: f64 = 16.0;
+
+/// One instant to compare with.
+#[derive(Clone, Debug, Default)]
+struct Instant {
+    time: f64,
+    points: Vec<Vec3>,
+    /// Normal force by ball joint, N; empty without a drive.
+    loads: Vec<f64>,
+}
+
+/// Judges from the frames of a run whether it has settled.
+#[derive(Clone, Debug)]
+pub struct Settling {
+    /// Longest period of the drives, s.
+    period: Option<f64>,
+    /// Body of each socket, and clearance of each joint with play, m.
+    joints: Vec<Option<(Option<usize>, f64)>>,
+    /// Instants since which nothing has changed, oldest first.
+    past: Vec<Instant>,
+    /// The latest.
+    here: Instant,
+    /// Since when it has been quiet.
+    quiet: Option<f64>,
+    /// It was quiet before, and motion resumed.
+    has_resumed: bool,
+}
+
+impl Settling {
+    /// Watches a run of `scene` from now on.
+    pub fn new(scene: &Scene) -> Self {
+        let period = match drive_period(scene) {
+            Ok(period) => Some(period),
+            Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
+            Err(NoPeriod::None { .. }) => None,
+        };
+        let play = |joint: &crate::scene::BallJoint| {
+            let clearance = joint.contact.clearance;
+            (clearance > 0.0).then_some((joint.socket.body, clearance))
+        };
+        Self {
+            period,
+            joints: scene.ball_joints.iter().map(play).collect(),
+            past: Vec::new(),
+            here: Instant::default(),
+            quiet: None,
+            has_resumed: false,
+        }
+    }
+
+    /// Whether it has settled.
+    pub fn has_settled(&self) -> bool {
+        let needed = match self.period {
+            Some(period) if self.has_resumed => period,
+            _ => 0.0,
+        };
+        self.quiet.is_some_and(|since| self.here.time - since >= needed)
+    }
+
+    /// Records the next instant of the run.
+    pub fn record(&mut self, frame: &Frame) {
+        let least = self.joints.iter().flatten().map(|(_, c)| *c);
+        let least = least.fold(f64::INFINITY, f64::min);
+        if !least.is_finite() || frame.joints.len() != self.joints.len() {
+            return;
+        }
+        let free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactState::Free;
+        let driven = self.period.is_some();
+        if driven && self.joints.iter().zip(&frame.joints).any(free) {
+            self.past.clear();
+        }
+        self.take(frame);
+        let stretch = self.period.map_or(REST, |period| period * PART);
+        let Self { joints, here, .. } = self;
+        self.past.retain(|then| {
+            let mut points = then.points.iter().zip(&here.points).enumerate();
+            let still = points.all(|(i, (a, b))| {
+                let clearance = if driven { joints[i].map(|(_, clearance)| clearance) } else { Some(least) };
+                clearance.is_none_or(|clearance| (a - b).norm() <= STILL * clearance)
+            });
+            let mut loads = then.loads.iter().zip(&here.loads);
+            // Those older than two stretches are no longer needed.
+            still && here.time - then.time < 2.0 * stretch && loads.all(|(a, b)| (a - b).abs() <= LOAD * a)
+        });
+        let since = |then: Option<&Instant>| then.map(|then| here.time - then.time);
+        let quiet = since(self.past.first()).is_some_and(|age| age >= stretch);
+        match (quiet, self.quiet) {
+            (true, None) => self.quiet = Some(here.time),
+            (false, Some(_)) => (self.quiet, self.has_resumed) = (None, true),
+            _ => {}
+        }
+        if since(self.past.last()).is_none_or(|age| age >= stretch / KEPT) {
+            self.past.push(here.clone());
+        }
+    }
+
+    /// Takes the positions: in a driven scene, of the balls in the axes of their sockets; otherwise, of points of the bodies.
+    fn take(&mut self, frame: &Frame) {
+        let Instant { time, points, loads } = &mut self.here;
+        *time = frame.time;
+        points.clear();
+        loads.clear();
+        if self.period.is_none() {
+            points.extend(frame.bodies.iter().map(|body| body.position));
+            points.extend(frame.joints.iter().map(|joint| joint.ball_centre));
+            return;
+        }
+        for (joint, now) in self.joints.iter().zip(&frame.joints) {
+            let socket = joint.and_then(|(body, _)| body);
+            let axes = socket.and_then(|body| frame.bodies.get(body));
+            points.push(match axes {
+                Some(body) => body.rotation.transpose() * now.eccentricity,
+                None => now.eccentricity,
+            });
+            loads.push(joint.map_or(0.0, |_| now.normal_force.norm()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Simulation;
+
+    /// Runs `scene` to `to`, s: the times at which it became settled or ceased to be.
+    fn turns(scene: &Scene, to: f64) -> Vec<f64> {
+        let mut simulation = Simulation::new(scene).expect("starts");
+        let mut settling = Settling::new(scene);
+        let (mut frame, mut turns) = (Frame::default(), Vec::new());
+        while simulation.time() < to {
+            simulation.step().expect("runs");
+            simulation.sample(simulation.time(), &mut frame);
+            settling.record(&frame);
+            if settling.has_settled() != (turns.len() % 2 == 1) {
+                turns.push(frame.time);
+            }
+        }
+        turns
+    }
+
+    fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+        let changes: Vec<(String, String)> =
+            changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+        Scene::load(name, &changes).expect("built in")
+    }
+
+    #[test]
+    fn the_papers_mechanism_settles_once_it_has_rattled_and_stays_so() {
+        let turns = turns(&scene("spcmm", &[]), 2.2);
+        assert!(turns.len() == 1 && (0.1..0.45).contains(&turns[0]), "{turns:?}");
+    }
+
+    #[test]
+    fn what_swings_or_is_driven_about_its_play_never_settles() {
+        for (name, changes, to) in [
+            ("pendulum", &[][..], 3.0),
+            ("chain", &[("chain.links", "3")], 1.5),
+            ("slider-crank", &[], 1.5),
+            ("slider-crank-driven", &[], 4.0),
+            ("slider-crank-driven", &[("contact.friction", "0")], 3.0),
+            ("slider-crank-driven", &[("contact.friction", "0.5")], 3.0),
+        ] {
+            let turns = turns(&scene(name, changes), to);
+            assert!(turns.is_empty(), "{name} {changes:?}: {turns:?}");
+        }
+    }
+
+    #[test]
+    fn a_rod_that_hangs_straight_down_comes_to_rest() {
+        let text = scene("pendulum", &[]).source.text.clone();
+        let hangs = text.replace("-30 deg", "0 deg");
+        assert_ne!(hangs, text);
+        let hangs = Scene::parse(&hangs, None, &[]).expect("a scene");
+        let turns = turns(&hangs, 1.5);
+        assert!(turns.len() == 1 && turns[0] > REST, "{turns:?}");
+    }
+}

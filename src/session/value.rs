@@ -1,0 +1,294 @@
+//! Values as text on the screen: words as in files and on the command line, typeset units.
+
+use crate::scene::{Kind, Scene, Value, format_quantity, format_quantity_digits};
+use crate::simulate::ContactState;
+
+/// What a contact does.
+pub fn contact(state: ContactState) -> &'static str {
+    match state {
+        ContactState::Free => "The ball touches nothing",
+        ContactState::Creep => "In contact, creeping",
+        ContactState::Slip => "In contact, sliding",
+        ContactState::Ideal => "Ideal joint: no clearance",
+    }
+}
+
+/// Units in `text` as they are printed, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.
+pub fn typeset(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut word = String::new();
+    // A final separator, so that the last word is handled.
+    for letter in text.chars().chain(['\0']) {
+        if letter.is_alphanumeric() {
+            word.push(letter);
+            continue;
+        }
+        let number = word.trim_start_matches(|c: char| c.is_ascii_digit());
+        let digits = word.len() - number.len();
+        let power = out.ends_with('^') && digits == word.len();
+        match (number, word.as_str()) {
+            ("um" | "us", _) => {
+                out.push_str(&word[..digits]);
+                out.push('µ');
+                out.push_str(&number[1..]);
+            }
+            (_, "2") if power => out.replace_range(out.len() - 1.., "²"),
+            (_, "3") if power => out.replace_range(out.len() - 1.., "³"),
+            _ => out.push_str(&word),
+        }
+        word.clear();
+        if letter != '\0' {
+            out.push(letter);
+        }
+    }
+    out
+}
+
+/// An SI value in `unit`, as shown to the user.
+pub fn quantity(si: f64, unit: &str, digits: usize) -> String {
+    typeset(&format_quantity_digits(si, unit, digits))
+}
+
+/// `value` as shown to the user: display unit, six digits.
+pub fn shown(value: &Value, kind: &Kind) -> String {
+    match (value, kind) {
+        (Value::Number(si), Kind::Number { display, .. }) => quantity(*si, display, 6),
+        (Value::Number(si), _) => format_quantity(*si, ""),
+        (Value::Count(count), _) => count.to_string(),
+        (Value::Choice(word), _) => (*word).to_owned(),
+        (Value::Unset, _) => "not set".to_owned(),
+    }
+}
+
+/// Name and displayed value of `key` of `scene`; `None` if the scene has no such key.
+pub(crate) fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
+    let (value, parameter) = (scene.get(key).ok()?, scene.parameter(key).ok()?);
+    let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
+        Some((joint, _)) => format!("{} of {joint}", parameter.label),
+        None => parameter.label.to_owned(),
+    };
+    Some((name, shown(&value, &parameter.kind)))
+}
+
+/// A scene in one line: its name, its changes except for the keys `except`, and its solver.
+pub fn scene_line(scene: &Scene, except: &[String]) -> String {
+    let changed = scene.changes.iter().map(|(key, _)| key);
+    let changed = changed.filter(|key| !except.contains(key) && !is_solver_or_view_key(key));
+    let mut parts = vec![scene.name.clone()];
+    parts.extend(
+        changed.filter_map(|key| named(scene, key)).map(|(name, value)| format!("{} {value}", name.to_lowercase())),
+    );
+    parts.push(solver(scene));
+    parts.join(", ")
+}
+
+/// Keys of solver and view: the solver is named as a whole, and the view does not affect the motion.
+fn is_solver_or_view_key(key: &str) -> bool {
+    key.starts_with("solver.") || key.starts_with("view.")
+}
+
+/// Method with its tolerance, or its fixed step.
+pub fn solver(scene: &Scene) -> String {
+    let method = scene.solver.method;
+    if scene.solver.method.is_adaptive() {
+        format!("{method} {}", power_of_ten(scene.solver.tolerance))
+    } else {
+        format!("{method} {}", quantity(scene.solver.step, "us", 6))
+    }
+}
+
+/// What was changed in a scene, one phrase each.
+pub fn changes(scene: &Scene) -> Vec<String> {
+    let changed = scene.changes.iter().filter_map(|(key, _)| named(scene, key));
+    changed.map(|(name, value)| format!("{name} {value}")).collect()
+}
+
+/// What would change with `there` in place of `here`, one phrase each, except for the keys `except`; empty if the motion is the
+/// same.
+pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {
+    if there.source.text != here.source.text || there.source.beside != here.source.beside {
+        let (new, old) = (&there.name, &here.name);
+        return vec![if new == old {
+            format!("Scene: another file of the name {new}")
+        } else {
+            format!("Scene: {new} instead of {old}")
+        }];
+    }
+    let mut keys: Vec<&String> = Vec::new();
+    for (key, _) in there.changes.iter().chain(&here.changes) {
+        if !keys.contains(&key) && !except.contains(key) && !is_solver_or_view_key(key) {
+            keys.push(key);
+        }
+    }
+    let mut all: Vec<String> = keys
+        .into_iter()
+        .filter(|key| there.get(key).ok() != here.get(key).ok())
+        .map(|key| {
+            let value = |scene| named(scene, key).map_or_else(|| "none".to_owned(), |n| n.1);
+            let name = named(there, key).or_else(|| named(here, key));
+            let name = name.map_or_else(|| key.clone(), |n| n.0);
+            format!("{name}: {} instead of {}", value(there), value(here))
+        })
+        .collect();
+    let (new, old) = (solver(there), solver(here));
+    if new != old {
+        all.push(format!("Solver: {new} instead of {old}"));
+    }
+    all
+}
+
+/// What a user typed, with the display unit added to a bare number.
+pub fn completed(typed: &str, kind: &Kind) -> String {
+    let typed = typed.trim();
+    match kind {
+        Kind::Number { display, .. } if !display.is_empty() && typed.parse::<f64>().is_ok() => {
+            format!("{typed} {display}")
+        }
+        _ => typed.to_owned(),
+    }
+}
+
+/// A bare number with at most `digits` significant digits.
+pub fn number(value: f64, digits: usize) -> String {
+    format_quantity_digits(value, "", digits)
+}
+
+/// Digits that distinguish values of size up to `most` that differ by a thousandth of `span`.
+pub fn digits_within(span: f64, most: f64) -> usize {
+    let more = (most / span).log10().ceil();
+    if more.is_finite() { 4 + (more.max(0.0) as usize).min(11) } else { 4 }
+}
+
+/// Decimals of the values that a slider over `span` steps to: a hundred to a thousand of them.
+pub fn decimals(span: f64) -> usize {
+    let decimals = 2.0 - libm::log10(span);
+    // Of a power of ten a hundred, whatever the last bit of its logarithm.
+    if decimals.is_finite() { (decimals - 1e-9).ceil().clamp(0.0, 15.0) as usize } else { 15 }
+}
+
+/// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
+pub fn power_of_ten(share: f64) -> String {
+    if share == 0.0 || (1e-3..1e4).contains(&share.abs()) { number(share, 2) } else { format!("{share:.0e}") }
+}
+
+/// A share in per cent, two digits, however small.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent == 0.0 || percent >= 0.01 { format!("{} %", number(percent, 2)) } else { format!("{percent:.0e} %") }
+}
+
+/// Most characters of [`time`] up to 10^9 s: the width reserved for a clock.
+pub const LONGEST_TIME: usize = 11;
+
+/// A time with the unit that suits its size; a long one has fewer decimals, so that it takes no more room.
+pub fn time(seconds: f64) -> String {
+    let size = seconds.abs();
+    for (unit, name, decimals) in [(1e-6, "µs", 3), (1e-3, "ms", 4)] {
+        // A value that rounds up to the next unit is written in that unit.
+        let whole = 1000.0 - 0.5 * libm::pow(10.0, -f64::from(decimals));
+        if size > 0.0 && size / unit < whole {
+            return format!("{:.*} {name}", decimals as usize, seconds / unit);
+        }
+    }
+    let decimals =
+        (0..4).find(|taken| size < libm::pow(10.0, f64::from(4 + taken)) - 0.5).map_or(0, |taken| 4 - taken as usize);
+    format!("{seconds:.decimals$} s")
+}
+
+/// A time scale as people say it: `1:50`.
+pub fn time_scale(scale: f64) -> String {
+    if scale <= 0.0 || !scale.is_finite() {
+        return "1:∞".to_owned();
+    }
+    let slower = 1.0 / scale;
+    if slower < 9.95 {
+        format!("1:{}", format_quantity((slower * 10.0).round() / 10.0, ""))
+    } else {
+        format!("1:{}", grouped(slower.round() as u64))
+    }
+}
+
+/// A count with a thin space between thousands.
+fn grouped(count: u64) -> String {
+    if count < 10_000 { count.to_string() } else { format!("{}\u{202f}{:03}", count / 1000, count % 1000) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Dimension;
+
+    const LENGTH: Kind = Kind::Number {
+        dimension: Dimension::Length,
+        min: 0.0,
+        max: 2e-3,
+        display: "mm",
+        slider: (0.0, 1e-3),
+        logarithmic: false,
+    };
+
+    #[test]
+    fn a_bare_number_takes_the_unit_on_show() {
+        assert_eq!(completed(" 0.5 ", &LENGTH), "0.5 mm");
+        assert_eq!(completed("500 um", &LENGTH), "500 um");
+        assert_eq!(completed("half", &LENGTH), "half");
+    }
+
+    #[test]
+    fn units_are_printed_one_way_and_read_back() {
+        for (plain, printed) in [
+            ("3 um", "3 µm"),
+            ("3um and 5 us.", "3µm and 5 µs."),
+            ("units m, mm, um, um/s", "units m, mm, µm, µm/s"),
+            ("-9.81 m/s^2 to 20 kg mm^2, m^3", "-9.81 m/s² to 20 kg mm², m³"),
+            ("maximum of status, 2^20, x^2y", "maximum of status, 2^20, x^2y"),
+            ("", ""),
+        ] {
+            assert_eq!(typeset(plain), printed);
+        }
+        let kinds = crate::scene::table().iter().map(|parameter| parameter.kind);
+        let mut seen = 0;
+        for kind in kinds {
+            let Kind::Number { dimension, display, .. } = kind else {
+                continue;
+            };
+            let printed = shown(&Value::Number(0.25), &kind);
+            assert!(!printed.contains('^') && !printed.contains("um"), "{printed}");
+            let read = crate::scene::parse_quantity(&printed, dimension).expect("reads back");
+            assert!((read - 0.25).abs() < 1e-6, "{display}: {printed}");
+            seen += 1;
+        }
+        assert!(seen > 10);
+    }
+
+    #[test]
+    fn a_slider_steps_to_round_values_in_proportion_to_its_range() {
+        let given =
+            [(1.0, 2), (0.3, 3), (2.0, 2), (40.0, 1), (500.0, 0), (1e5, 0), (1e-3, 5), (0.0, 15), (f64::NAN, 15)];
+        for (span, expected) in given {
+            assert_eq!(decimals(span), expected, "{span}");
+        }
+    }
+
+    #[test]
+    fn values_read_as_people_write_them() {
+        assert_eq!(shown(&Value::Number(3e-4), &LENGTH), "0.3 mm");
+    }
+
+    #[test]
+    fn times_and_scales_suit_their_size() {
+        assert_eq!(time(0.0), "0.0000 s");
+        assert_eq!(time(7.85e-3), "7.8500 ms");
+        assert_eq!(time(12.5e-6), "12.500 µs");
+        assert_eq!(time(0.999_999_99), "1.0000 s");
+        assert_eq!(time(999.999_9e-6), "1.0000 ms");
+        assert_eq!(time(12_345.678_9), "12345.679 s");
+        let longest = (-90..90).map(|k| time(libm::pow(10.0, f64::from(k) / 10.0) * 0.999_999_99));
+        let longest = longest.map(|words| words.chars().count()).max();
+        assert_eq!(longest, Some(LONGEST_TIME));
+        assert_eq!(time_scale(1.0), "1:1");
+        assert_eq!(time_scale(0.4), "1:2.5");
+        assert_eq!(time_scale(0.02), "1:50");
+        assert_eq!(time_scale(1e-4), "1:10\u{202f}000");
+    }
+}
