@@ -1,7 +1,7 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
 //! Layers from the bottom up; a module uses only those below it (`ARCHITECTURE.md`): [`contact`], [`files`] and [`integrate`],
-//! [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`], [`film`] and [`view`], [`render`], [`app`], and the entries [`cli`],
+//! [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`], and the entries [`cli`],
 //! `main.rs` and [`web`].
 
 /// The version that every output file names.
@@ -23,6 +23,8 @@ pub mod files;
 pub mod film;
 #[cfg(feature = "gui")]
 pub mod render;
+#[cfg(feature = "gui")]
+pub mod session;
 #[cfg(feature = "gui")]
 pub mod view;
 pub mod web;

@@ -1,22 +1,13 @@
 //! What the application asks of its platform: a desktop window or a web page.
 
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use eframe::egui;
-use web_time::Instant;
 
 use super::click::Click;
 use crate::analysis::task::{Job, Message};
-
-/// Seconds since an arbitrary origin, to measure the stepping time of a frame.
-pub type Clock = fn() -> f64;
-
-/// Wall-clock time.
-pub fn wall() -> f64 {
-    static START: OnceLock<Instant> = OnceLock::new();
-    START.get_or_init(Instant::now).elapsed().as_secs_f64()
-}
+pub use crate::session::clock::{Clock, wall};
 
 /// A background computation.
 pub trait Running {

@@ -11,7 +11,7 @@ const FLOORS: [&[&str]; 10] = [
     &["mechanism"],
     &["simulate"],
     &["analysis", "chart", "film", "view"],
-    &["render"],
+    &["render", "session"],
     &["app"],
     &["cli"],
     &["main", "web"],
