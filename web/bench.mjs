@@ -1,5 +1,5 @@
 // Speed of the page on this machine: physics in wasm against the native program, the time to the first picture, and what a sweep
-// leaves of its frames.
+// leaves of its frames and answers.
 //
 //     ./run web --bench
 
@@ -33,6 +33,28 @@ const LATEST_PICTURE = 1.5;
 /** Frames a second that a sweep leaves to a view that had them; for how long they are counted, and what goes before that, ms. */
 const LEAST_PACE = 20;
 const [SETTLING, WATCHED] = [8000, 5000];
+
+/** In the page: how long tasks and frames take, and from what the user does to the end of the frame that shows it, ms. */
+function watchAnswers() {
+    const watched = { tasks: [], frames: [], answers: [] };
+    globalThis.watched = watched;
+    let asked = [];
+    const frame = globalThis.requestAnimationFrame.bind(globalThis);
+    globalThis.requestAnimationFrame = (call) => frame((time) => {
+        const began = performance.now();
+        call(time);
+        const took = performance.now() - began;
+        // One that draws nothing shows nothing.
+        if (took < 3) return;
+        watched.frames.push(took);
+        watched.answers.push(...asked.map((at) => began + took - at));
+        asked = [];
+    });
+    for (const kind of ['keydown', 'pointermove', 'wheel']) {
+        addEventListener(kind, ({ timeStamp }) => asked.push(timeStamp), { capture: true });
+    }
+    new PerformanceObserver((list) => watched.tasks.push(...list.getEntries().map(({ duration }) => duration))).observe({ type: 'longtask' });
+}
 
 // Processor time on both sides: another program on this machine disturbs it least.
 function natively(scene, method, seconds) {
@@ -122,6 +144,52 @@ for (const backend of ['webgl', 'webgpu']) {
         const wanted = before < LEAST_PACE ? 'nothing' : `at least ${LEAST_PACE}`;
         console.log(`${backend.padEnd(7)} ${size.width}x${size.height}: ${before.toFixed(1)} and ${during.toFixed(1)}; wanted: ${wanted}`);
         good &&= before < LEAST_PACE || during >= LEAST_PACE;
+    }
+}
+console.log('at the time scale 1:1 during a sweep, while it is paused, a slider drawn and the wheel turned, software rendering, in ms:');
+for (const scene of ['chain', 'hexapod']) {
+    for (const size of [{ width: 800, height: 560 }, { width: 1280, height: 800 }]) {
+        const lab = await open('', { backend: 'webgl', size, picture: true, ownTime: true, before: watchAnswers });
+        const wait = (ms) => new Promise((done) => setTimeout(done, ms));
+        await lab.key('b');
+        await wait(1500);
+        await lab.page.evaluate(() => globalThis.jointplay.mirror.follow());
+        await lab.page.getByRole('button', { name: 'Start sweep', exact: true }).evaluate((button) => button.click());
+        // It is of the scene that can be swept, and goes on beside the other.
+        await wait(500);
+        await lab.page.evaluate((scene) => globalThis.jointplay.page.openLink(`?scene=${scene}`), scene);
+        for (let faster = 0; faster < 8; faster += 1) await lab.page.keyboard.press('+');
+        await wait(SETTLING / 4);
+        const [x0, y0, , y1] = (await lab.find('Slider', 'Clearance')).rect;
+        const [since, before] = [performance.now(), (await lab.state()).shown_s];
+        await lab.page.evaluate(() => Object.values(globalThis.watched).forEach((list) => list.splice(0)));
+        let turns = 0;
+        // As long as the sweep lasts.
+        for (; turns < 6 && lab.page.workers().length > 0; turns += 1) {
+            for (const pause of [150, 700]) {
+                await lab.page.keyboard.press('Space');
+                await wait(pause);
+            }
+            await lab.page.mouse.move(x0 + 40, (y0 + y1) / 2);
+            await lab.page.mouse.down();
+            for (let k = 0; k < 10; k += 1) {
+                await lab.page.mouse.move(x0 + 40 + 8 * k, (y0 + y1) / 2);
+                await wait(33);
+            }
+            await lab.page.mouse.up();
+            await lab.page.mouse.wheel(0, 40);
+            await wait(700);
+        }
+        const { tasks, frames, answers } = await lab.page.evaluate(() => globalThis.watched);
+        const speed = ((await lab.state()).shown_s - before) / ((performance.now() - since) / 1000);
+        await lab.close();
+        if (turns === 0) throw new Error('the sweep did not last');
+        const part = (list, share) => list.toSorted((a, b) => a - b)[Math.floor(share * (list.length - 1))]?.toFixed(0) ?? '-';
+        console.log(
+            `${scene} ${size.width}x${size.height}, ${turns} times each: frames ${part(frames, 0.95)} (95 %), ${part(frames, 1)} at most; ` +
+                `${tasks.length} tasks above 50, ${part(tasks, 1)} at most; answered in ${part(answers, 0.5)} (half), ` +
+                `${part(answers, 0.95)} (95 %); ${speed.toFixed(3)} simulated seconds a second`,
+        );
     }
 }
 await quit();

@@ -130,6 +130,7 @@ const LEAST_MEASURED: f64 = 1e-3;
 const MOST_RECORDED: f64 = 64.0;
 
 /// What to know about a scene before it runs.
+#[derive(Clone)]
 struct Known {
     /// As [`Warning::key`].
     key: Option<&'static str>,
@@ -222,7 +223,7 @@ impl Player {
             simulation: run(&self.simulation),
             unchanged: self.unchanged.as_ref().map(|unchanged| Box::new(run(unchanged))),
             original: self.original.clone(),
-            warnings: Known::of(self.wanted()),
+            warnings: self.warnings.clone(),
             playing: false,
             backwards: false,
             stopped: self.stopped.clone(),
