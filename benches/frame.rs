@@ -77,7 +77,7 @@ struct Stage {
 
 impl Stage {
     fn new(scene: Scene, time: f64) -> Self {
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         simulation.advance_to(time).expect("runs");
         let mut frame = Frame::default();
         simulation.sample(time, &mut frame);

@@ -27,11 +27,11 @@ fn load(name: &str, changes: &[(&str, &str)]) -> Scene {
 
 /// One derivative of `scene` at its state after `time`, contacts included, with the drive recomputed or not.
 fn evaluation(watch: &Stopwatch, label: &str, scene: &Scene, time: f64) {
-    let mut simulation = Simulation::new(scene).expect("a built-in scene starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
     simulation.advance_to(time).expect("a built-in scene runs");
     let t = simulation.time();
     let y = simulation.state().to_vec();
-    let mut mechanism = Mechanism::new(scene).expect("a built-in scene starts");
+    let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
     let joints = 0..mechanism.contacts.len();
     let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
     let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
@@ -57,7 +57,7 @@ fn real_time(watch: &Stopwatch) {
         ("dopri5 at 1e-6", vec![("solver.method", "dopri5"), ("solver.tolerance", "1e-6")]),
     ] {
         let scene = load("spcmm", &changes);
-        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(7e-3).expect("a built-in scene runs");
         let start = simulation.snapshot();
         watch.time(&format!("10 ms simulated (spcmm, over the first impacts)/{label}"), || {
@@ -71,7 +71,7 @@ fn real_time(watch: &Stopwatch) {
 fn snapshots(watch: &Stopwatch) {
     for name in ["spcmm", "chain"] {
         let scene = load(name, &[]);
-        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(0.02).expect("a built-in scene runs");
         let snapshot = simulation.snapshot();
         watch.time(&format!("snapshot/{name}: take"), || simulation.snapshot());
@@ -89,11 +89,11 @@ fn spans(watch: &Stopwatch) {
         for (label, method, end) in methods {
             let all: Vec<(&str, &str)> = changes.iter().chain(method).copied().collect();
             let scene = load("spcmm", &all);
-            let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+            let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
             simulation.advance_to(from).expect("a built-in scene runs");
             let start = simulation.snapshot();
             watch.time_part(&format!("{name}/{label}"), || {
-                let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+                let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
                 simulation.restore(&start);
                 let clock = Instant::now();
                 simulation.advance_to(end).expect("a built-in scene runs");
@@ -109,11 +109,11 @@ fn spans(watch: &Stopwatch) {
 fn chain(watch: &Stopwatch) {
     for links in [4, 16, 64, 256] {
         let scene = load("chain", &[("chain.links", &links.to_string())]);
-        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(2e-3).expect("a built-in scene runs");
         let y = simulation.state().to_vec();
         let t = simulation.time();
-        let mut mechanism = Mechanism::new(&scene).expect("a built-in scene starts");
+        let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
         let memory = vec![Memory::default(); mechanism.contacts.len()];
         let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
         let mut dy = vec![0.0; y.len()];
@@ -146,7 +146,7 @@ fn set_up(watch: &Stopwatch) {
         let changes = [("formulation".to_owned(), form.to_owned())];
         watch.time(&format!("set up/{n} {kind}, {form}, clearance {clearance}"), || {
             let scene = Scene::parse(&text, None, &changes).expect("a scene");
-            Simulation::new(&scene).expect("starts").time()
+            Simulation::new(&scene.machine).expect("starts").time()
         });
     }
 }

@@ -8,7 +8,9 @@
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 pub use jointplay_analysis as analysis;
-pub use jointplay_physics::{contact, integrate, jet, mechanism, mesh, scene, simulate, words};
+pub use jointplay_physics::{
+    contact, expression, integrate, jet, machine, mechanism, mesh, scene, simulate, suggest, units, words,
+};
 
 #[cfg(feature = "gui")]
 pub mod app;

@@ -68,7 +68,7 @@ fn laws_of_drives_allocate_nothing() {
     for form in ["tree", "lagrange"] {
         let changes = [("formulation".to_owned(), form.to_owned())];
         let scene = Scene::parse(text, None, &changes).unwrap();
-        let mut simulation = Simulation::new(&scene).unwrap();
+        let mut simulation = Simulation::new(&scene.machine).unwrap();
         simulation.step().unwrap();
         let made = allocations(|| simulation.advance_to(0.05).unwrap());
         assert_eq!(made, 0, "{form}");
@@ -81,7 +81,7 @@ fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
         for form in ["tree", "lagrange"] {
             let changes = [("formulation".to_owned(), form.to_owned())];
             let scene = Scene::parse(text, None, &changes).unwrap();
-            let mut simulation = Simulation::new(&scene).unwrap();
+            let mut simulation = Simulation::new(&scene.machine).unwrap();
             let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
             simulation.step().unwrap();
             simulation.sample(simulation.time(), &mut frame);
@@ -103,7 +103,7 @@ fn joints_of_two_degrees_and_those_that_close_loops_allocate_nothing() {
         for method in METHODS {
             for form in ["tree", "lagrange"] {
                 let changes = [("formulation", form), ("solver.method", method)];
-                let mut simulation = Simulation::new(&common::parse(text, &changes)).unwrap();
+                let mut simulation = Simulation::new(&common::parse(text, &changes).machine).unwrap();
                 let mut frame = Frame::default();
                 simulation.step().unwrap();
                 simulation.sample(simulation.time(), &mut frame);
@@ -172,7 +172,7 @@ fn steps_of_the_machines_allocate_nothing() {
 #[test]
 fn a_clearance_on_its_way_allocates_nothing() {
     for method in METHODS {
-        let mut simulation = simulation("pendulum", &[("solver.method", method)]);
+        let mut simulation = common::live("pendulum", &[("solver.method", method)]);
         simulation.advance_to(0.03).unwrap();
         simulation.set("contact.clearance", "0.25 mm").unwrap();
         simulation.set("contact.friction", "0.2").unwrap();
@@ -200,8 +200,8 @@ fn what_setting_up_allocates_grows_with_the_scene_and_not_with_its_square() {
             let before = BYTES.get();
             let changes = [("formulation".to_owned(), form.to_owned())];
             let scene = Scene::parse(&text, Some("big.toml"), &changes).unwrap();
-            std::hint::black_box(scene.warnings());
-            std::hint::black_box(Simulation::new(&scene).unwrap().time());
+            std::hint::black_box(scene.machine.warnings());
+            std::hint::black_box(Simulation::new(&scene.machine).unwrap().time());
             BYTES.get() - before
         };
         let (once, twice) = (bytes(400), bytes(800));

@@ -9,7 +9,7 @@ use super::{theme, value};
 use crate::analysis::presets::{self, Measured};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
-use crate::scene::Preset;
+use crate::machine::Preset;
 use crate::simulate::Impact;
 
 /// Width of the names, points.
@@ -182,8 +182,8 @@ impl Accuracy {
         let here = own.filter(|found| Some(found.preset) == preset && found.scene == scene);
         let (measured, place) = match (here, preset) {
             (Some(found), _) => (Some(found.measured), "on this scene with its present values"),
-            (None, Some(preset)) if scene.changes.is_empty() && player.wanted().source.file.is_none() => {
-                (presets::measured(&player.wanted().name, preset), "on this scene as it comes with the program")
+            (None, Some(preset)) if scene.changes.is_empty() && player.pending().source.file.is_none() => {
+                (presets::measured(&player.pending().name, preset), "on this scene as it comes with the program")
             }
             _ => (None, ""),
         };
@@ -222,7 +222,7 @@ impl Accuracy {
 
 /// The preset whose method and tolerance (fixed step) are in force, whether or not it was chosen by name.
 pub fn preset_of(player: &Player) -> Option<Preset> {
-    let solver = &player.wanted().solver;
+    let solver = &player.pending().machine.solver;
     let is = |preset: &Preset| {
         let (method, step, tolerance) = preset.point();
         method == solver.method
@@ -234,7 +234,7 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
 
 /// The scene with everything that determines its motion, without solver and view settings.
 fn model_of(player: &Player) -> SceneSource {
-    let mut scene = SceneSource::of(player.wanted());
+    let mut scene = SceneSource::of(player.pending());
     let kept = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
     scene.changes.retain(|(key, _)| kept(key));
     scene
@@ -242,7 +242,7 @@ fn model_of(player: &Player) -> SceneSource {
 
 /// Name of a ball joint.
 fn joint(player: &Player, index: usize) -> &str {
-    let joints = &player.scene().ball_joints;
+    let joints = &player.running().machine.ball_joints;
     joints.get(index).map_or("", |joint| &joint.name)
 }
 
@@ -250,7 +250,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
     let name = preset.map_or_else(|| "no preset".to_owned(), |preset| format!("what the preset {} has", preset.word()));
     AccuracyLine {
         label: "Runs with",
-        value: value::solver(player.wanted()),
+        value: value::solver(player.pending()),
         doubtful: false,
         help: format!(
             "Method with its tolerance, or its fixed step: {name}. They are set under Solver; a measured error is given for presets \

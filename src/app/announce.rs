@@ -2,8 +2,8 @@
 
 use super::player::Player;
 use super::value;
-use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;
+use crate::units::format_quantity_digits;
 
 /// Least time between two reports unless something happens, s.
 const INTERVAL: f64 = 1.0;
@@ -48,7 +48,8 @@ impl Announcer {
     /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did and, if one is due later, after how long to
     /// ask again. `news` is what the application itself has to say.
     pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
-        let occasion = format!("{} {} {} {news}", player.scene().name, player.is_playing(), player.stopped().is_some());
+        let occasion =
+            format!("{} {} {} {news}", player.running().name, player.is_playing(), player.stopped().is_some());
         let event = occasion != self.occasion;
         let standing = sentences(player, news, None);
         if standing == self.standing && self.strongest.is_none() {
@@ -68,7 +69,7 @@ impl Announcer {
 }
 
 fn sentences(player: &Player, news: &str, strongest: Option<(usize, f64, f64)>) -> String {
-    let scene = player.scene();
+    let scene = player.running();
     let mut parts = Vec::new();
     if !news.is_empty() {
         parts.push(format!("{}.", news.trim_end_matches('.')));
@@ -85,7 +86,7 @@ fn sentences(player: &Player, news: &str, strongest: Option<(usize, f64, f64)>) 
     });
     parts.extend(joints(player));
     if let Some((joint, force, time)) = strongest
-        && let Some(joint) = scene.ball_joints.get(joint)
+        && let Some(joint) = scene.machine.ball_joints.get(joint)
     {
         parts.push(format!(
             "Largest normal force since the last report: {} at {}, at {}.",
@@ -98,7 +99,7 @@ fn sentences(player: &Player, news: &str, strongest: Option<(usize, f64, f64)>) 
 }
 
 fn joints(player: &Player) -> Option<String> {
-    let scene = player.scene();
+    let scene = player.running();
     let settled = player.has_settled();
     let reports = &player.frame().joints;
     if reports.is_empty() {
@@ -114,6 +115,7 @@ fn joints(player: &Player) -> Option<String> {
         ));
     }
     let each: Vec<String> = scene
+        .machine
         .ball_joints
         .iter()
         .zip(reports)

@@ -57,7 +57,7 @@ pub fn impulse(impact: &Impact, mass: f64) -> f64 {
 
 /// Mass of all bodies, kg.
 pub fn mass(scene: &Scene) -> f64 {
-    scene.bodies.iter().map(|body| body.mass).sum()
+    scene.machine.bodies.iter().map(|body| body.mass).sum()
 }
 
 /// Writes the clicks of the `impacts` that ended within `stretch` to `out`, in their order; `mass` is that of all bodies, kg.
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn the_impulse_is_the_integral_of_the_force() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut impacts = Vec::new();
         let mut frame = Frame::default();
         let (mut sum, mut compared) = (0.0, 0);

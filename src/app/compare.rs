@@ -93,7 +93,7 @@ impl Kept {
 
     /// How it differs from the run of `player`, a line for each parameter.
     fn differences(&self, player: &Player) -> String {
-        let all = value::differences(self.run.scene(), player.scene(), &[]);
+        let all = value::differences(self.run.running(), player.running(), &[]);
         let ends = self.run.stopped().map(|stopped| format!("It {stopped}"));
         let all: Vec<String> = all.into_iter().chain(ends).collect();
         if all.is_empty() { "The same parameters as now".to_owned() } else { all.join("\n") }
@@ -102,7 +102,7 @@ impl Kept {
 
 /// The parameter `key` of what runs, with its value.
 fn named(run: &Player, key: &str) -> String {
-    value::named(run.scene(), key).map_or_else(|| key.to_owned(), |(name, value)| format!("{name}: {value}"))
+    value::named(run.running(), key).map_or_else(|| key.to_owned(), |(name, value)| format!("{name}: {value}"))
 }
 
 /// The kept runs.

@@ -12,8 +12,9 @@ use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{equations, keys, spoken, theme, value};
-use crate::scene::{Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display};
-use crate::simulate::{ChangeError, Effect};
+use crate::scene::{Kind, Parameter, SceneError, Scope, SetError, Value};
+use crate::simulate::Effect;
+use crate::units::{format_quantity_digits, from_display, to_display};
 
 /// Shown with the accuracy that it gives.
 const PRESET: &str = "solver.preset";
@@ -71,17 +72,17 @@ impl Controls {
 
     /// What the scene is called.
     pub fn title(&self, ui: &mut Ui, player: &Player) {
-        let title = &player.scene().title;
+        let title = &player.running().title;
         let label = ui.label(RichText::new(title).small().weak());
         spoken::heading(&label, title);
-        label.on_hover_text(&player.scene().description);
+        label.on_hover_text(&player.running().description);
         ui.add_space(2.0);
     }
 
     /// All controls, one under the other.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
         self.few(ui, player);
-        let table = player.wanted().parameters();
+        let table = player.pending().parameters();
         ui.separator();
         self.accuracy_ui(ui, player, accuracy, &table);
         self.one_joint(ui, player, &table);
@@ -110,7 +111,7 @@ impl Controls {
     /// The most important ones.
     pub fn few(&mut self, ui: &mut Ui, player: &mut Player) {
         spoken::landmark(ui, "Parameters");
-        let table = player.wanted().parameters();
+        let table = player.pending().parameters();
         for key in FIRST {
             if let Some(parameter) = table.iter().find(|p| p.key == key) {
                 self.control(ui, player, parameter, key);
@@ -139,7 +140,7 @@ impl Controls {
 
     /// Contact parameters of one ball joint, which override the scene's.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
-        let names: Vec<String> = player.wanted().ball_joints.iter().map(|j| j.name.clone()).collect();
+        let names: Vec<String> = player.pending().machine.ball_joints.iter().map(|j| j.name.clone()).collect();
         if names.is_empty() {
             return;
         }
@@ -169,7 +170,7 @@ impl Controls {
     /// One parameter under `key`, which may be a joint's own.
     fn control(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str) {
         // A key that the scene no longer has (a shorter chain) has no control.
-        let Ok(now) = player.wanted().get(key) else {
+        let Ok(now) = player.pending().get(key) else {
             return;
         };
         let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
@@ -380,7 +381,7 @@ impl Controls {
     }
 
     /// An accepted value clears its draft; a rejected one stays, with the reason.
-    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, ChangeError>) {
+    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SetError>) {
         match done {
             Ok(Effect::Now | Effect::AtReset) => {
                 self.drafts.remove(key);
@@ -388,12 +389,11 @@ impl Controls {
             Err(error) => {
                 // The control shows which key it is.
                 let reason = match error {
-                    ChangeError::Scene(SceneError { value: Some(value), message, .. }) => {
+                    SetError::Scene(SceneError { value: Some(value), message, .. }) => {
                         format!("{value}: {message}")
                     }
-                    ChangeError::Scene(error) => error.message,
-                    ChangeError::Method(error) => error.to_string(),
-                    pull @ (ChangeError::NoBody { .. } | ChangeError::TooFar { .. }) => pull.to_string(),
+                    SetError::Scene(error) => error.message,
+                    SetError::Change(error) => error.to_string(),
                 };
                 let draft = Draft { text: text.to_owned(), error: Some(reason) };
                 self.drafts.insert(key.to_owned(), draft);
@@ -431,7 +431,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     tooltip.show(|ui| {
         ui.strong(parameter.label);
         ui.label(value::typeset(parameter.help));
-        let stated = equations::law(key, player.wanted());
+        let stated = equations::law(key, player.pending());
         if let Some(stated) = &stated {
             ui.label(RichText::new(format!("{}: {}", stated.law, stated.formula)).small());
         }
@@ -442,7 +442,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         }
         let mut range = value::typeset(&parameter.range());
         if parameter.key == "contact.clearance"
-            && let Ok(Value::Number(radius)) = player.wanted().get(&key.replace("clearance", "ball_radius"))
+            && let Ok(Value::Number(radius)) = player.pending().get(&key.replace("clearance", "ball_radius"))
         {
             range = format!("{range} ({})", value::quantity(radius, "mm", 6));
         }

@@ -235,7 +235,7 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
     }
     ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
     ui.add_space(6.0);
-    let scene = player.scene();
+    let scene = player.running();
     ui.label(RichText::new(&scene.title).strong());
     ui.label(&scene.description);
     ui.add_space(6.0);

@@ -137,7 +137,7 @@ impl App {
         let panels = self.embedded.clone();
         let mut link = self.link();
         link.embedded = Some(panels.unwrap_or_else(|| Embedded(vec![Part::Controls])));
-        let (fragment, _) = link.format_short(self.player.wanted())?;
+        let (fragment, _) = link.format_short(self.player.pending())?;
         let text = |text: &str| {
             let text = text.replace('&', "&amp;").replace('"', "&quot;");
             text.replace('<', "&lt;")
@@ -147,7 +147,7 @@ impl App {
             "<iframe src=\"{}\" width=\"{width}\" height=\"{height}\" style=\"border: 0\" loading=\"lazy\" \
              allow=\"fullscreen; clipboard-write\" title=\"{}\"></iframe>",
             text(&format!("{address}#{fragment}")),
-            text(&self.player.scene().title)
+            text(&self.player.running().title)
         ))
     }
 

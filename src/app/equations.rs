@@ -32,8 +32,8 @@ impl Stated {
 pub fn law(key: &str, scene: &Scene) -> Option<Stated> {
     let (group, last) = key.rsplit_once('.')?;
     let contact = match group.strip_prefix("joint.") {
-        Some(name) => &scene.ball_joints.iter().find(|joint| joint.name == name)?.contact,
-        None if group == "contact" => &scene.contact,
+        Some(name) => &scene.machine.ball_joints.iter().find(|joint| joint.name == name)?.contact,
+        None if group == "contact" => &scene.machine.contact,
         None => return None,
     };
     law_of(last, contact)
@@ -114,7 +114,8 @@ pub fn source(equation: &str) -> String {
 mod tests {
     use super::*;
     use crate::contact::damping_factor;
-    use crate::scene::{Dimension, Quantity, evaluate};
+    use crate::scene::{Quantity, evaluate};
+    use crate::units::Dimension;
 
     #[test]
     fn equations_are_named_by_their_paper() {

@@ -37,9 +37,9 @@ impl App {
             return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
-        let (plots, window) = shown::changed(&self.plots, player.wanted());
+        let (plots, window) = shown::changed(&self.plots, player.pending());
         let followed = self.viewport.followed();
-        let joints = &player.scene().ball_joints;
+        let joints = &player.running().machine.ball_joints;
         let under_microscope = joints.get(self.microscope.joint());
         let instruments = Instruments {
             microscope: under_microscope.filter(|_| self.microscope.is_open()).map(|joint| joint.name.clone()),
@@ -50,7 +50,7 @@ impl App {
         Link {
             lesson,
             step,
-            scene: SceneText::of(player.wanted()),
+            scene: SceneText::of(player.pending()),
             log: player.log(),
             steps: Some(player.steps()),
             time: Some(player.pacer.shown()),
@@ -58,7 +58,7 @@ impl App {
             time_scale: Some(player.pacer.scale()),
             camera: self.viewport.pose(),
             magnification: Some(self.viewport.options.magnification),
-            follow: followed.and_then(|part| shown::name_followed(player.scene(), part)),
+            follow: followed.and_then(|part| shown::name_followed(player.running(), part)),
             plots,
             channels: (!self.plots.picked.is_empty()).then(|| self.plots.picked.clone()),
             window,
@@ -67,7 +67,7 @@ impl App {
             playing: Some(player.is_playing()),
             theme: None,
             version: Some(crate::VERSION.to_owned()),
-            beside: player.wanted().source.beside.clone(),
+            beside: player.pending().source.beside.clone(),
         }
     }
 
@@ -86,7 +86,7 @@ impl App {
     /// Whether the changes to a scene of the user's own, none of the built-in ones, would be lost with this window: not if they are in
     /// a file or came with a link. `None` as long as nothing was changed or saved since the link that it was opened with.
     pub fn unsaved(&self) -> Option<bool> {
-        let wanted = self.player.wanted();
+        let wanted = self.player.pending();
         if matches!(SceneText::of(wanted), SceneText::BuiltIn(_)) {
             return Some(false);
         }
@@ -106,7 +106,7 @@ impl App {
             self.show_link_dialog();
             return;
         }
-        match self.link().format_short(self.player.wanted()) {
+        match self.link().format_short(self.player.pending()) {
             Ok((fragment, note)) => {
                 self.copy(ctx, format!("{address}#{fragment}"));
                 note.into_iter().for_each(|note| self.say(note));
@@ -281,7 +281,7 @@ impl App {
 
     /// Saves the scene file with the changes in it.
     pub fn save_scene(&mut self) {
-        let scene = self.player.wanted();
+        let scene = self.player.pending();
         match scene.to_toml() {
             Ok(text) => {
                 let name = format!("{}.toml", scene.name);
@@ -294,7 +294,7 @@ impl App {
     /// The changes are in a file now, if the scene is among `files`.
     fn note_saved(&mut self, files: &[SaveFile]) {
         if files.iter().any(|file| file.mime == SCENE_TYPE) {
-            let changes = self.player.wanted().changes.clone();
+            let changes = self.player.pending().changes.clone();
             self.scene_file.saved_with(changes);
         }
     }
@@ -383,7 +383,7 @@ pub fn verdict_words(verdict: &Verdict) -> String {
 
 /// Scene and time, for the names of files.
 fn file_stem(player: &Player) -> String {
-    format!("{}-{:.3}ms", player.scene().name, player.pacer.shown() * 1e3)
+    format!("{}-{:.3}ms", player.running().name, player.pacer.shown() * 1e3)
 }
 
 /// The record of a run, and what made it.
@@ -432,7 +432,7 @@ fn record_csv(player: &Player) -> String {
 
 /// Metadata: what made the record, and `more` about what is in it.
 pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Value); N]) -> String {
-    let scene = player.scene();
+    let scene = player.running();
     let changed: Map<String, serde_json::Value> =
         scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
     let mut meta = json!({
@@ -441,16 +441,16 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         "scene": scene.name,
         "scene_file": scene.source.file,
         "changed_parameters": changed,
-        "formulation": scene.formulation,
-        "method": scene.solver.method,
-        "step_s": scene.solver.step,
-        "tolerance": scene.solver.tolerance,
+        "formulation": scene.machine.formulation,
+        "method": scene.machine.solver.method,
+        "step_s": scene.machine.solver.step,
+        "tolerance": scene.machine.solver.tolerance,
         "time_s": player.pacer.shown(),
         // The state is that at the end of the latest step.
         "state_time_s": player.simulation().time(),
         "state_hash": format!("{:016x}", player.simulation().state_hash()),
     });
-    let wanted = player.wanted();
+    let wanted = player.pending();
     if wanted.source.beside.is_empty() {
         let link = Link {
             scene: SceneText::of(wanted),
@@ -478,11 +478,11 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
 fn describe(player: &Player) -> String {
     let mut words = format!(
         "{} at t = {}, state hash {:016x}",
-        player.scene().name,
+        player.running().name,
         value::time(player.pacer.shown()),
         player.simulation().state_hash()
     );
-    for (key, value) in &player.scene().changes {
+    for (key, value) in &player.running().changes {
         let _ = write!(words, ", {key} = {value}");
     }
     words

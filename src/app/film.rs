@@ -247,7 +247,7 @@ impl App {
         match going_on.and_then(finish) {
             Ok(bytes) => {
                 self.save(vec![SaveFile {
-                    name: format!("{}.{format}", self.player.scene().name),
+                    name: format!("{}.{format}", self.player.running().name),
                     mime: format.mime(),
                     bytes,
                 }]);

@@ -66,6 +66,7 @@ impl App {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::Machine;
     use crate::scene::Scene;
     use crate::simulate::{Frame, Simulation, closed};
     use crate::view::{LabelKind, PeakMarks, ViewOptions, output_point, to_f32};
@@ -78,14 +79,14 @@ mod tests {
         player.run_to(0.06);
         player.place_ghost();
         let time = player.frame().time;
-        let tip = |scene: &Scene| {
+        let tip = |machine: &Machine| {
             let mut frame = Frame::default();
-            let mut run = Simulation::new(scene).expect("starts");
+            let mut run = Simulation::new(machine).expect("starts");
             run.advance_to(time).expect("runs");
             run.sample(time, &mut frame);
-            output_point(&scene.output, &frame).expect("has a body")
+            output_point(&machine.output, &frame).expect("has a body")
         };
-        let (ideal, error) = (tip(&closed(&scene)), tip(&scene) - tip(&closed(&scene)));
+        let (ideal, error) = (tip(&closed(&scene.machine)), tip(&scene.machine) - tip(&closed(&scene.machine)));
         let view = SceneView::new(&scene, player.frame());
         let (marks, camera) = (PeakMarks::new(), view.camera());
         for magnification in [1.0, 10.0] {

@@ -123,7 +123,7 @@ impl App {
     }
 
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
-        let name = self.player.scene().name.clone();
+        let name = self.player.running().name.clone();
         let (mut wanted, mut link) = (None, false);
         ComboBox::from_id_salt("scene")
             .width(if compact { 150.0 } else { 170.0 })
@@ -150,7 +150,7 @@ impl App {
                 }
             })
             .response
-            .on_hover_text(&self.player.scene().title)
+            .on_hover_text(&self.player.running().title)
             .accessible_name("Scene");
         if let Some(wanted) = wanted {
             self.problem = self.open(wanted).err();
@@ -262,7 +262,7 @@ impl App {
     /// Whether the scene is the one that a visitor meets, and nobody has said that this is understood.
     fn tells_changes(&self) -> bool {
         let here = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
-        here && !self.changes_seen && opening::is_rattling(self.player.wanted())
+        here && !self.changes_seen && opening::is_rattling(self.player.pending())
     }
 
     /// Says with which changes the window began; one click takes them back.

@@ -204,7 +204,7 @@ impl Course {
         let begin = &self.lesson.steps[self.lesson.beginning(self.step)];
         let same = (!begin.twin || player.twin().is_some())
             && log.base == run.scene.changes
-            && player.scene().source.text == run.scene.source.text
+            && player.running().source.text == run.scene.source.text
             && log.entries.len() == run.changes.len();
         let mut pairs = log.entries.iter().zip(player.flags()).zip(&run.changes);
         same && pairs.all(|((entry, flag), (time, key, value))| {
@@ -304,7 +304,7 @@ impl App {
         let mut ends = before.iter().rev().filter_map(|step| step.until.as_ref());
         let whole = begin.twin || !course.lesson.runs[begin.run].changes.is_empty();
         let left_at = ends.find_map(|until| names.time(until)).filter(|_| !whole);
-        let same = self.player.wanted().source.text == scene.source.text;
+        let same = self.player.pending().source.text == scene.source.text;
         let pose = self.viewport.pose().filter(|_| same && link.camera.is_none());
         self.problem = self.show_scene(&scene).err();
         self.player.set_playing(false);
@@ -419,7 +419,7 @@ impl App {
     /// Rings around what the step points at, over everything: they move nothing.
     pub(super) fn point_out(&self, ui: &egui::Ui) {
         let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
-        let joints = &self.player.scene().ball_joints;
+        let joints = &self.player.running().machine.ball_joints;
         let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
         let places = Spots::places(ui.ctx(), &self.pointed_controls());
         let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
@@ -446,7 +446,7 @@ impl App {
     /// Names of the controls that the step points at.
     fn pointed_controls(&self) -> Vec<String> {
         let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
-        let joints = &self.player.scene().ball_joints;
+        let joints = &self.player.running().machine.ball_joints;
         wanted.iter().filter(|name| joints.iter().all(|joint| joint.name != **name)).cloned().collect()
     }
 }

@@ -94,7 +94,7 @@ impl Microscope {
     }
 
     fn contents(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
-        let joints = &player.scene().ball_joints;
+        let joints = &player.running().machine.ball_joints;
         self.joint = self.joint.min(joints.len().saturating_sub(1));
         let mut chosen = None;
         ui.horizontal_wrapped(|ui| {
@@ -138,7 +138,7 @@ impl Microscope {
             return chosen;
         };
         let space = ui.available_size();
-        let axes = self.plane.axes(player.scene().view.down, view);
+        let axes = self.plane.axes(player.running().view.down, view);
         if space.x >= WIDE && space.x > space.y {
             ui.horizontal_top(|ui| {
                 let side = (space.x - NUMBERS - 8.0).min(space.y).max(96.0);
@@ -166,7 +166,7 @@ impl Microscope {
     fn sphere(&mut self, ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2], size: egui::Vec2) {
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
         let report = &sight.report;
-        let name = player.scene().ball_joints.get(self.joint);
+        let name = player.running().machine.ball_joints.get(self.joint);
         let words = format!(
             "Ball joint {} under the microscope. {}. Ball's centre {} from the socket's, clearance {}.",
             name.map_or("", |joint| &joint.name),

@@ -72,8 +72,9 @@ use eframe::egui_wgpu;
 
 use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;
+use crate::machine::Vec3;
 use crate::render;
-use crate::scene::{DEFAULT_SCENE, Scene, Vec3};
+use crate::scene::{DEFAULT_SCENE, Scene};
 use crate::session::{load, log, paths, player, twin, value, watch};
 use crate::simulate::{LONGEST_FRAME, SPELL, Simulation, StartError};
 use crate::view::{Preset, Quality, ViewOptions};
@@ -216,7 +217,7 @@ impl AppOptions {
             return Ok(Self { theme, embedded: link.embedded, ..Self::first() });
         }
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
-        Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
+        Simulation::new(&scene.machine).map_err(|error| format!("link: {}", scene.locate(&error)))?;
         link.followed(&scene).map_err(|error| error.to_string())?;
         link.under_microscope(&scene).map_err(|error| error.to_string())?;
         let mut options = Self::new(scene);
@@ -447,7 +448,7 @@ impl App {
             self.viewport.set_pose(pose);
         }
         // Reading the link has already checked that the parts exist.
-        let scene = self.player.scene();
+        let scene = self.player.running();
         self.viewport.follow(link.followed(scene).ok().flatten());
         if let Some(chosen) = &link.plots {
             self.plots.chosen.clone_from(chosen);
@@ -571,11 +572,11 @@ impl App {
             bench::Asked::Ready(sweep) => match sweep.scene() {
                 Err(error) => self.problem = Some(error.to_string()),
                 Ok(scene) => {
-                    let lost = value::changes(self.player.wanted());
+                    let lost = value::changes(self.player.pending());
                     // What another ready sweep has changed is no loss.
                     let opened = READY.iter().filter_map(|ready| ready.scene().ok());
                     let mut known = opened.chain([scene]);
-                    let same = known.any(|scene| value::differences(&scene, self.player.wanted(), &[]).is_empty());
+                    let same = known.any(|scene| value::differences(&scene, self.player.pending(), &[]).is_empty());
                     if same || lost.is_empty() {
                         self.start_ready(sweep);
                     } else {
@@ -591,7 +592,7 @@ impl App {
         let scene = sweep.scene().map_err(|error| error.to_string());
         self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
         if self.problem.is_none() {
-            self.bench.start(sweep, self.player.wanted());
+            self.bench.start(sweep, self.player.pending());
         }
     }
 
@@ -600,7 +601,7 @@ impl App {
         match load.scene.scene() {
             Err(error) => self.problem = Some(error.to_string()),
             Ok(scene) => {
-                let changes = value::differences(&scene, self.player.wanted(), load.varied());
+                let changes = value::differences(&scene, self.player.pending(), load.varied());
                 if changes.is_empty() {
                     self.go_to_section(load);
                 } else {
@@ -616,7 +617,7 @@ impl App {
         let phase = self.player.watch().phase();
         let twin = self.player.twin().is_some();
         let pose = self.viewport.pose();
-        let (there, here) = (&load.scene, SceneSource::of(self.player.wanted()));
+        let (there, here) = (&load.scene, SceneSource::of(self.player.pending()));
         let same = (&there.text, &there.beside) == (&here.text, &here.beside);
         let file = self.scene_file.name().map(str::to_owned).filter(|_| same);
         let scene = load.scene.scene().map_err(|error| error.to_string());
@@ -680,7 +681,7 @@ impl App {
                 self.beside = None;
                 self.viewport.restart(&self.player);
             }
-            Err(error) => self.problem = Some(error.located(self.player.wanted()).to_string()),
+            Err(error) => self.problem = Some(self.player.pending().locate(&error).to_string()),
         }
     }
 
@@ -812,11 +813,11 @@ impl App {
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
-        let mut player = Player::new(scene).map_err(|error| error.located(scene).to_string())?;
+        let mut player = Player::new(scene).map_err(|error| scene.locate(&error).to_string())?;
         // Its time scale is not that of the run.
         self.cancel_film();
         player.clock = self.player.clock;
-        let another = scene.source.text != self.player.wanted().source.text;
+        let another = scene.source.text != self.player.pending().source.text;
         let scale = if another { opening::time_scale(scene) } else { self.player.pacer.scale() };
         player.pacer.set_scale(scale);
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
@@ -891,7 +892,7 @@ impl App {
                 }
             }
             Action::CloseUp(joint) => {
-                if joint < self.player.scene().ball_joints.len() {
+                if joint < self.player.running().machine.ball_joints.len() {
                     self.microscope.focus(joint);
                     self.viewport.close_up(&self.player, joint);
                 }

@@ -85,7 +85,7 @@ mod tests {
         for name in BUILT_IN {
             let scene = Scene::load(name, &[]).expect("built in");
             let end = time_scale(&scene);
-            let mut simulation = Simulation::new(&scene).expect("starts");
+            let mut simulation = Simulation::new(&scene.machine).expect("starts");
             let mut peaks = Vec::new();
             let mut impacts = 0;
             while simulation.time() < end {
@@ -105,7 +105,7 @@ mod tests {
             Quantity::ProbeError => "probe-error".to_owned(),
             _ => quantity.label().to_lowercase().replace(' ', "-"),
         });
-        assert_eq!(words.each_ref().map(String::as_str), crate::scene::PLOT_WORDS);
+        assert_eq!(words.each_ref().map(String::as_str), crate::simulate::PLOT_WORDS);
     }
 
     #[test]
@@ -114,7 +114,7 @@ mod tests {
         assert!(is_rattling(&scene));
         let period = drive_period(&scene).expect("driven");
         assert!((3.0..6.0).contains(&(period / RATTLING_SCALE)));
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut peaks = Vec::new();
         for turn in 1..=12 {
             let mut impacts = 0;

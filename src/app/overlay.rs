@@ -7,8 +7,9 @@ use eframe::egui::{Align2, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec
 use super::labels::{self, Places};
 pub(super) use super::labels::{SMALL, colour, has_room, text};
 use super::value;
-use crate::scene::{Scene, format_quantity_digits};
+use crate::scene::Scene;
 use crate::simulate::{ContactState, Frame};
+use crate::units::format_quantity_digits;
 use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
 
 /// Distance of overlays from the edge, points.
@@ -138,8 +139,9 @@ pub fn plates(rect: Rect, joints: usize, options: &ViewOptions) -> Vec<Rect> {
 
 /// One line per ball joint: its forces as the step reported them.
 pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
-    let newtons = |force: &crate::scene::Vec3| format_quantity_digits(force.norm(), "N", 4);
+    let newtons = |force: &crate::machine::Vec3| format_quantity_digits(force.norm(), "N", 4);
     scene
+        .machine
         .ball_joints
         .iter()
         .zip(&frame.joints)
@@ -348,7 +350,7 @@ mod tests {
         for (scene, joints) in [("hexapod", 12), ("delta", 12)] {
             let scene = Scene::load(scene, &[]).expect("built in");
             let mut frame = Frame::default();
-            let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+            let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
             simulation.sample(0.0, &mut frame);
             let view = SceneView::new(&scene, &frame);
             let (options, marks, size) = (ViewOptions::default(), PeakMarks::new(), [640, 400]);
@@ -368,7 +370,7 @@ mod tests {
             view.build(&shot, &mut list);
             let named = |kind| matches!(kind, LabelKind::Joint(_));
             list.labels.retain(|label| named(label.kind));
-            assert_eq!(list.labels.len(), joints.min(scene.ball_joints.len()));
+            assert_eq!(list.labels.len(), joints.min(scene.machine.ball_joints.len()));
             let rect = Rect::from_min_size(Pos2::ZERO, vec2(640.0, 400.0));
             let (mut plates, mut ends) = (Vec::new(), Vec::new());
             for shape in shapes_of(&list, rect) {

@@ -176,7 +176,7 @@ const MOST_FOUND: usize = 60;
 
 /// Names of channels that contain `search`, or match it as a pattern: without it, all groups of components.
 fn find(player: &Player, search: &str) -> Vec<Entry> {
-    let list = channels_of(player.scene(), player.frame());
+    let list = channels_of(&player.running().machine, player.frame());
     let wanted = search.to_lowercase();
     let mut entries: Vec<Entry> = Vec::new();
     let mut add = |name: &str, unit: &'static str| {
@@ -292,7 +292,7 @@ impl Plots {
                 }
             }
         }
-        if player.scene().ball_joints.len() > RECORDED_JOINTS {
+        if player.running().machine.ball_joints.len() > RECORDED_JOINTS {
             ui.label(RichText::new(format!("The first {RECORDED_JOINTS} ball joints are recorded")).small().weak());
         }
         ui.separator();

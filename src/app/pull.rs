@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::player::Player;
-use crate::scene::Vec3 as Exact;
+use crate::machine::Vec3 as Exact;
 use crate::simulate::Pull;
 use crate::view::{Camera, Hit, Picked};
 
@@ -18,16 +18,16 @@ pub struct Grip {
 impl Grip {
     /// Takes hold of what was hit; `None` if it does not move.
     pub fn new(player: &Player, hit: Hit) -> Option<Self> {
-        let scene = player.scene();
+        let scene = player.running();
         let body = match hit.what {
             Picked::Body(body) => body,
-            Picked::Joint(joint) => scene.ball_joints.get(joint)?.ball.body?,
+            Picked::Joint(joint) => scene.machine.ball_joints.get(joint)?.ball.body?,
             Picked::Fixed(_) => return None,
         };
         let motion = player.frame().bodies.get(body)?;
         let point = Exact::from(hit.point.to_array().map(f64::from));
         let inside = motion.rotation.tr_mul(&(point - motion.position));
-        Some(Self { pull: Pull::softly(scene, body, inside, point), hand: hit.point })
+        Some(Self { pull: Pull::softly(&scene.machine, body, inside, point), hand: hit.point })
     }
 
     /// The pointer has moved to `pixel`: the hand moves parallel to the picture or, with `depth`, along the line of sight (up
@@ -74,7 +74,7 @@ mod tests {
             grip.hand.distance(to_f32(&point))
         };
         assert!(stretch(&grip, &player) < 1e-6);
-        let view = SceneView::new(player.scene(), player.frame());
+        let view = SceneView::new(player.running(), player.frame());
         let camera = view.camera();
         let size = [800, 600];
         let pixel = camera.project(grip.hand, size).expect("seen");

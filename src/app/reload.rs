@@ -72,7 +72,7 @@ impl App {
         // The changes of a link come on its way.
         let there = self.replay.is_none();
         let file = &mut self.scene_file;
-        let wanted = self.player.wanted();
+        let wanted = self.player.pending();
         if there && file.saved.is_none() {
             file.saved = Some(wanted.changes.clone());
         }
@@ -114,7 +114,7 @@ impl App {
         let name = file.name;
         let bytes = file.content.map_err(|reason| format!("{name}: {reason}"))?;
         let text = String::from_utf8(bytes).map_err(|_| format!("{name}: not a text file"))?;
-        let wanted = self.player.wanted();
+        let wanted = self.player.pending();
         let source = &wanted.source;
         let again = |scene: Scene| scene.source.beside == source.beside;
         let same = text == source.text;
@@ -138,7 +138,7 @@ impl App {
             let before = before.as_ref().ok().and_then(|scene| scene.get(key).ok());
             before.is_some() && before == after.get(key).ok()
         };
-        let mut changes = self.player.wanted().changes.clone();
+        let mut changes = self.player.pending().changes.clone();
         changes.retain(|(key, _)| stays(key));
         let scene = self.parse_file(&name, &text, &given, &changes);
         let scene = scene.map_err(|error| error.to_string())?;

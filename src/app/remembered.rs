@@ -120,9 +120,9 @@ impl Store {
         };
         let load = || Scene::load(name, &[]).map_err(|error| error.to_string());
         let opened = is_there(name).and_then(|()| load());
-        let started = opened.and_then(|scene| match Simulation::new(&scene) {
+        let started = opened.and_then(|scene| match Simulation::new(&scene.machine) {
             Ok(_) => Ok(AppOptions::new(scene)),
-            Err(error) => Err(error.located(&scene).to_string()),
+            Err(error) => Err(scene.locate(&error).to_string()),
         });
         started.unwrap_or_else(|reason| AppOptions {
             problem: Some(format!("Cannot open the last scene: {reason}")),
@@ -167,7 +167,7 @@ impl App {
         let (scale, zoom) = (ctx.zoom_factor(), self.own_zoom(ctx));
         let whole_screen = self.is_presenting();
         let file = self.scene_file.name().map(|name| absolute(Path::new(name)));
-        let scene = self.player.wanted();
+        let scene = self.player.pending();
         let built_in = built_in_text(&scene.name).is_some_and(|text| *text == *scene.source.text);
         let teaching = self.course.is_some();
         let Some(store) = &mut self.store else {

@@ -154,7 +154,7 @@ mod tests {
     /// A link to where `player` is, through its text.
     fn link_to(player: &Player) -> Link {
         let link = Link {
-            scene: SceneText::of(player.scene()),
+            scene: SceneText::of(player.running()),
             log: player.log(),
             steps: Some(player.steps()),
             time: Some(player.pacer.shown()),
@@ -207,7 +207,7 @@ mod tests {
             // Smaller than the ball's eccentricity: the wall closes in over many steps.
             original.set("contact.clearance", "0.1 mm").expect("in range");
             play(&mut original, 3);
-            let joint = original.scene().ball_joints[0].name.clone();
+            let joint = original.running().machine.ball_joints[0].name.clone();
             let own = format!("joint.{joint}.clearance");
             original.set(&own, "0.4 mm").expect("in range");
             original.set_playing(false);
@@ -317,6 +317,6 @@ mod tests {
         let (player, verdict, _) = follow(link, 5);
         assert_eq!(verdict, Verdict::Reached);
         assert_eq!(player.pacer.shown(), 9.5e-3);
-        assert_eq!(player.log(), Log::new(&player.scene().changes));
+        assert_eq!(player.log(), Log::new(&player.running().changes));
     }
 }

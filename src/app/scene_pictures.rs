@@ -87,7 +87,7 @@ impl ScenePictures {
 /// What is drawn of `scene`: all of it at its start, without forces, axes and names.
 fn list(scene: &Scene, theme: Theme, size: [u32; 2], pixels_per_point: f32) -> Option<DrawList> {
     let mut frame = Frame::default();
-    Simulation::new(scene).ok()?.sample(0.0, &mut frame);
+    Simulation::new(&scene.machine).ok()?.sample(0.0, &mut frame);
     let bare = ArrowOptions { normal: false, friction: false, peaks: false, ..ArrowOptions::default() };
     let options = ViewOptions {
         theme,

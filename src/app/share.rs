@@ -14,11 +14,9 @@ use eframe::egui::ThemePreference;
 use super::embed::Embedded;
 use super::log::Log;
 use super::plots::Window;
-use crate::scene::{
-    DEFAULT_SCENE, Dimension, LARGEST_FILE, Scene, SceneError, Texts, built_in_text, parse_quantity, visible,
-    visible_line,
-};
+use crate::scene::{DEFAULT_SCENE, LARGEST_FILE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
 use crate::simulate::{Quantity, SCALE_RANGE};
+use crate::units::{Dimension, parse_quantity};
 use crate::view::Picked;
 use shown::Instruments;
 
@@ -461,11 +459,11 @@ impl Link {
         let Some(name) = self.instruments.as_ref().and_then(|i| i.microscope.as_ref()) else {
             return Ok(None);
         };
-        let mut joints = scene.ball_joints.iter();
+        let mut joints = scene.machine.ball_joints.iter();
         match joints.position(|joint| joint.name == *name) {
             Some(joint) => Ok(Some(joint)),
             None => {
-                let known: Vec<_> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
+                let known: Vec<_> = scene.machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
                 let message = format!("no such ball joint; allowed: {}", known.join(", "));
                 Err(fault("show", &format!("microscope.{name}"), message))
             }

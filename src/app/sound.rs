@@ -63,7 +63,7 @@ impl App {
         let stretch = Stretch { from, to: player.pacer.shown(), lasts: dt };
         // The simulation may be a step ahead of what is on show.
         let impacts = player.simulation().impacts();
-        clicks(impacts, &stretch, mass(player.scene()), &mut self.sound.clicks);
+        clicks(impacts, &stretch, mass(player.running()), &mut self.sound.clicks);
         if !self.sound.clicks.is_empty() {
             self.host.click(&self.sound.clicks);
         }

@@ -248,7 +248,7 @@ impl App {
         self.compare(!held && self.undo.last().is_none_or(|at| now - at > TOGETHER));
         if let Some(edit) = edits.iter().find(|edit| edit.key == PRESET).or(edits.first()) {
             let original = self.player.original(&edit.key);
-            let scene = self.player.wanted();
+            let scene = self.player.pending();
             let kind = scene.parameter(&edit.key).ok().map(|parameter| &parameter.kind);
             let original = original.zip(kind).map(|(value, kind)| value::shown(&value, kind));
             let ends = [&edit.before, &edit.after];

@@ -16,8 +16,8 @@ use super::player::Player;
 use super::pull::Grip;
 use super::share::CameraPose;
 use super::{ghosts, keys, spoken, value, zoom};
+use crate::machine::Vec3 as Exact;
 use crate::render;
-use crate::scene::Vec3 as Exact;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
     Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions, WearMap,
@@ -38,7 +38,7 @@ const STILL: f32 = 6.0;
 macro_rules! shot {
     ($self:ident, $player:ident, $camera:expr, $screen:expr) => {
         Shot {
-            scene: $player.scene(),
+            scene: $player.running(),
             frame: $player.frame(),
             marks: &$self.marks,
             options: &$self.options,
@@ -106,7 +106,7 @@ pub struct Viewport {
 impl Viewport {
     /// A viewport that shows all of the player's scene.
     pub fn new(player: &Player, options: ViewOptions) -> Self {
-        let view = SceneView::new(player.scene(), player.frame());
+        let view = SceneView::new(player.running(), player.frame());
         Self {
             camera: view.camera(),
             goal: None,
@@ -235,7 +235,7 @@ impl Viewport {
 
     /// After a reset: the same shapes at t = 0.
     pub fn restart(&mut self, player: &Player) {
-        self.view = SceneView::new(player.scene(), player.frame());
+        self.view = SceneView::new(player.running(), player.frame());
         self.arrive(player);
         self.followed = None;
     }
@@ -298,7 +298,7 @@ impl Viewport {
     pub fn close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
-            let scene = player.scene();
+            let scene = player.running();
             self.view.close_up(&mut goal, joint, scene, player.frame(), &self.options);
             self.glide(player, goal, joint);
         }
@@ -451,7 +451,7 @@ impl Viewport {
             let plates = plates.take(if self.bare { 1 } else { usize::MAX }).chain(above.iter().copied());
             let corners = |plate: Rect| [plate.min, plate.max].map(|corner| screen.pixel(corner));
             let plates: Vec<_> = plates.map(corners).collect();
-            self.view.fit_around(&mut goal, player.scene(), player.frame(), &self.options, size, &plates);
+            self.view.fit_around(&mut goal, player.running(), player.frame(), &self.options, size, &plates);
             if first {
                 (self.camera, self.goal) = (goal, None);
             } else {
@@ -821,7 +821,7 @@ impl Viewport {
     }
 
     fn extend_trail(&mut self, player: &Player) {
-        let output = &player.scene().output;
+        let output = &player.running().machine.output;
         let (Some(probe), Some(body)) = (output.probe, player.frame().bodies.get(output.body)) else {
             return;
         };
@@ -876,10 +876,10 @@ impl Screen {
 }
 
 fn name_of(player: &Player, picked: Picked) -> Option<&str> {
-    let scene = player.scene();
+    let scene = player.running();
     match picked {
-        Picked::Body(index) => scene.bodies.get(index).map(|body| body.name.as_str()),
-        Picked::Joint(index) => scene.ball_joints.get(index).map(|joint| joint.name.as_str()),
+        Picked::Body(index) => scene.machine.bodies.get(index).map(|body| body.name.as_str()),
+        Picked::Joint(index) => scene.machine.ball_joints.get(index).map(|joint| joint.name.as_str()),
         Picked::Fixed(_) => None,
     }
 }
@@ -899,7 +899,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     ui.strong(name);
     match picked {
         Picked::Body(index) => {
-            if let (Some(body), Some(motion)) = (player.scene().bodies.get(index), frame.bodies.get(index)) {
+            if let (Some(body), Some(motion)) = (player.running().machine.bodies.get(index), frame.bodies.get(index)) {
                 row(ui, "Mass", body.mass, "kg");
                 row(ui, "Speed", motion.velocity.norm(), "m/s");
                 row(ui, "Angular speed", motion.angular_velocity.norm(), "rad/s");

@@ -43,7 +43,7 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
     let mut options = options.unwrap_or_else(begin);
     options.embedded = None;
     // A scene error must keep its type and not become one of the window.
-    Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
+    Player::new(&options.scene).map_err(|error| options.scene.locate(&error))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
         let mut app = App::new(cc, options)?;
         app.set_host(Box::new(DesktopHost::new(page).with_dialogs()));

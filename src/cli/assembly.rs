@@ -4,9 +4,10 @@ use serde_json::{Map, Value as Json, json};
 
 use super::output::significant;
 use super::summary;
+use crate::machine::Machine;
 use crate::mechanism::Placement;
-use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{Doubt, Simulation};
+use crate::units::format_quantity_digits;
 
 /// A body moved or turned by more than this is not where its scene puts it: m, rad.
 const FAR: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
@@ -17,9 +18,9 @@ const NEAR: Placement = Placement { moved: 1e-6, turned: 1e-3 * DEGREE };
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Name of a joint at which trees are cut.
-fn cut_joint(scene: &Scene, joint: usize) -> &str {
-    let closing = || &scene.closing_joints[joint - scene.ball_joints.len()].name;
-    let ball = scene.ball_joints.get(joint).map(|ball| &ball.name);
+fn cut_joint(machine: &Machine, joint: usize) -> &str {
+    let closing = || &machine.closing_joints[joint - machine.ball_joints.len()].name;
+    let ball = machine.ball_joints.get(joint).map(|ball| &ball.name);
     ball.unwrap_or_else(closing)
 }
 
@@ -33,7 +34,7 @@ fn words(placement: &Placement) -> String {
 
 /// Label and text of each line about the assembly.
 fn lines(simulation: &Simulation) -> Vec<(String, String)> {
-    let scene = simulation.scene();
+    let machine = simulation.machine();
     let assembly = simulation.mechanism().assembly();
     let Some((joint, gap)) = assembly.widest else {
         return vec![("Assembly".to_owned(), "none: no joint starts closed".to_owned())];
@@ -41,22 +42,22 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
     let guess = if assembly.closed_form { "in the drives' closed form" } else { "as given" };
     let mode = if assembly.other_mode { "; another assembly mode than the guess's" } else { "" };
     let gap = if gap > NEAR.moved {
-        format!("largest gap {guess} {} at {}", format_quantity_digits(gap, "mm", 4), cut_joint(scene, joint))
+        format!("largest gap {guess} {} at {}", format_quantity_digits(gap, "mm", 4), cut_joint(machine, joint))
     } else {
         format!("no gap {guess}")
     };
     let turned = assembly.most_turned.filter(|(_, turned)| *turned > NEAR.turned);
     let turned = turned.map_or_else(String::new, |(joint, turned)| {
-        format!("; turned most {} at {}", format_quantity_digits(turned, "deg", 4), cut_joint(scene, joint))
+        format!("; turned most {} at {}", format_quantity_digits(turned, "deg", 4), cut_joint(machine, joint))
     });
     let mut lines = vec![("Assembly".to_owned(), gap + &turned + mode)];
-    let bodies = || scene.bodies.iter().zip(&assembly.bodies);
+    let bodies = || machine.bodies.iter().zip(&assembly.bodies);
     for (body, placement) in bodies().filter(|(_, p)| exceeds(p, &NEAR)) {
         lines.push((format!("  {}", body.name), words(placement)));
     }
     let still = bodies().filter(|(_, p)| !exceeds(p, &NEAR)).count();
     if still > 0 {
-        let who = if still == scene.bodies.len() { "  every body" } else { "  every other body" };
+        let who = if still == machine.bodies.len() { "  every body" } else { "  every other body" };
         let text = "moved less than 0.001 mm, turned less than 0.001°";
         lines.push((who.to_owned(), text.to_owned()));
     }
@@ -65,20 +66,20 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
 
 /// Assembly results that the scene can hardly intend.
 fn warnings(simulation: &Simulation) -> Vec<String> {
-    let scene = simulation.scene();
+    let machine = simulation.machine();
     let assembly = simulation.mechanism().assembly();
-    let far = scene.bodies.iter().zip(&assembly.bodies);
+    let far = machine.bodies.iter().zip(&assembly.bodies);
     let far = far.filter(|(_, placement)| exceeds(placement, &FAR));
     let far: Vec<String> = far.map(|(body, placement)| format!("{} {}", body.name, words(placement))).collect();
     let mut warnings = Vec::new();
     if !far.is_empty() {
         let open = assembly.widest.filter(|(_, gap)| *gap > NEAR.moved);
         let open = open.map(|(joint, gap)| {
-            format!(" {} was {} open.", cut_joint(scene, joint), format_quantity_digits(gap, "mm", 4))
+            format!(" {} was {} open.", cut_joint(machine, joint), format_quantity_digits(gap, "mm", 4))
         });
         let askew = assembly.most_turned.filter(|(_, turned)| *turned > NEAR.turned);
         let askew = askew.map(|(joint, turned)| {
-            format!(" {} was {} out of line.", cut_joint(scene, joint), format_quantity_digits(turned, "deg", 4))
+            format!(" {} was {} out of line.", cut_joint(machine, joint), format_quantity_digits(turned, "deg", 4))
         });
         let gap: String = open.into_iter().chain(askew).collect();
         warnings.push(format!(
@@ -115,13 +116,13 @@ impl Start {
     /// From a simulation at its start.
     pub fn of(simulation: &mut Simulation) -> Self {
         let loose = simulation.not_unique();
-        let scene = simulation.scene();
-        let driven: Vec<&String> = scene.driven().map(|(joint, _)| &joint.name).collect();
+        let machine = simulation.machine();
+        let driven: Vec<&String> = machine.driven().map(|(joint, _)| &joint.name).collect();
         let reactions = loose.reactions.iter();
         Self {
             lines: lines(simulation),
             warnings: warnings(simulation),
-            reactions: reactions.map(|&j| cut_joint(scene, j).to_owned()).collect(),
+            reactions: reactions.map(|&j| cut_joint(machine, j).to_owned()).collect(),
             actuators: loose.actuators.iter().map(|&i| driven[i].clone()).collect(),
             assembly: json(simulation),
         }
@@ -157,9 +158,9 @@ impl Start {
 
 /// The assembly for a script: m and rad.
 fn json(simulation: &Simulation) -> Json {
-    let scene = simulation.scene();
+    let machine = simulation.machine();
     let assembly = simulation.mechanism().assembly();
-    let bodies = scene.bodies.iter().zip(&assembly.bodies);
+    let bodies = machine.bodies.iter().zip(&assembly.bodies);
     let bodies: Map<String, Json> = bodies
         .map(|(body, p)| {
             let placement = json!({"moved_m": p.moved, "turned_rad": p.turned});
@@ -168,7 +169,7 @@ fn json(simulation: &Simulation) -> Json {
         .collect();
     let widest = assembly.widest;
     json!({
-        "largest_gap_joint": widest.map(|(joint, _)| cut_joint(scene, joint)),
+        "largest_gap_joint": widest.map(|(joint, _)| cut_joint(machine, joint)),
         "largest_gap_m": widest.map(|(_, gap)| gap),
         "other_mode": assembly.other_mode,
         "bodies": bodies,

@@ -6,7 +6,8 @@ use super::args::BenchArguments;
 use super::tradeoff::{grid, percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
 use crate::analysis::{GROWTH, Reach, SPEED_GOALS, Speed, growth, reach, speed};
-use crate::scene::{Scene, format_quantity};
+use crate::scene::Scene;
+use crate::units::format_quantity;
 
 /// Runs `bench`.
 ///

@@ -11,11 +11,11 @@ use crate::analysis::beginning::Beginning;
 use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
+use crate::machine::{BallJoint, Body, Element, Formulation, Joint, JointKind};
 use crate::mechanism::{ElementReport, Summary};
-use crate::scene::{
-    BallJoint, Body, Element, Formulation, Joint, JointKind, Scene, format_quantity, format_quantity_digits, to_display,
-};
+use crate::scene::Scene;
 use crate::simulate::{Frame, Listed, Peak, Simulation, channels_of};
+use crate::units::{format_quantity, format_quantity_digits, to_display};
 
 /// Runs `check`.
 ///
@@ -29,7 +29,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     if arguments.channels {
-        return print(&channels(&channels_of(&scene, &frame)));
+        return print(&channels(&channels_of(&scene.machine, &frame)));
     }
     let contents = simulation.mechanism().summary();
     let beginning = (contents.contacts > 0).then(|| Beginning::of(&mut simulation));
@@ -73,15 +73,22 @@ fn report(
     let mut line = |label: &str, value: &str| {
         let _ = writeln!(out, "{label:<22}{value}");
     };
-    line("Bodies", &format!("{} moving: {}", scene.bodies.len(), names(scene.bodies.iter().map(|body| &body.name))));
-    for body in scene.bodies.iter().filter(|body| body.density.is_some()) {
+    line(
+        "Bodies",
+        &format!(
+            "{} moving: {}",
+            scene.machine.bodies.len(),
+            names(scene.machine.bodies.iter().map(|body| &body.name))
+        ),
+    );
+    for body in scene.machine.bodies.iter().filter(|body| body.density.is_some()) {
         line(&format!("  {}", body.name), &of_its_shapes(body));
     }
-    line("Joints", &joints(&scene.joints));
-    if !scene.closing_joints.is_empty() {
-        line("Close loops", &joints(&scene.closing_joints));
+    line("Joints", &joints(&scene.machine.joints));
+    if !scene.machine.closing_joints.is_empty() {
+        line("Close loops", &joints(&scene.machine.closing_joints));
     }
-    for (joint, [force, torque]) in scene.closing_joints.iter().zip(&start.closing) {
+    for (joint, [force, torque]) in scene.machine.closing_joints.iter().zip(&start.closing) {
         let unique = !begun.reactions.contains(&joint.name);
         let words = format!(
             "reaction at the start {} N and {} N m{}",
@@ -92,23 +99,23 @@ fn report(
         line(&format!("  {}", joint.name), &words);
     }
     line("Ball joints", &format!("{} with clearance, {} ideal", contents.contacts, contents.ideal_joints));
-    for (joint, report) in scene.ball_joints.iter().zip(&start.joints) {
+    for (joint, report) in scene.machine.ball_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
             &ball_joint(joint, report.normal_force.norm(), !begun.reactions.contains(&joint.name)),
         );
     }
-    if !scene.elements.is_empty() {
-        line("Force elements", &format!("{}, with what they exert at the start", scene.elements.len()));
+    if !scene.machine.elements.is_empty() {
+        line("Force elements", &format!("{}, with what they exert at the start", scene.machine.elements.len()));
     }
-    for (element, report) in scene.elements.iter().zip(&start.elements) {
+    for (element, report) in scene.machine.elements.iter().zip(&start.elements) {
         line(&format!("  {}", element.name), &force_element(element, report));
     }
     begun.lines.iter().for_each(|(label, words)| line(label, words));
     if let Some(beginning) = beginning {
         let until = format_quantity_digits(beginning.until, "ms", 4);
         line("Beginning", &format!("largest contact forces of the first {until}"));
-        let loose = scene.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
+        let loose = scene.machine.ball_joints.iter().zip(&beginning.peaks).filter(|(joint, _)| !is_ideal(joint));
         for (joint, peak) in loose.take(MOST_JOINTS) {
             line(&format!("  {}", joint.name), &first_contact(peak));
         }
@@ -123,14 +130,14 @@ fn report(
         "Equations",
         &format!(
             "{} formulation: {} velocity coordinates, {} constraint rows",
-            scene.formulation, contents.velocity_coordinates, contents.constraint_rows
+            scene.machine.formulation, contents.velocity_coordinates, contents.constraint_rows
         ),
     );
     line("Method", &method(scene, contents));
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
-    let warnings = scene.warnings().into_iter().map(|w| w.to_string());
+    let warnings = scene.machine.warnings().into_iter().map(|w| w.to_string());
     warnings
         .chain(too_slow(scene).map(|slow| slow.to_string()))
         .chain(near_singular(scene).map(|near| near.to_string()))
@@ -213,7 +220,7 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
     let force = report.own_force().map(|force| format!("{} N", significant(force.norm(), 6)));
     let torque = report.torque.map(|torque| format!("{} N m", significant(torque.norm(), 6)));
     let exerts: Vec<String> = force.into_iter().chain(torque).collect();
-    format!("{}: {}", element.kind.section, exerts.join(" and "))
+    format!("{}: {}", element.kind.word(), exerts.join(" and "))
 }
 
 /// Ball joints whose beginning is listed at most.
@@ -257,8 +264,8 @@ fn rows(contents: &Summary) -> String {
 }
 
 fn method(scene: &Scene, contents: &Summary) -> String {
-    let method = scene.solver.method;
-    let step = significant(scene.solver.step * 1e6, 6);
+    let method = scene.machine.solver.method;
+    let step = significant(scene.machine.solver.step * 1e6, 6);
     let explicit = method == Method::Automatic
         && contents.solves_differential_equation
         && contents.velocity_coordinates > contents.largest_implicit;
@@ -271,7 +278,10 @@ fn method(scene: &Scene, contents: &Summary) -> String {
         } else {
             String::new()
         };
-        format!("{method}, relative tolerance {}, first step {step} us{alone}", significant(scene.solver.tolerance, 3))
+        format!(
+            "{method}, relative tolerance {}, first step {step} us{alone}",
+            significant(scene.machine.solver.tolerance, 3)
+        )
     } else {
         format!("{method}, step {step} us")
     }
@@ -279,7 +289,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
 
 /// What the run will compute, and what it need not.
 fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
-    let with = |ideal| names(scene.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
+    let with = |ideal| names(scene.machine.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
     let (mut computed, mut left_out) = (Vec::new(), Vec::new());
     let mut sort = |needed: bool, yes: String, no: &str| {
         if needed { computed.push(yes) } else { left_out.push(no.to_owned()) }
@@ -301,7 +311,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     let rubs = |joint: &&BallJoint| {
         !is_ideal(joint) && joint.contact.friction > 0.0 && joint.contact.friction_law != FrictionLaw::None
     };
-    let rubbing = || scene.ball_joints.iter().filter(rubs).map(|joint| &joint.name);
+    let rubbing = || scene.machine.ball_joints.iter().filter(rubs).map(|joint| &joint.name);
     sort(rubbing().next().is_some(), format!("friction at {}", names(rubbing())), "friction: no contact has any");
     sort(
         contents.ideal_joints > 0,
@@ -309,12 +319,12 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         "reactions of ideal joints: no ball joint is ideal",
     );
     if contents.closing_joints > 0 {
-        let closing = names(scene.closing_joints.iter().map(|joint| &joint.name));
+        let closing = names(scene.machine.closing_joints.iter().map(|joint| &joint.name));
         sort(true, format!("reactions of the joints that close loops at {closing}"), "");
     }
     sort(
         contents.drives > 0,
-        format!("actuator forces at {}", names(scene.driven().map(|(joint, _)| &joint.name))),
+        format!("actuator forces at {}", names(scene.machine.driven().map(|(joint, _)| &joint.name))),
         "actuator forces: nothing is driven",
     );
     (computed, left_out)
@@ -354,19 +364,19 @@ impl std::fmt::Display for NearSingular {
 /// Rods that reach do not yet make a good mechanism: near a singular pose the reactions of the ideal joints explode.
 pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let mut rigid = scene.clone();
-    rigid.formulation = Formulation::Tree;
-    rigid.elements.clear();
-    let drive = rigid.spcmm.as_mut()?;
+    rigid.machine.formulation = Formulation::Tree;
+    rigid.machine.elements.clear();
+    let drive = rigid.machine.spcmm.as_mut()?;
     // Sliders at rest have a single pose.
     let instants = if drive.frequency > 0.0 { INSTANTS } else { 0 };
     // Slow, so that the reactions come from weight alone: the poses are the same.
     drive.frequency = SLOW;
     let period = 1.0 / SLOW;
-    for joint in &mut rigid.ball_joints {
+    for joint in &mut rigid.machine.ball_joints {
         joint.contact.clearance = 0.0;
     }
-    let limit = MOST_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
-    let mut simulation = Simulation::new(&rigid).ok()?;
+    let limit = MOST_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let mut simulation = Simulation::new(&rigid.machine).ok()?;
     // Any other motion would need a simulation of arbitrary length.
     if !simulation.mechanism().is_kinematic() {
         return None;

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use super::Failure;
 use crate::analysis::section::Schedule;
 use crate::app::{Entry, Event, Link};
+use crate::scene::LiveScene;
 use crate::scene::Scene;
-use crate::simulate::Simulation;
 
 /// The rest of a link's run.
 pub struct Way {
@@ -48,7 +48,7 @@ impl Way {
     }
 
     /// Whether `simulation` is at the link's instant.
-    pub fn is_there(&self, simulation: &Simulation) -> bool {
+    pub fn is_there(&self, simulation: &LiveScene) -> bool {
         let there = match (self.steps, self.time) {
             (Some(steps), _) => simulation.statistics().steps >= steps,
             (None, Some(time)) => simulation.time() >= time,
@@ -67,7 +67,7 @@ impl Way {
     ///
     /// # Errors
     /// In words: a change that is refused, a step that is refused and was not in the link's run.
-    pub fn step(&mut self, simulation: &mut Simulation, end: Option<f64>) -> Result<(), String> {
+    pub fn step(&mut self, simulation: &mut LiveScene, end: Option<f64>) -> Result<(), String> {
         self.do_due(simulation)?;
         if end.is_none() && self.is_there(simulation) {
             return Ok(());
@@ -79,7 +79,7 @@ impl Way {
         }
     }
 
-    fn do_due(&mut self, simulation: &mut Simulation) -> Result<(), String> {
+    fn do_due(&mut self, simulation: &mut LiveScene) -> Result<(), String> {
         let steps = simulation.statistics().steps;
         while let Some(entry) = self.entries.pop_front_if(|entry| entry.steps <= steps && entry.event != Event::Stop) {
             self.sections = entry.event.schedule().or(self.sections);
@@ -90,13 +90,13 @@ impl Way {
     }
 
     /// Whether a refused step was refused in the link's run, too.
-    fn expects_stop(&mut self, simulation: &Simulation) -> bool {
+    fn expects_stop(&mut self, simulation: &LiveScene) -> bool {
         let steps = simulation.statistics().steps;
         self.entries.pop_front_if(|entry| entry.event == Event::Stop && entry.steps == steps).is_some()
     }
 
     /// The state compared with the link's, in words; the error if they differ.
-    pub fn verdict(&self, simulation: &Simulation) -> Result<String, String> {
+    pub fn verdict(&self, simulation: &LiveScene) -> Result<String, String> {
         let found = simulation.state_hash();
         match self.hash {
             None => Ok("the link has no hash to compare with".to_owned()),

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use super::{Failure, interrupt, progress};
 use crate::analysis::{AnalysisError, RunContext};
 use crate::scene::Scene;
-use crate::simulate::ChangeError;
 
 /// Parts of the progress bar.
 const PARTS: f64 = 1000.0;
@@ -32,8 +31,8 @@ pub fn measure<T>(
         (AnalysisError::Cancelled, _) => {
             Failure::new(Failure::INTERRUPTED, "interrupted; nothing was written".to_owned())
         }
-        (AnalysisError::Start(error), Some(scene)) => error.located(scene).into(),
-        (AnalysisError::Setting(ChangeError::Scene(error)), _) => error.into(),
+        (AnalysisError::Start(error), Some(scene)) => scene.locate(&error).into(),
+        (AnalysisError::Scene(error), _) => error.into(),
         (error @ AnalysisError::Stopped(_), _) => Failure::new(Failure::DIVERGED, error.to_string()),
         (error, _) => Failure::usage(error.to_string()),
     })

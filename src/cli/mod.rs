@@ -45,8 +45,8 @@ use clap::Parser;
 use self::args::{Arguments, Command, LessonArguments, SceneArguments, ViewArguments};
 pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
+use crate::scene::LiveScene;
 use crate::scene::{BENCHMARKS, BUILT_IN, Scene, reference_page, visible};
-use crate::simulate::Simulation;
 
 /// Runs the command line; returns the exit code.
 pub fn main() -> u8 {
@@ -192,8 +192,8 @@ fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
 }
 
 /// Starts a scene; an error names the line of its file and the change that it concerns.
-fn start(scene: &Scene) -> Result<Simulation, Failure> {
-    Simulation::new(scene).map_err(|error| error.located(scene).into())
+fn start(scene: &Scene) -> Result<LiveScene, Failure> {
+    LiveScene::new(scene).map_err(|error| scene.locate(&error).into())
 }
 
 /// Writes results to standard output, with control characters in foreign text made visible; a reader that stops early (`|

@@ -1,6 +1,6 @@
 //! In place of [`super::link`] in a program without the window, which reads no links.
 
-use crate::simulate::Simulation;
+use crate::scene::LiveScene;
 
 /// There is none.
 pub enum Way {}
@@ -17,17 +17,17 @@ impl Way {
     }
 
     /// As there.
-    pub fn is_there(&self, _simulation: &Simulation) -> bool {
+    pub fn is_there(&self, _simulation: &LiveScene) -> bool {
         match *self {}
     }
 
     /// As there.
-    pub fn step(&mut self, _simulation: &mut Simulation, _end: Option<f64>) -> Result<(), String> {
+    pub fn step(&mut self, _simulation: &mut LiveScene, _end: Option<f64>) -> Result<(), String> {
         match *self {}
     }
 
     /// As there.
-    pub fn verdict(&self, _simulation: &Simulation) -> Result<String, String> {
+    pub fn verdict(&self, _simulation: &LiveScene) -> Result<String, String> {
         match *self {}
     }
 }

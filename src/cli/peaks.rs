@@ -3,7 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::output::significant;
-use crate::scene::JointKind;
+use crate::machine::JointKind;
 use crate::simulate::{LoadPeak, Simulation};
 
 /// Units of force and torque, and their members of a summary: value and time.
@@ -40,10 +40,10 @@ impl Part<'_> {
 
 /// All parts whose peaks `simulation` keeps.
 pub fn parts(simulation: &Simulation) -> Vec<Part<'_>> {
-    let scene = simulation.scene();
-    let elements = scene.elements.iter().map(|element| ("Element", &element.name, element.kind.section));
-    let holding = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
-    let joints = holding.chain(&scene.closing_joints).map(|joint| ("Joint", &joint.name, joint.kind.word()));
+    let machine = simulation.machine();
+    let elements = machine.elements.iter().map(|element| ("Element", &element.name, element.kind.word()));
+    let holding = machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+    let joints = holding.chain(&machine.closing_joints).map(|joint| ("Joint", &joint.name, joint.kind.word()));
     let peaks = simulation.load_peaks().map_or(&[][..], |peaks| peaks.parts());
     let largest = |i: usize| peaks.iter().filter_map(|part| part[i]).fold(0.0, |most, (size, _)| size.max(most));
     let rounding = [0, 1].map(|i| ROUNDING * largest(i));

@@ -20,11 +20,11 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
     // Its presence tells that the file of the scene is not all of it.
     let checksum = |text: &str| json!(format!("{:08x}", crc32fast::hash(&file_bytes(text))));
     insert_files(&mut meta, "scene_files_crc32", scene, checksum);
-    meta.insert("formulation".into(), json!(scene.formulation));
-    meta.insert("method".into(), json!(scene.solver.method));
-    meta.insert("step_s".into(), json!(scene.solver.step));
-    if scene.solver.method.is_adaptive() {
-        meta.insert("tolerance".into(), json!(scene.solver.tolerance));
+    meta.insert("formulation".into(), json!(scene.machine.formulation));
+    meta.insert("method".into(), json!(scene.machine.solver.method));
+    meta.insert("step_s".into(), json!(scene.machine.solver.step));
+    if scene.machine.solver.method.is_adaptive() {
+        meta.insert("tolerance".into(), json!(scene.machine.solver.tolerance));
     }
     meta
 }

@@ -1,8 +1,8 @@
 //! Quantities as options: `20ms`, `7.85 ms`, `0`, `30deg`, `500N`.
 
 use super::Failure;
-use crate::scene::{Dimension, parse_quantity};
 use crate::simulate::LONGEST_RUN;
+use crate::units::{Dimension, parse_quantity};
 
 /// A time of a run, s: not negative, and not beyond the longest.
 ///

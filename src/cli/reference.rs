@@ -1,9 +1,9 @@
 //! `reference`: the page of the scene format, whose tables follow from the rows by which the reader goes.
 
 use crate::scene::{
-    ABOVE_ZERO, Absent, DRIVE_KINDS, Dimension, ELEMENT_KINDS, FILE, FileKey, FileTable, Kind, Takes, Variants,
-    dimension_name, file_tables, find, format_quantity, si_unit, unit_table,
+    ABOVE_ZERO, Absent, DRIVE_LAWS, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables, find, is_element,
 };
+use crate::units::{Dimension, dimension_name, format_quantity, si_unit, unit_table};
 
 /// The page as it was when the program was built.
 const PAGE: &str = include_str!("../../docs/scene-format.md");
@@ -50,10 +50,6 @@ fn draw(name: &str) -> Option<String> {
 /// Whether the tables of the page draw this one: there is a table of its name, or it is a force element.
 pub fn has(page: &str, table: &FileTable) -> bool {
     is_element(table) || page.contains(&format!("{START}{} -->", table.name))
-}
-
-fn is_element(table: &FileTable) -> bool {
-    ELEMENT_KINDS.iter().any(|kind| kind.section == table.name)
 }
 
 /// A Markdown table.
@@ -225,8 +221,8 @@ pub fn absent(key: &FileKey) -> String {
 
 /// The laws of drives.
 fn laws() -> String {
-    let row = |kind: &crate::scene::DriveKind| vec![format!("`{}`", kind.word), kind.help.to_owned()];
-    markdown(&["law", "motion"], DRIVE_KINDS.iter().map(row))
+    let row = |kind: &crate::scene::DriveLaw| vec![format!("`{}`", kind.word), kind.help.to_owned()];
+    markdown(&["law", "motion"], DRIVE_LAWS.iter().map(row))
 }
 
 /// All force elements.

@@ -17,8 +17,9 @@ use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::presets::too_slow;
 use crate::files::{FileError, publish};
+use crate::scene::LiveScene;
 use crate::scene::Scene;
-use crate::simulate::{Frame, Simulation};
+use crate::simulate::Frame;
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 256;
@@ -156,7 +157,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if wear_begins && arguments.from_state.is_some() {
             warn("the wear map begins at the saved state, which has none");
         }
-        let warnings = scene.warnings().into_iter().map(|w| w.to_string());
+        let warnings = scene.machine.warnings().into_iter().map(|w| w.to_string());
         warnings
             .chain(too_slow(&scene).map(|slow| slow.to_string()))
             .chain(begun.warnings.iter().cloned())
@@ -283,7 +284,7 @@ fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
 ///
 /// # Errors
 /// As [`state::read`]; a `duration`, s, that is over by then.
-fn go_on(simulation: &mut Simulation, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
+fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
     let Begun { state, time } = state::read(path, scene)?;
     if duration < time {
         return Err(Failure::usage(format!(
@@ -308,7 +309,7 @@ struct Keepers<'a> {
 
 impl Keepers<'_> {
     /// Whether the run is over.
-    fn is_over(&self, simulation: &Simulation, duration: f64) -> bool {
+    fn is_over(&self, simulation: &LiveScene, duration: f64) -> bool {
         let at_link = self.way.as_ref().filter(|_| self.end.is_none());
         at_link.map_or(simulation.time() >= duration, |way| way.is_there(simulation))
     }
@@ -319,7 +320,7 @@ impl Keepers<'_> {
 /// # Errors
 /// The disk that takes the rows.
 fn simulate(
-    simulation: &mut Simulation,
+    simulation: &mut LiveScene,
     (from, duration): (f64, f64),
     times: Option<Times>,
     table: &mut Table,
@@ -375,7 +376,7 @@ fn simulate(
 }
 
 /// Steps until `row` is reached, the run ends, or a check is due; in words, why it stopped. A row never shortens a step.
-fn step_some(simulation: &mut Simulation, row: f64, duration: f64, keepers: &mut Keepers<'_>) -> Result<(), String> {
+fn step_some(simulation: &mut LiveScene, row: f64, duration: f64, keepers: &mut Keepers<'_>) -> Result<(), String> {
     for _ in 0..STEPS_BETWEEN_LOOKS {
         if simulation.time() >= row || keepers.is_over(simulation, duration) {
             break;

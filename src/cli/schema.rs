@@ -4,9 +4,8 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::reference::{absent, capital, value};
-use crate::scene::{
-    ABOVE_ZERO, Absent, Dimension, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables, find, unit_names,
-};
+use crate::scene::{ABOVE_ZERO, Absent, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables, find};
+use crate::units::{Dimension, unit_names};
 
 /// The schema as text.
 pub fn page() -> String {

@@ -10,8 +10,9 @@ use serde_json::{Map, Value as Json, json};
 
 use super::{Failure, provenance};
 use crate::files::{FileError, OutputFile, PROGRAM, PendingFile};
+use crate::scene::LiveScene;
 use crate::scene::{Scene, visible_line};
-use crate::simulate::{SavedState, Simulation};
+use crate::simulate::SavedState;
 
 /// Counts the versions of the file's layout.
 const FORMAT: u64 = 3;
@@ -36,7 +37,7 @@ impl StateFile {
 
     /// To be called before every step of a run that ends at `end`, s: the state kept is that before the first step that the
     /// end of the run cuts short, as a longer run would not.
-    pub fn watch(&mut self, simulation: &Simulation, end: f64) {
+    pub fn watch(&mut self, simulation: &LiveScene, end: f64) {
         if self.saved.is_none() && simulation.is_cut_by(end) {
             self.saved = Some(simulation.saved());
         }
@@ -46,12 +47,12 @@ impl StateFile {
     ///
     /// # Errors
     /// A value that is not a number, for which JSON has no word.
-    pub fn text(&self, simulation: &Simulation) -> Result<String, Failure> {
+    pub fn text(&self, simulation: &LiveScene) -> Result<String, Failure> {
         let saved = match &self.saved {
             Some(saved) => saved,
             None => &simulation.saved(),
         };
-        let scene = simulation.scene();
+        let scene = simulation.pending();
         let mut meta = provenance::meta(scene);
         meta.insert("state_format".into(), json!(FORMAT));
         // Rows of a run that goes on begin here.

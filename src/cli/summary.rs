@@ -9,8 +9,10 @@ use super::impacts::Restitution;
 use super::output::significant;
 use super::peaks::{self, parts};
 use super::provenance;
-use crate::scene::{Preset, Scene};
-use crate::simulate::{Impact, Ledger, Simulation};
+use crate::machine::Preset;
+use crate::scene::LiveScene;
+use crate::scene::Scene;
+use crate::simulate::{Impact, Ledger};
 use crate::words::words;
 
 /// How a run ended.
@@ -44,16 +46,16 @@ impl Stepping {
 
 /// The summary as JSON: provenance, then results; `impacts` if all of them were collected.
 pub fn json(
-    simulation: &Simulation,
+    simulation: &LiveScene,
     status: Status,
     stepping: Stepping,
     impacts: Option<&[Impact]>,
 ) -> Map<String, Json> {
-    let scene = simulation.scene();
+    let scene = simulation.pending();
     let statistics = simulation.statistics();
     let time = simulation.time();
     let by_joint = |value: &dyn Fn(usize) -> Json| -> Json {
-        let entries = scene.ball_joints.iter().enumerate();
+        let entries = scene.machine.ball_joints.iter().enumerate();
         Json::Object(entries.map(|(i, joint)| (joint.name.clone(), value(i))).collect())
     };
     let mut summary = provenance::meta(scene);
@@ -108,8 +110,8 @@ fn energy(ledger: &Ledger) -> Json {
 }
 
 /// The summary as text; `impacts` if all of them were collected.
-pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts: Option<&[Impact]>) -> String {
-    let scene = simulation.scene();
+pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts: Option<&[Impact]>) -> String {
+    let scene = simulation.pending();
     let statistics = simulation.statistics();
     let time = simulation.time();
     let mut out = String::new();
@@ -123,14 +125,14 @@ pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts
     }
     line("Status", status.word().to_owned());
     line("Simulated time", format!("{} s", significant(time, 9)));
-    let method = scene.solver.method;
-    let formulation = scene.formulation;
+    let method = scene.machine.solver.method;
+    let formulation = scene.machine.formulation;
     line("Method", format!("{method}, {formulation} formulation"));
     line(
         "Steps",
         format!("{} ({} rejected), {} evaluations", statistics.steps, statistics.rejected, statistics.evaluations),
     );
-    for (i, joint) in scene.ball_joints.iter().enumerate() {
+    for (i, joint) in scene.machine.ball_joints.iter().enumerate() {
         let (force, at) = simulation.peak(i);
         let peak = format!("peak {} N at {} s", significant(force, 6), significant(at, 6));
         let story = if joint.contact.clearance == 0.0 {
@@ -175,7 +177,7 @@ pub fn text(simulation: &Simulation, status: Status, stepping: Stepping, impacts
                 joules(ledger.friction_loss)
             ),
         );
-        if !scene.elements.is_empty() {
+        if !scene.machine.elements.is_empty() {
             let (given, lost) = (joules(ledger.external_work), joules(ledger.damping_loss));
             let story = format!("loads from outside {given} J, lost in dampers {lost} J");
             line("  elements", story);
@@ -226,7 +228,7 @@ pub fn count(number: u64, what: &str) -> String {
 
 /// Whether real time was requested, by the preset of that name, and not reached.
 fn slower_than_asked(scene: &Scene, ratio: Option<f64>) -> bool {
-    scene.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
+    scene.machine.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
 }
 
 /// A hash as outputs write it: 16 hexadecimal digits (JSON numbers do not hold 64 bits).
@@ -246,7 +248,7 @@ mod tests {
             assert_eq!(slower_than_asked(&scene, Some(0.9)), slow, "{preset}");
             assert!(!slower_than_asked(&scene, Some(1.1)), "{preset}");
             assert!(!slower_than_asked(&scene, None), "{preset}");
-            let mut simulation = Simulation::new(&scene).unwrap();
+            let mut simulation = LiveScene::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
             for (wall, said) in [(1.0, slow), (1e-9, false)] {
                 let stepping = Stepping { from: 0.0, wall };

@@ -115,11 +115,11 @@ fn frames_survive() {
     use super::Command;
     use super::render::{Destination, Studio, Times, fill};
     use crate::render::Image;
+    use crate::scene::LiveScene;
     use crate::scene::Scene;
-    use crate::simulate::Simulation;
 
     /// Draws nothing: this is about files.
-    struct Blank(Simulation);
+    struct Blank(LiveScene);
 
     impl Studio for Blank {
         fn go_to(&mut self, instant: f64) -> Result<(), Failure> {
@@ -133,7 +133,7 @@ fn frames_survive() {
 
         fn fix_arrow_scale(&mut self, _reference: f32) {}
 
-        fn simulation(&self) -> &Simulation {
+        fn simulation(&self) -> &LiveScene {
             &self.0
         }
 
@@ -152,7 +152,7 @@ fn frames_survive() {
         let scene = Scene::load("pendulum", &[]).unwrap();
         let times = Times::new(&arguments).unwrap();
         let destination = Destination::claim(&arguments)?;
-        let mut studio = Blank(Simulation::new(&scene).unwrap());
+        let mut studio = Blank(LiveScene::new(&scene).unwrap());
         fill(destination, &mut studio, &scene, &times, &arguments)
     };
     let whole = |old: &Tree, new: &Tree, found: &Tree| found == old || found == new;

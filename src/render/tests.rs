@@ -4,7 +4,8 @@ use glam::Vec3;
 
 use super::wgpu::naga;
 use super::{Image, Offscreen, RenderError, shaders};
-use crate::scene::{Scene, Vec3 as Vec3d};
+use crate::machine::Vec3 as Vec3d;
+use crate::scene::Scene;
 use crate::simulate::{ContactState, Frame, Simulation};
 use crate::view::{
     Camera, Colour, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, WearMap,
@@ -220,27 +221,27 @@ fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
     // No cut in the middle of the picture.
     let openings = [right + up - back, up - right + 0.5 * back, right - 2.0 * up - 1.5 * back];
     let double = |v: Vec3| Vec3d::new(v.x.into(), v.y.into(), v.z.into());
-    let (joint, report) = (scene.ball_joints[0].clone(), frame.joints[0]);
-    let (body, motion) = (scene.bodies[0].clone(), frame.bodies[0]);
-    (scene.ball_joints, frame.joints) = Default::default();
-    (scene.bodies, frame.bodies) = Default::default();
+    let (joint, report) = (scene.machine.ball_joints[0].clone(), frame.joints[0]);
+    let (body, motion) = (scene.machine.bodies[0].clone(), frame.bodies[0]);
+    (scene.machine.ball_joints, frame.joints) = Default::default();
+    (scene.machine.bodies, frame.bodies) = Default::default();
     for k in order {
         let by = double(back * (0.05 * (k as f32 - 1.0)));
         let mut joint = joint.clone();
         joint.opening = double(openings[k].normalize());
-        joint.ball.body = Some(scene.bodies.len());
-        scene.ball_joints.push(joint);
+        joint.ball.body = Some(scene.machine.bodies.len());
+        scene.machine.ball_joints.push(joint);
         let mut report = report;
         report.socket_centre += by;
         report.ball_centre += by;
         report.contact_point += by;
         frame.joints.push(report);
-        scene.bodies.push(body.clone());
+        scene.machine.bodies.push(body.clone());
         let mut motion = motion;
         motion.position += by;
         frame.bodies.push(motion);
     }
-    scene.fixed_shapes.clear();
+    scene.machine.fixed_shapes.clear();
     if behind {
         camera.yaw += std::f32::consts::PI;
     }
@@ -454,7 +455,7 @@ fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
             - right * (shift[0] * half)
             - up * (shift[1] * half);
         let along = (right * 0.8 - up * 0.6).as_dvec3();
-        frame.joints[0].normal_force = crate::scene::Vec3::new(along.x, along.y, along.z) * newtons;
+        frame.joints[0].normal_force = crate::machine::Vec3::new(along.x, along.y, along.z) * newtons;
         let mut list = picture(&scene, &frame, &options, &camera, false);
         list.solid.by_mesh.iter_mut().for_each(Vec::clear);
         let with = draw(&list);
@@ -482,7 +483,7 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
     for move_by in [4.0, -4.0] {
         let metres = move_by * f64::from(camera.metres_per_pixel(SIZE)) / 20.0;
         let mut ghost = frame.clone();
-        ghost.joints[0].eccentricity += crate::scene::Vec3::new(back.x, back.y, back.z) * metres;
+        ghost.joints[0].eccentricity += crate::machine::Vec3::new(back.x, back.y, back.z) * metres;
         let mut list = plain.clone();
         let (marks, trail) = (PeakMarks::new(), []);
         let shot = Shot {
@@ -517,7 +518,7 @@ fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
     let (right, up, _) = camera.axes();
     let pixel = camera.metres_per_pixel(SIZE);
     let aside = (40.0 * pixel * right).as_dvec3();
-    let aside = crate::scene::Vec3::new(aside.x, aside.y, aside.z);
+    let aside = crate::machine::Vec3::new(aside.x, aside.y, aside.z);
     let mut ghost = frame.clone();
     ghost.bodies[0].position += aside;
     ghost.joints[0].socket_centre += aside;
@@ -544,7 +545,7 @@ fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
     let both = drawn(&[Ghost::Ideal, Ghost::Twin]);
     let report = &ghost.joints[0];
     let centre = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
-    let radius = scene.ball_joints[0].contact.ball_radius as f32;
+    let radius = scene.machine.ball_joints[0].contact.ball_radius as f32;
     let palette = Palette::of(options.theme);
     let near = |image: &Image, point: Vec3, colour: [u8; 4]| {
         let [r, g, b, _] = colour;
@@ -582,9 +583,9 @@ fn every_standard_view_shows_what_moves() {
     for name in crate::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
         let mut frame = Frame::default();
-        let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+        let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
         // Twelve loose joints take their time.
-        let later = (scene.ball_joints.len() <= 8).then_some(0.3);
+        let later = (scene.machine.ball_joints.len() <= 8).then_some(0.3);
         for (turn, time) in std::iter::once(0.0).chain(later).enumerate() {
             simulation.advance_to(time).expect("runs");
             simulation.sample(time, &mut frame);
@@ -596,7 +597,7 @@ fn every_standard_view_shows_what_moves() {
                 view.fit(&mut camera, &scene, &frame, &options, size);
                 let whole = picture_of(size, &scene, &frame, &options, &camera, false);
                 let mut free = scene.clone();
-                free.fixed_shapes.clear();
+                free.machine.fixed_shapes.clear();
                 let mut moving = picture_of(size, &free, &frame, &options, &camera, false);
                 moving.light = whole.light;
                 let (mut fixed, mut nothing) = (whole.clone(), moving.clone());
@@ -665,7 +666,7 @@ impl eframe::App for OnlyViewport {
 #[test]
 fn struck_cells_have_the_colour_of_their_value_and_others_none() {
     let scene = Scene::load("pendulum", &[]).expect("built in");
-    let mut simulation = Simulation::new(&scene).expect("starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("starts");
     simulation.keep_wear();
     simulation.advance_to(0.3).expect("steps");
     simulation.commit_wear();
@@ -934,7 +935,7 @@ fn the_longest_chain_asks_for_few_triangles_from_afar_and_from_within() {
     let links = [("chain.links".to_owned(), "4096".to_owned())];
     let scene = Scene::load("chain", &links).expect("as many are allowed");
     let mut frame = Frame::default();
-    let mut simulation = Simulation::new(&scene).expect("starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("starts");
     simulation.sample(0.0, &mut frame);
     let (view, options) = (SceneView::new(&scene, &frame), bare());
     let mut afar = view.camera();
@@ -953,9 +954,9 @@ fn the_longest_chain_asks_for_few_triangles_from_afar_and_from_within() {
 
 /// A scene and a frame of it, moved.
 fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
-    use crate::scene::Geometry::{Box, Capsule, Cylinder};
+    use crate::machine::Geometry::{Box, Capsule, Cylinder};
     let (mut scene, mut frame) = (scene.clone(), frame.clone());
-    for shape in &mut scene.fixed_shapes {
+    for shape in &mut scene.machine.fixed_shapes {
         match &mut shape.geometry {
             Capsule { from, to, .. } | Cylinder { from, to, .. } => {
                 *from += by;
@@ -965,7 +966,7 @@ fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
             other => panic!("{other:?}"),
         }
     }
-    for joint in &mut scene.ball_joints {
+    for joint in &mut scene.machine.ball_joints {
         for end in [&mut joint.socket, &mut joint.ball] {
             if end.body.is_none() {
                 end.point += by;

@@ -2,7 +2,7 @@
 //! computed only while shown, up to the displayed instant, and does not affect the run.
 
 use super::clock::Clock;
-use crate::scene::{Output, Scene, Vec3};
+use crate::machine::{Machine, Output, Vec3};
 use crate::simulate::{Frame, Simulation, Snapshot, StartError, Stopped, closed};
 use crate::view::output_point;
 
@@ -77,8 +77,8 @@ struct Motion {
 
 impl Ideal {
     /// Of `scene`, at its start. If its loops do not close, or it is too large with closed joints, [`Self::fault`] says so.
-    pub fn new(scene: &Scene) -> Self {
-        let motion = Simulation::new(&closed(scene)).map(|mut simulation| {
+    pub fn new(machine: &Machine) -> Self {
+        let motion = Simulation::new(&closed(machine)).map(|mut simulation| {
             let mut frame = Frame::default();
             simulation.sample(simulation.time(), &mut frame);
             Motion {
@@ -89,7 +89,7 @@ impl Ideal {
                 stopped: None,
             }
         });
-        Self { output: scene.output.clone(), motion }
+        Self { output: machine.output.clone(), motion }
     }
 
     /// Advances to `time`, s, to which the run is recorded, if that is near.
@@ -168,7 +168,7 @@ impl Motion {
             let now = self.simulation.time();
             self.keep(now);
             let force = gravity.at(now);
-            if self.simulation.running_scene().gravity != force {
+            if self.simulation.machine().gravity != force {
                 self.simulation.set_gravity(force);
             }
             self.stopped = self.simulation.step_until(gravity.next(now)).err();
@@ -207,7 +207,7 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::BUILT_IN;
+    use crate::scene::{BUILT_IN, Scene};
     use crate::session::player::Player;
     use crate::simulate::Quantity;
 
@@ -227,10 +227,10 @@ mod tests {
         panic!("never comes there");
     }
 
-    /// The output point of `scene` at `time`, by a run of its own.
-    fn alone(scene: &Scene, output: &Output, time: f64) -> Vec3 {
+    /// The output point of `machine` at `time`, by a run of its own.
+    fn alone(machine: &Machine, output: &Output, time: f64) -> Vec3 {
         let mut frame = Frame::default();
-        let mut run = Simulation::new(scene).expect("starts");
+        let mut run = Simulation::new(machine).expect("starts");
         run.advance_to(time).expect("runs");
         run.sample(time, &mut frame);
         output_point(output, &frame).expect("has a body")
@@ -243,7 +243,7 @@ mod tests {
             let [mut with, mut without] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
             with.set_ideal(true);
             // Many loose joints take their time.
-            let part = if scene.ball_joints.len() > 3 { 0.4 } else { 1.0 };
+            let part = if scene.machine.ball_joints.len() > 3 { 0.4 } else { 1.0 };
             for (turn, time) in [0.013, 0.03, 0.021_3].map(|time| part * time).into_iter().enumerate() {
                 if turn == 2 {
                     // Back, and another way there.
@@ -257,7 +257,8 @@ mod tests {
                 let error = with.ideal().expect("on").output_error(with.frame());
                 let error = error.unwrap_or_else(|| panic!("{name}: none at {time}"));
                 let time = with.frame().time;
-                let two = alone(&scene, &scene.output, time) - alone(&closed(&scene), &scene.output, time);
+                let two = alone(&scene.machine, &scene.machine.output, time)
+                    - alone(&closed(&scene.machine), &scene.machine.output, time);
                 let off = (error - two).norm();
                 assert!(off < 1e-12 + 1e-9 * two.norm(), "{name}: {off:e}");
                 assert!(two.norm() > 1e-6, "{name}: {two:?}");
@@ -304,19 +305,19 @@ mod tests {
         let time = player.frame().time;
         let there = |player: &Player| {
             let ideal = player.ideal().expect("on").frame(player.frame().time);
-            output_point(&scene.output, ideal.expect("came there")).expect("has a body")
+            output_point(&scene.machine.output, ideal.expect("came there")).expect("has a body")
         };
-        let mut other = Simulation::new(&closed(&scene)).expect("starts");
+        let mut other = Simulation::new(&closed(&scene.machine)).expect("starts");
         let mut frame = Frame::default();
         while other.time() < change {
             other.step_until(change).expect("runs");
         }
-        let mut weightless = scene.gravity;
+        let mut weightless = scene.machine.gravity;
         weightless.z = 0.0;
         other.set_gravity(weightless);
         other.advance_to(time).expect("runs");
         other.sample(time, &mut frame);
-        let expected = output_point(&scene.output, &frame).expect("has a body");
+        let expected = output_point(&scene.machine.output, &frame).expect("has a body");
         let off = (there(&player) - expected).norm();
         assert!(off < 1e-9, "{off:e}");
         // Switched on late, it still knows of the change.
@@ -335,27 +336,27 @@ mod tests {
         }
         let time = player.frame().time;
         other.advance_to(time).expect("runs");
-        let mut straight = Simulation::new(&closed(&scene)).expect("starts");
+        let mut straight = Simulation::new(&closed(&scene.machine)).expect("starts");
         while straight.time() < change {
             straight.step_until(change).expect("runs");
         }
         straight.set_gravity(weightless);
         straight.advance_to(time).expect("runs");
         straight.sample(time, &mut frame);
-        let expected = output_point(&scene.output, &frame).expect("has a body");
+        let expected = output_point(&scene.machine.output, &frame).expect("has a body");
         assert!((there(&player) - expected).norm() < 1e-9);
     }
 
     #[test]
     fn states_kept_to_go_back_to_are_bounded_and_lead_everywhere() {
         let scene = scene("pendulum", &[]);
-        let mut ideal = Ideal::new(&scene);
-        let gravity = Gravity::new(scene.gravity);
+        let mut ideal = Ideal::new(&scene.machine);
+        let gravity = Gravity::new(scene.machine.gravity);
         let at = |ideal: &mut Ideal, time: f64| {
             let motion = ideal.motion.as_mut().expect("starts");
             motion.place(time, &gravity, || true);
             assert!(motion.kept.len() <= KEPT);
-            output_point(&scene.output, ideal.frame(time).expect("came there")).expect("a body")
+            output_point(&scene.machine.output, ideal.frame(time).expect("came there")).expect("a body")
         };
         let times: Vec<f64> = (0..60).map(|k| 0.05 * f64::from(k)).collect();
         let forth: Vec<Vec3> = times.iter().map(|time| at(&mut ideal, *time)).collect();

@@ -145,7 +145,7 @@ mod tests {
             let point = find(index).expect("came");
             let state = observed(&player.frame().pose);
             assert_eq!(state[..6], point.sections[kept], "point {index}");
-            let wanted = player.wanted().contact.clearance;
+            let wanted = player.pending().machine.contact.clearance;
             assert_eq!(wanted, point.values[0]);
         }
         // A point that was cancelled makes those after it unreachable.

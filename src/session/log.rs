@@ -4,8 +4,9 @@
 //! and are not logged.
 
 use crate::analysis::section::Schedule;
-use crate::scene::{SOLVER_KEYS, Scene, Value, Vec3};
-use crate::simulate::{ChangeError, Effect, Pull, Simulation};
+use crate::machine::Vec3;
+use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
+use crate::simulate::{Effect, Pull};
 
 /// Largest stiffness in N/m, and damping in N s/m, of a hand in a log.
 const STIFFEST: f64 = 1e9;
@@ -55,7 +56,7 @@ impl Event {
     ///
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
-    pub fn apply(&self, run: &mut Simulation, original: &Scene) -> Result<Effect, ChangeError> {
+    pub fn apply(&self, run: &mut LiveScene, original: &Scene) -> Result<Effect, SetError> {
         match self {
             Self::Set { key, value } => {
                 let effect = run.set(key, value)?;
@@ -68,7 +69,7 @@ impl Event {
                 Ok(effect)
             }
             Self::Original { key } => run.set_value(key, &original.get(key)?),
-            Self::Pull(pulled) => run.pull(pulled.map(Pull::from)).map(|()| Effect::Now),
+            Self::Pull(pulled) => Ok(run.pull(pulled.map(Pull::from)).map(|()| Effect::Now)?),
             Self::Sections { .. } | Self::Stop => Ok(Effect::Now),
         }
     }

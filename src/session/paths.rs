@@ -1,6 +1,7 @@
 //! The recent path of each ball in its socket, drawn by the microscope.
 
-use crate::scene::{Mat3, Scene};
+use crate::machine::Mat3;
+use crate::scene::Scene;
 use crate::simulate::{Frame, RECORDED_JOINTS};
 
 /// Points kept of each ball joint.
@@ -38,8 +39,8 @@ pub fn axes_of(frame: &Frame, body: Option<usize>) -> Mat3 {
 impl Paths {
     /// Empty paths for `scene`.
     pub fn new(scene: &Scene) -> Self {
-        let joints = scene.ball_joints.iter().take(RECORDED_JOINTS);
-        let path = |joint: &crate::scene::BallJoint| Path { carrier: joint.socket.body, points: Vec::new() };
+        let joints = scene.machine.ball_joints.iter().take(RECORDED_JOINTS);
+        let path = |joint: &crate::machine::BallJoint| Path { carrier: joint.socket.body, points: Vec::new() };
         Self { joints: joints.map(path).collect() }
     }
 
@@ -101,9 +102,9 @@ mod tests {
         let scene = Scene::load("slider-crank", &changes).expect("built in");
         let mut player = Player::new(&scene).expect("starts");
         player.run_to(0.05);
-        let mut other = Simulation::new(&scene).expect("starts");
+        let mut other = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
-        for (joint, spec) in scene.ball_joints.iter().enumerate() {
+        for (joint, spec) in scene.machine.ball_joints.iter().enumerate() {
             let points = player.paths().between(joint, ALL.0, ALL.1);
             assert!(points.len() > 100, "{}: {}", spec.name, points.len());
             assert!(points.is_sorted_by(|a, b| a.time < b.time));
@@ -117,8 +118,8 @@ mod tests {
             }
             other.sample(point.time, &mut frame);
             let joint = &frame.joints[0];
-            let carrier = axes_of(&frame, scene.ball_joints[0].socket.body);
-            let seen = carrier * crate::scene::Vec3::from(point.place.map(f64::from));
+            let carrier = axes_of(&frame, scene.machine.ball_joints[0].socket.body);
+            let seen = carrier * crate::machine::Vec3::from(point.place.map(f64::from));
             let off = (seen - joint.eccentricity).norm();
             assert!(off < 1e-9, "{off:e} m at {} s", point.time);
             turned = turned.max((carrier - Mat3::identity()).norm());
@@ -152,7 +153,7 @@ mod tests {
         assert!(points.is_sorted_by(|a, b| a.time < b.time));
         assert_eq!(points[..before.len()], before);
 
-        let mut paths = Paths::new(player.scene());
+        let mut paths = Paths::new(player.running());
         let mut frame = player.frame().clone();
         for step in 0..20_000 {
             frame.time = f64::from(step) * 1e-5;

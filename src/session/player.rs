@@ -16,10 +16,11 @@ use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::presets::too_slow;
 use crate::analysis::section::Schedule;
-use crate::scene::{SOLVER_KEYS, Scene, Value, Warning};
+use crate::machine::Warning;
+use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
 use crate::simulate::{
-    ChangeError, Channels, ContactState, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS,
-    Simulation, StartError, Stopped, Wear,
+    Channels, ContactState, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
+    StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
 use impact_record::ImpactRecord;
@@ -40,9 +41,9 @@ pub struct Player {
     pub pacer: Pacer,
     /// Clock that measures stepping time.
     pub clock: Clock,
-    simulation: Simulation,
+    simulation: LiveScene,
     /// The run before a change made within the displayed step: it still holds what that step did until the change.
-    unchanged: Option<Box<Simulation>>,
+    unchanged: Option<Box<LiveScene>>,
     /// The scene as its file gives it.
     original: Scene,
     /// What is allowed but may not do what the user expects.
@@ -142,7 +143,7 @@ impl Known {
     fn of(scene: &Scene) -> Vec<Self> {
         let known = |warning: Warning| Self { key: warning.key(), sentence: warning.to_string() };
         let slow = too_slow(scene).map(|slow| Self { key: Some("solver.preset"), sentence: slow.to_string() });
-        scene.warnings().into_iter().map(known).chain(slow).collect()
+        scene.machine.warnings().into_iter().map(known).chain(slow).collect()
     }
 
     /// Whether it is about `key`, the scene's or a ball joint's.
@@ -158,11 +159,11 @@ impl Player {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        let simulation = Simulation::new(scene)?;
+        let simulation = LiveScene::new(scene)?;
         // The text has been parsed before; should that fail now, a control's default is its present value.
         let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
             .unwrap_or_else(|_| scene.clone());
-        let channels = Channels::of(scene);
+        let channels = Channels::of(&scene.machine);
         let mut player = Self {
             pacer: Pacer::default(),
             clock: wall,
@@ -204,7 +205,7 @@ impl Player {
             sections: None,
             watch: RunWatch::new(scene),
             twin: None,
-            gravity: Gravity::new(scene.gravity),
+            gravity: Gravity::new(scene.machine.gravity),
             ideal: None,
             simulation,
         };
@@ -215,8 +216,8 @@ impl Player {
     /// A copy of the run with its record, paused, without its twin: it goes on as this run would have done without what is done to it
     /// from now on.
     fn copy(&self) -> Self {
-        let run = |run: &Simulation| Simulation::of(&run.snapshot());
-        let scene = self.simulation.running_scene();
+        let run = |run: &LiveScene| LiveScene::of(&run.snapshot());
+        let scene = self.simulation.running();
         Self {
             pacer: self.pacer.clone(),
             clock: self.clock,
@@ -258,7 +259,7 @@ impl Player {
             watch: self.watch.clone(),
             twin: None,
             gravity: self.gravity.clone(),
-            ideal: self.ideal.is_some().then(|| Box::new(Ideal::new(scene))),
+            ideal: self.ideal.is_some().then(|| Box::new(Ideal::new(&scene.machine))),
             stepped: self.stepped,
             stepping: self.stepping,
         }
@@ -308,25 +309,25 @@ impl Player {
 
     /// `key` was changed in the run that was `before`; nothing if it has the same value.
     fn changed_from(&mut self, before: Option<Box<Self>>, key: &str) {
-        let changed = |before: &Self| before.wanted().changes != self.wanted().changes;
+        let changed = |before: &Self| before.pending().changes != self.pending().changes;
         if let Some(before) = before.filter(|before| changed(before)) {
             (self.before, self.gesture) = (Some((before, key.to_owned())), Some(key.to_owned()));
         }
     }
 
     /// The simulation.
-    pub fn simulation(&self) -> &Simulation {
+    pub fn simulation(&self) -> &LiveScene {
         &self.simulation
     }
 
     /// The scene as the user wants it, including changes that still wait for a reset.
-    pub fn wanted(&self) -> &Scene {
-        self.simulation.scene()
+    pub fn pending(&self) -> &Scene {
+        self.simulation.pending()
     }
 
     /// The scene as it runs.
-    pub fn scene(&self) -> &Scene {
-        self.simulation.running_scene()
+    pub fn running(&self) -> &Scene {
+        self.simulation.running()
     }
 
     /// What is displayed.
@@ -362,7 +363,7 @@ impl Player {
         self.picks = patterns.to_vec();
         let (first, channels) = (self.clearances().end, self.history.channels());
         let old = self.channels.clone();
-        self.channels.pick(self.simulation.running_scene(), &self.frame, patterns);
+        self.channels.pick(&self.simulation.running().machine, &self.frame, patterns);
         let place = |new: &Listed| {
             let same = |old: &Listed| old.column == new.column;
             old.picked().iter().position(same).map(|at| first + at)
@@ -445,7 +446,7 @@ impl Player {
 
     /// Switches the ideal motion on or off. This never affects the run itself.
     pub fn set_ideal(&mut self, on: bool) {
-        self.ideal = on.then(|| Box::new(Ideal::new(self.simulation.running_scene())));
+        self.ideal = on.then(|| Box::new(Ideal::new(self.simulation.machine())));
     }
 
     /// Starts a twin run from the present state, or ends it. This never affects the run itself.
@@ -652,17 +653,17 @@ impl Player {
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation.reset()?;
         self.stopped = None;
-        self.log = Log::new(&self.simulation.scene().changes);
+        self.log = Log::new(&self.simulation.pending().changes);
         self.sections = None;
-        self.watch.begin(self.simulation.running_scene(), 0.0);
+        self.watch.begin(self.simulation.running(), 0.0);
         self.restart_twin();
         let mut first = Frame::default();
         if !self.picks.is_empty() {
             self.simulation.sample(0.0, &mut first);
         }
-        let scene = self.simulation.running_scene();
-        let mut channels = Channels::of(scene);
-        channels.pick(scene, &first, &self.picks);
+        let scene = self.simulation.running();
+        let mut channels = Channels::of(&scene.machine);
+        channels.pick(&scene.machine, &first, &self.picks);
         if channels.list() != self.channels.list() || channels.picked().len() != self.channels.picked().len() {
             self.history = record_of(scene, &channels);
         }
@@ -676,14 +677,14 @@ impl Player {
     ///
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
+    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
         let run_before = self.before_change(key);
         if self.has_future() {
             // A refused change must not abandon the future.
-            self.wanted().clone().set(key, value)?;
+            self.pending().clone().set(key, value)?;
             self.branch();
         }
-        let before = self.wanted().changes.clone();
+        let before = self.pending().changes.clone();
         let event = Event::set(key, value);
         let effect = self.apply(&event)?;
         self.note(event);
@@ -694,7 +695,7 @@ impl Player {
 
     /// Notes what differs from the changes `before`.
     fn note_edits(&mut self, before: &[(String, String)]) {
-        let after = &self.simulation.scene().changes;
+        let after = &self.simulation.pending().changes;
         for (key, _) in before.iter().chain(after) {
             let (old, new) = (changed(before, key), changed(after, key));
             if old == new {
@@ -716,8 +717,8 @@ impl Player {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub(crate) fn put_back(&mut self, key: &str, text: Option<&str>) -> Result<(), ChangeError> {
-        if changed(&self.wanted().changes, key).as_deref() == text {
+    pub(crate) fn put_back(&mut self, key: &str, text: Option<&str>) -> Result<(), SetError> {
+        if changed(&self.pending().changes, key).as_deref() == text {
             return Ok(());
         }
         match text {
@@ -727,12 +728,12 @@ impl Player {
     }
 
     /// Makes a change of the run at its latest state. The rest of the latest step is still shown as it was.
-    fn apply(&mut self, event: &Event) -> Result<Effect, ChangeError> {
+    fn apply(&mut self, event: &Event) -> Result<Effect, SetError> {
         let Self { simulation: run, unchanged, original, pacer, .. } = self;
         let effect = if pacer.shown() >= run.time() || run.step_start() >= run.time() {
             event.apply(run, original)?
         } else {
-            let mut copy = Simulation::of(&run.snapshot());
+            let mut copy = LiveScene::of(&run.snapshot());
             let effect = event.apply(&mut copy, original)?;
             *unchanged = Some(Box::new(std::mem::replace(run, copy)));
             effect
@@ -752,11 +753,11 @@ impl Player {
     ///
     /// # Errors
     /// As [`Simulation::set_value`]; nothing has changed then.
-    pub fn set_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
+    pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.original.get(key)?;
         let run_before = self.before_change(key);
         self.branch();
-        let before = self.wanted().changes.clone();
+        let before = self.pending().changes.clone();
         let event = Event::Original { key: key.to_owned() };
         let effect = self.apply(&event)?;
         self.note(event);
@@ -769,7 +770,7 @@ impl Player {
     ///
     /// # Errors
     /// As [`Simulation::pull`]; the run is as it was then.
-    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), ChangeError> {
+    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SetError> {
         if self.simulation.pulled() == pull {
             return Ok(());
         }
@@ -789,9 +790,9 @@ impl Player {
     }
 
     fn after_change(&mut self) {
-        self.warnings = Known::of(self.wanted());
-        self.watch.begin(self.simulation.running_scene(), self.simulation.time());
-        self.settling = Settling::new(self.simulation.running_scene());
+        self.warnings = Known::of(self.pending());
+        self.watch.begin(self.simulation.running(), self.simulation.time());
+        self.settling = Settling::new(self.simulation.running());
         // Where the run is taken again, it has begun only later.
         let now = self.simulation.time();
         if self.twin.as_ref().is_some_and(|twin| twin.begins() <= now) {
@@ -802,12 +803,12 @@ impl Player {
 
     /// Whether `key` was changed and waits for a reset.
     pub fn is_waiting(&self, key: &str) -> bool {
-        self.wanted().get(key).ok() != self.scene().get(key).ok()
+        self.pending().get(key).ok() != self.running().get(key).ok()
     }
 
     /// Whether any change waits for a reset.
     pub fn has_waiting(&self) -> bool {
-        self.wanted().changes.iter().any(|(key, _)| self.is_waiting(key))
+        self.pending().changes.iter().any(|(key, _)| self.is_waiting(key))
     }
 
     /// What is allowed but may not do what the user expects, in sentences.
@@ -829,7 +830,8 @@ impl Player {
     pub(crate) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.keep();
-        match self.simulation.step_until(self.next_section()) {
+        let end = self.next_section();
+        match self.simulation.step_until(end) {
             Ok(()) => {
                 self.unchanged = None;
                 self.simulation.take_peaks(&mut self.coming);
@@ -837,7 +839,7 @@ impl Player {
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
-                let (start, gravity) = (self.simulation.step_start(), self.simulation.running_scene().gravity);
+                let (start, gravity) = (self.simulation.step_start(), self.simulation.running().machine.gravity);
                 if self.gravity.observe(start, gravity)
                     && let Some(ideal) = &mut self.ideal
                 {
@@ -985,7 +987,7 @@ impl Player {
     }
 
     fn forget_peaks(&mut self) {
-        let joints = self.simulation.running_scene().ball_joints.len();
+        let joints = self.simulation.running().machine.ball_joints.len();
         for peaks in [&mut self.peaks, &mut self.coming, &mut self.passed] {
             peaks.clear();
             peaks.resize(joints, Peak::default());
@@ -1012,7 +1014,8 @@ impl Player {
     /// step on.
     fn show_changed_clearances(&mut self, frame: &mut Frame) {
         let mut next = Frame::default();
-        self.simulation.sample(self.simulation.time(), &mut next);
+        let time = self.simulation.time();
+        self.simulation.sample(time, &mut next);
         let pairs = frame.joints.iter_mut().zip(&next.joints);
         for (own, next) in pairs.filter(|(own, _)| own.state == ContactState::Free) {
             own.penetration += own.clearance - next.clearance;
@@ -1029,9 +1032,9 @@ impl Player {
         self.history.clear();
         self.clear_rewind();
         self.unchanged = None;
-        self.settling = Settling::new(self.simulation.running_scene());
-        self.paths = Paths::new(self.simulation.running_scene());
-        self.gravity = Gravity::new(self.simulation.running_scene().gravity);
+        self.settling = Settling::new(self.simulation.running());
+        self.paths = Paths::new(self.simulation.running());
+        self.gravity = Gravity::new(self.simulation.running().machine.gravity);
         self.set_ideal(self.ideal.is_some());
         self.simulation.keep_wear();
         // Forces at the start belong to the first frame: there has been no impact yet.
@@ -1046,7 +1049,7 @@ impl Player {
 
 /// An empty record of `channels`, of the clearances, and of the picked channels.
 fn record_of(scene: &Scene, channels: &Channels) -> History {
-    let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
+    let joints = scene.machine.ball_joints.len().min(RECORDED_JOINTS);
     let picked = channels.picked().len();
     History::new(channels.len() + joints + picked, FINEST_BIN)
 }

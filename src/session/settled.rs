@@ -11,7 +11,8 @@
 //! All of this is judged from the frames of the run.
 
 use crate::analysis::drive::{NoPeriod, drive_period};
-use crate::scene::{Scene, Vec3};
+use crate::machine::Vec3;
+use crate::scene::Scene;
 use crate::simulate::{ContactState, Frame, JointReport};
 
 /// Fraction of the period over which a driven scene is watched.
@@ -59,13 +60,13 @@ impl Settling {
             Err(NoPeriod::Different { first, second, .. }) => Some(first.max(second)),
             Err(NoPeriod::None { .. }) => None,
         };
-        let play = |joint: &crate::scene::BallJoint| {
+        let play = |joint: &crate::machine::BallJoint| {
             let clearance = joint.contact.clearance;
             (clearance > 0.0).then_some((joint.socket.body, clearance))
         };
         Self {
             period,
-            joints: scene.ball_joints.iter().map(play).collect(),
+            joints: scene.machine.ball_joints.iter().map(play).collect(),
             past: Vec::new(),
             here: Instant::default(),
             quiet: None,
@@ -149,7 +150,7 @@ mod tests {
 
     /// Runs `scene` to `to`, s: the times at which it became settled or ceased to be.
     fn turns(scene: &Scene, to: f64) -> Vec<f64> {
-        let mut simulation = Simulation::new(scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut settling = Settling::new(scene);
         let (mut frame, mut turns) = (Frame::default(), Vec::new());
         while simulation.time() < to {

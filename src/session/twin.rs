@@ -1,7 +1,7 @@
 //! A second run beside the first, minimally displaced, whose distance is never renormalised; and a third, which is, and so tells the
 //! largest Lyapunov exponent as a sweep does. Neither affects the run.
 
-use crate::analysis::drive::drive_period;
+use crate::analysis::drive::common_period;
 use crate::analysis::exponent::{ALIGNMENT, Benettin, Exponent, offset, scaled_distance};
 use crate::analysis::orbit::Orbit as _;
 use crate::analysis::point::separation_of;
@@ -35,9 +35,9 @@ struct Growth {
 impl Growth {
     /// Of neighbours of `run` from now on.
     fn new(run: &Simulation) -> Self {
-        let scene = run.running_scene();
-        let interval = drive_period(scene).unwrap_or(UNDRIVEN);
-        let mut benettin = Benettin::new(separation_of(scene), interval, ROOM);
+        let machine = run.machine();
+        let interval = common_period(machine).ok().flatten().unwrap_or(UNDRIVEN);
+        let mut benettin = Benettin::new(separation_of(machine), interval, ROOM);
         let mut twin = run.twin();
         benettin.start(run, &mut twin);
         Self { twin, benettin, interval, next: run.time() + interval, ended: 0, lost: false }
@@ -261,7 +261,7 @@ mod tests {
     fn a_twin_starts_a_billionth_away_and_thins_its_record() {
         let changes = [("contact.friction".to_owned(), "0".to_owned())];
         let scene = Scene::load("spcmm", &changes).expect("built in");
-        let mut run = Simulation::new(&scene).expect("starts");
+        let mut run = Simulation::new(&scene.machine).expect("starts");
         let mut twin = Twin::new(&run);
         let start = twin.distances()[0];
         assert!((start[1] / DISPLACEMENT - 1.0).abs() < 1e-6, "{start:?}");
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn its_exponent_is_that_of_a_sweep() {
         let scene = Scene::load("slider-crank-driven", &[]).expect("built in");
-        let period = drive_period(&scene).expect("driven");
+        let period = crate::analysis::drive::drive_period(&scene).expect("driven");
         let (discard, kept) = (ALIGNMENT, FEWEST);
         let plan = Plan { periods: discard + kept, discard, phase: 0.0, exponent: true };
         let mut point = PointRun::cold(&scene, plan, period).expect("starts");
@@ -291,7 +291,7 @@ mod tests {
             point.step().expect("runs");
         }
         let swept = point.finish().0.evidence.exponent.expect("a twin");
-        let mut run = Simulation::new(&scene).expect("starts");
+        let mut run = Simulation::new(&scene.machine).expect("starts");
         let mut twin = Twin::new(&run);
         assert_eq!(twin.exponent(), Err((discard + kept, period)));
         for k in 1..=discard + kept {

@@ -1,7 +1,8 @@
 //! Values as text on the screen: words as in files and on the command line, typeset units.
 
-use crate::scene::{Kind, Scene, Value, format_quantity, format_quantity_digits};
+use crate::scene::{Kind, Scene, Value};
 use crate::simulate::ContactState;
+use crate::units::{format_quantity, format_quantity_digits};
 
 /// What a contact does.
 pub fn contact(state: ContactState) -> &'static str {
@@ -89,11 +90,11 @@ fn is_solver_or_view_key(key: &str) -> bool {
 
 /// Method with its tolerance, or its fixed step.
 pub fn solver(scene: &Scene) -> String {
-    let method = scene.solver.method;
-    if scene.solver.method.is_adaptive() {
-        format!("{method} {}", power_of_ten(scene.solver.tolerance))
+    let method = scene.machine.solver.method;
+    if scene.machine.solver.method.is_adaptive() {
+        format!("{method} {}", power_of_ten(scene.machine.solver.tolerance))
     } else {
-        format!("{method} {}", quantity(scene.solver.step, "us", 6))
+        format!("{method} {}", quantity(scene.machine.solver.step, "us", 6))
     }
 }
 
@@ -216,7 +217,7 @@ fn grouped(count: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Dimension;
+    use crate::units::Dimension;
 
     const LENGTH: Kind = Kind::Number {
         dimension: Dimension::Length,
@@ -254,7 +255,7 @@ mod tests {
             };
             let printed = shown(&Value::Number(0.25), &kind);
             assert!(!printed.contains('^') && !printed.contains("um"), "{printed}");
-            let read = crate::scene::parse_quantity(&printed, dimension).expect("reads back");
+            let read = crate::units::parse_quantity(&printed, dimension).expect("reads back");
             assert!((read - 0.25).abs() < 1e-6, "{display}: {printed}");
             seen += 1;
         }

@@ -176,13 +176,13 @@ mod tests {
     fn sections_lie_at_the_drive_phase_and_the_orbit_is_as_long_as_it_says() {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load("spcmm", &changes).expect("built in");
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut watch = RunWatch::new(&scene);
         assert_eq!(watch.period(), Ok(0.2));
         // Not the start itself.
         run(&mut watch, &mut simulation, 0.21);
         assert_eq!(watch.sections().len(), 1);
-        simulation.reset().expect("starts");
+        simulation = Simulation::new(&scene.machine).expect("starts");
         watch.begin(&scene, 0.0);
         watch.set_phase(0.25, 0.0);
         run(&mut watch, &mut simulation, 0.7);
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn a_scene_without_a_drive_has_an_orbit_and_no_sections() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut watch = RunWatch::new(&scene);
         assert!(watch.period().expect_err("hangs").contains("no drive that repeats"));
         run(&mut watch, &mut simulation, 0.1);

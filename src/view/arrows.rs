@@ -8,7 +8,8 @@ use super::theme::Material;
 use super::{
     Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot, Tick, to_f32,
 };
-use crate::scene::{ElementLook, format_quantity_digits};
+use crate::machine::ElementKind;
+use crate::units::format_quantity_digits;
 
 /// Reference length of arrows, as a fraction of the picture height.
 pub const ARROW_LENGTH: f32 = 0.22;
@@ -134,8 +135,8 @@ fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
 pub(super) fn push_forces(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Palette, out: &mut DrawList) {
     let options = &shot.options.arrows;
     let at_joints = (options.normal || options.friction) && !joints.is_empty();
-    let elements = shot.scene.elements.iter().zip(&shot.frame.elements);
-    let loads = elements.filter(|(of, _)| options.normal && of.kind.look == ElementLook::Arrow);
+    let elements = shot.scene.machine.elements.iter().zip(&shot.frame.elements);
+    let loads = elements.filter(|(of, _)| options.normal && matches!(of.kind, ElementKind::Load(_)));
     let loads = loads.map(|(_, report)| report);
     let mut outside = loads.chain(&shot.frame.pull).peekable();
     if !at_joints && outside.peek().is_none() {

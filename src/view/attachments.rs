@@ -8,7 +8,8 @@ use super::drawn::{BarKind, Pose, Solid};
 use super::solids::push_solid;
 use super::theme::Material;
 use super::{Colour, Layer, Line, to_f32};
-use crate::scene::{self, Element, Freedom, Joint, Scene};
+use crate::machine::{self, Attachment, Bushing, Freedom, Joint, JointCoordinate, Motor, Stop};
+use crate::scene::Scene;
 use crate::simulate::{ElementReport, Frame};
 
 /// Half the length and radius of a bushing's sleeve, and the same of the pin in it, in radii of the scene.
@@ -48,15 +49,21 @@ fn bar(from: Vec3, to: Vec3, radius: f32) -> Solid<'static> {
     Solid::Bar { from, to, radius, kind: BarKind::Cylinder, capped: [false; 2] }
 }
 
-fn rotation(quat: &scene::Quat) -> Mat3 {
+fn rotation(quat: &machine::Quat) -> Mat3 {
     Mat3::from_quat(Quat::from_xyzw(quat.i as f32, quat.j as f32, quat.k as f32, quat.w as f32))
 }
 
 /// A sleeve at the point of one body and a pin at that of the other, along the axis of the bushing that is turned about most softly.
-pub(super) fn push_bushing(element: &Element, report: &ElementReport, frame: &Frame, style: &Style, layer: &mut Layer) {
-    let body = element.points.first().and_then(|end| end.body);
-    let axes = Pose::in_frame(frame, body).rotation * rotation(&element.rotation("axes"));
-    let turning = element.vector("turning_stiffness");
+pub(super) fn push_bushing(
+    bushing: &Bushing,
+    from: &Attachment,
+    report: &ElementReport,
+    frame: &Frame,
+    style: &Style,
+    layer: &mut Layer,
+) {
+    let axes = Pose::in_frame(frame, from.body).rotation * rotation(&bushing.axes);
+    let turning = &bushing.turning_stiffness;
     // Of equal ones the last: the axis of a turned part is z.
     let softest = (0..3).rev().min_by(|&a, &b| turning[a].total_cmp(&turning[b])).unwrap_or(2);
     let along = axes.col(softest) * style.radius;
@@ -80,9 +87,9 @@ struct Axis<'a> {
 }
 
 impl<'a> Axis<'a> {
-    fn of(element: &Element, report: &ElementReport, scene: &'a Scene, frame: &Frame) -> Option<Self> {
-        let (index, freedom) = element.joint?;
-        let joint = scene.kinematic_joints().nth(index)?;
+    fn of(on: JointCoordinate, report: &ElementReport, scene: &'a Scene, frame: &Frame) -> Option<Self> {
+        let freedom = on.freedom;
+        let joint = scene.machine.kinematic_joints().nth(on.joint)?;
         let parent = Pose::in_frame(frame, joint.parent);
         let (pose, axis) = match freedom {
             Freedom::SecondTurn => (Pose::in_frame(frame, Some(joint.child)), &joint.child_axis),
@@ -94,7 +101,7 @@ impl<'a> Axis<'a> {
 
     /// Where the middle of the child points where its angle is `angle`, unit vector; `None` if that lies on the axis.
     fn direction(&self, scene: &Scene, angle: f32) -> Option<Vec3> {
-        let arm = scene.bodies[self.joint.child].centre - self.joint.child_point;
+        let arm = scene.machine.bodies[self.joint.child].centre - self.joint.child_point;
         let at_zero = self.parent.rotation * rotation(&self.joint.rotation) * to_f32(&arm);
         let across = at_zero.reject_from_normalized(self.along).try_normalize()?;
         Some(Quat::from_axis_angle(self.along, angle) * across)
@@ -103,17 +110,17 @@ impl<'a> Axis<'a> {
 
 /// A disc where a slide ends; at a hinge a bar where the middle of the turning body then points.
 pub(super) fn push_stop(
-    element: &Element,
+    stop: &Stop,
     report: &ElementReport,
     (scene, frame): (&Scene, &Frame),
     style: &Style,
     layer: &mut Layer,
 ) {
-    let Some(axis) = Axis::of(element, report, scene, frame) else {
+    let Some(axis) = Axis::of(stop.on, report, scene, frame) else {
         return;
     };
-    for (key, side) in [("lower", -1.0), ("upper", 1.0)] {
-        let limit = element.number(key) as f32;
+    for (limit, side) in [(stop.lower, -1.0), (stop.upper, 1.0)] {
+        let limit = limit as f32;
         if !limit.is_finite() {
             continue;
         }
@@ -132,14 +139,14 @@ pub(super) fn push_stop(
 
 /// A case on the axis of the joint, with an arrow about it or along it.
 pub(super) fn push_motor(
-    element: &Element,
+    motor: &Motor,
     report: &ElementReport,
     (scene, frame): (&Scene, &Frame),
     style: &Style,
     layer: &mut Layer,
     lines: &mut Vec<Line>,
 ) {
-    let Some(axis) = Axis::of(element, report, scene, frame) else {
+    let Some(axis) = Axis::of(motor.on, report, scene, frame) else {
         return;
     };
     let thick = CASE * style.radius;

@@ -21,7 +21,8 @@ use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh, MeshData, Palette,
     Shot, ViewOptions, WearMap, to_f32,
 };
-use crate::scene::{Element, ElementLook, Role, Scene, SignedAxis};
+use crate::machine::{Element, ElementKind, Role};
+use crate::scene::{Scene, SignedAxis};
 use crate::simulate::{ContactState, ElementReport, Frame, JointReport};
 
 /// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
@@ -100,7 +101,7 @@ impl SceneView {
             at_start: joints,
             parts,
             plates: plates.into(),
-            joint_names: scene.ball_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
+            joint_names: scene.machine.ball_joints.iter().map(|joint| joint.name.as_str().into()).collect(),
             axis_names: ["X", "Y", "Z", "g"].map(Arc::from),
             bounds,
             down: scene.view.down,
@@ -229,7 +230,7 @@ impl SceneView {
         let joints = drawn::joints(scene, frame, self.magnification(scene, frame, options));
         let palette = Palette::of(options.theme);
         let mut solids = solids(&self.parts, &self.symbols, frame, &joints);
-        for (element, report) in scene.elements.iter().zip(&frame.elements) {
+        for (element, report) in scene.machine.elements.iter().zip(&frame.elements) {
             let (mut layer, mut lines) = (Layer::default(), Vec::new());
             layer.clear(Mesh::SHARED);
             self.push_element((element, report), (scene, frame), &palette, 1.0, &mut layer, &mut lines);
@@ -305,7 +306,7 @@ impl SceneView {
             push_sockets(frame, &joints, eye, palette.socket, &mut out.sockets);
         }
 
-        for element in scene.elements.iter().zip(&frame.elements) {
+        for element in scene.machine.elements.iter().zip(&frame.elements) {
             let points = shot.pixels_per_point;
             self.push_element(element, (scene, frame), &palette, points, &mut out.solid, &mut out.lines);
         }
@@ -346,22 +347,24 @@ impl SceneView {
             outer: palette.material(Role::Slider),
             colour: palette.text,
         };
-        match element.kind.look {
-            ElementLook::Coil => {
+        match &element.kind {
+            ElementKind::Spring(_) | ElementKind::JointSpring(_) => {
                 let radius = COIL * self.bounds.radius;
                 push_coil(from, to, radius, width, colour, lines);
             }
-            ElementLook::Ground => {
-                let up = to_f32(&element.vector("up"));
+            ElementKind::Tyre(tyre) => {
+                let up = to_f32(&tyre.up);
                 let radius = GROUND * self.bounds.radius;
                 push_ground(from, up, radius, width, colour, lines);
             }
-            ElementLook::Bushing => push_bushing(element, report, frame, &style, solid),
-            ElementLook::Stop => push_stop(element, report, (scene, frame), &style, solid),
-            ElementLook::Motor => {
-                push_motor(element, report, (scene, frame), &style, solid, lines);
+            ElementKind::Bushing(bushing) => {
+                push_bushing(bushing, &element.points[0], report, frame, &style, solid);
             }
-            ElementLook::Arrow | ElementLook::Hidden => {}
+            ElementKind::Stop(stop) => push_stop(stop, report, (scene, frame), &style, solid),
+            ElementKind::Motor(motor) => {
+                push_motor(motor, report, (scene, frame), &style, solid, lines);
+            }
+            ElementKind::Load(_) => {}
         }
     }
 
@@ -449,7 +452,7 @@ impl SceneView {
             push_arrow(&mut out.overlay, corner, axis * (38.0 * scale), 1.9 * scale, colour);
             push_label(out, &self.axis_names[i], LabelKind::Axis, sheared(corner + axis * (47.0 * scale)), colour);
         }
-        let gravity = to_f32(&shot.scene.gravity).try_normalize();
+        let gravity = to_f32(&shot.scene.machine.gravity).try_normalize();
         if let Some(gravity) = gravity.filter(|_| points[0] >= SMALLEST_WITH_GRAVITY) {
             let length = gravity * (34.0 * scale);
             let start = corner + right * (74.0 * scale) - length * 0.5;

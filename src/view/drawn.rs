@@ -13,8 +13,9 @@ use super::sticks::sticks;
 use super::surface::surface;
 use super::theme::Material;
 use super::{Colour, Mesh, MeshData, Palette, to_f32, zones};
+use crate::machine::{self, Geometry, Role, Shape};
 use crate::mesh;
-use crate::scene::{self, Geometry, Role, Scene, Shape};
+use crate::scene::Scene;
 use crate::simulate::{BodyMotion, Frame};
 
 /// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
@@ -132,7 +133,7 @@ pub(super) struct Pose {
 impl Pose {
     pub const WORLD: Self = Self { position: Vec3::ZERO, rotation: Mat3::IDENTITY };
 
-    fn new(position: &scene::Vec3, rotation: &scene::Mat3) -> Self {
+    fn new(position: &machine::Vec3, rotation: &machine::Mat3) -> Self {
         let column = |i: usize| to_f32(&rotation.column(i).into_owned());
         Self { position: to_f32(position), rotation: Mat3::from_cols(column(0), column(1), column(2)) }
     }
@@ -161,10 +162,10 @@ impl Pose {
 pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
     let mut meshes = Meshes { data: zones::meshes(), of_files: Vec::new() };
     let mut parts = Vec::new();
-    let roles = scene.body_roles();
-    let fixed = scene.fixed_shapes.iter().enumerate().map(|(i, shape)| (None, i, shape));
+    let roles = scene.machine.body_roles();
+    let fixed = scene.machine.fixed_shapes.iter().enumerate().map(|(i, shape)| (None, i, shape));
     let sticks = sticks(scene);
-    let moving = scene.bodies.iter().enumerate().flat_map(|(b, body)| {
+    let moving = scene.machine.bodies.iter().enumerate().flat_map(|(b, body)| {
         let shapes = sticks.get(&b).unwrap_or(&body.shapes);
         shapes.iter().enumerate().map(move |(i, shape)| (Some(b), i, shape))
     });
@@ -180,10 +181,16 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
         }
     }
     let probe_drawn = parts.iter().any(|part| part.role == Role::Probe);
-    if let (Some(tip), false) = (&scene.output.probe, probe_drawn) {
-        let size = scene.ball_joints.first().map_or(0.01, |joint| joint.contact.ball_radius) as f32;
+    if let (Some(tip), false) = (&scene.machine.output.probe, probe_drawn) {
+        let size = scene.machine.ball_joints.first().map_or(0.01, |joint| joint.contact.ball_radius) as f32;
         let form = Form::Ball { centre: to_f32(tip), radius: 0.4 * size };
-        parts.push(DrawnShape { body: Some(scene.output.body), index: 0, role: Role::Probe, colour: None, form });
+        parts.push(DrawnShape {
+            body: Some(scene.machine.output.body),
+            index: 0,
+            role: Role::Probe,
+            colour: None,
+            form,
+        });
     }
     (parts, meshes.data)
 }
@@ -204,6 +211,7 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
         Geometry::Sphere { centre, radius } => {
             // The joint draws its own ball.
             let is_joint_ball = scene
+                .machine
                 .ball_joints
                 .iter()
                 .any(|j| j.ball.body == body && (j.ball.point - centre).norm() < 0.1 * j.contact.ball_radius);
@@ -267,7 +275,7 @@ impl Meshes {
 
 /// The ball joint that a bar's end reaches into, if any.
 fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
-    for (i, joint) in scene.ball_joints.iter().enumerate() {
+    for (i, joint) in scene.machine.ball_joints.iter().enumerate() {
         let radius = joint.contact.ball_radius as f32;
         if joint.ball.body == body && to_f32(&joint.ball.point).distance(end) < 1.3 * radius {
             return Some(Reach::Ball(i));
@@ -314,7 +322,7 @@ fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f32) -> Option<M
 /// Magnification drawn when `asked` is requested: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its [`room`].
 pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f32) -> f32 {
     let asked = if asked.is_finite() { asked.clamp(1.0, 100.0) } else { 1.0 };
-    let drawable = scene.ball_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
+    let drawable = scene.machine.ball_joints.iter().zip(&frame.joints).enumerate().map(|(i, (joint, now))| {
         let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
         let radius = joint.contact.ball_radius as f32;
         let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
@@ -325,7 +333,7 @@ pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f
 
 /// Every ball joint as drawn at magnification `m`.
 pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
-    let drawn = scene.ball_joints.iter().zip(&frame.joints).map(|(joint, now)| {
+    let drawn = scene.machine.ball_joints.iter().zip(&frame.joints).map(|(joint, now)| {
         let socket_centre = to_f32(&now.socket_centre);
         let ball_radius = joint.contact.ball_radius as f32;
         let eccentricity = to_f32(&now.eccentricity);

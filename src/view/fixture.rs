@@ -1,10 +1,8 @@
 //! Hand-built scenes and frames for tests of view and render: nothing here is simulated.
 
 use crate::contact;
-use crate::scene::{
-    Attachment, BallJoint, Body, Geometry, MOST_PLOTS, Mat3, Output, Quat, Role, Scene, Shape, SignedAxis, Vec3,
-    ViewSettings,
-};
+use crate::machine::{Attachment, BallJoint, Body, Geometry, Machine, Mat3, Output, Quat, Role, Shape, Vec3};
+use crate::scene::{MOST_PLOTS, Scene, SignedAxis, ViewSettings};
 use crate::simulate::{BodyMotion, ContactState, Frame, JointReport, Peak};
 
 const BALL: f64 = 0.010;
@@ -36,28 +34,23 @@ fn scene(
     ball_joints: Vec<BallJoint>,
     fixed_shapes: Vec<Shape>,
 ) -> Scene {
-    Scene {
-        name: name.to_owned(),
+    let mut scene = Scene::load("pendulum", &[]).expect("a built-in scene");
+    scene.name = name.to_owned();
+    scene.view = ViewSettings { down, floor: None, isometric: None, time_scale: None, plots: [None; MOST_PLOTS] };
+    scene.machine = Machine {
         gravity: down.unit() * 9.81,
-        view: ViewSettings { down, floor: None, isometric: None, time_scale: None, plots: [None; MOST_PLOTS] },
         output: Output { body: 0, probe: None },
         bodies,
         joints: Vec::new(),
         ball_joints,
         fixed_shapes,
-        ..Scene::load("pendulum", &[]).expect("a built-in scene")
-    }
+        ..scene.machine
+    };
+    scene
 }
 
 fn joint(name: &str, socket: Attachment, ball: Attachment, opening: Vec3) -> BallJoint {
-    BallJoint {
-        name: name.to_owned(),
-        socket,
-        ball,
-        opening,
-        contact: contact::Parameters::default(),
-        overrides: Vec::new(),
-    }
+    BallJoint { name: name.to_owned(), socket, ball, opening, contact: contact::Parameters::default() }
 }
 
 /// Report of a joint whose ball touches the wall in the direction `n` (unit) with `normal` newtons.
@@ -176,7 +169,7 @@ pub(crate) fn three_legs() -> (Scene, Frame) {
     bodies.push(body("platform", shapes));
     motions.push(at(o7, platform_turn));
     let mut scene = scene("three legs", SignedAxis::PlusX, bodies, joints, rails);
-    scene.output = Output { body: 6, probe: Some(x(0.060)) };
+    scene.machine.output = Output { body: 6, probe: Some(x(0.060)) };
     (scene, Frame { bodies: motions, joints: reports, ..Default::default() })
 }
 

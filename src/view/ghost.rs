@@ -9,8 +9,9 @@ use super::near::Near;
 use super::solids::push_solid;
 use super::theme::{Ghost, GhostLook, Material};
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
-use crate::scene::{Output, format_quantity_digits};
+use crate::machine::Output;
 use crate::simulate::Frame;
+use crate::units::format_quantity_digits;
 
 impl GhostLook {
     /// Surface and outline at visibility `seen`, 0 to 1.
@@ -26,9 +27,9 @@ impl GhostLook {
 }
 
 /// The output point of a scene in `frame`, m: its probe tip, or its output body's origin.
-pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::scene::Vec3> {
+pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::machine::Vec3> {
     let body = frame.bodies.get(output.body)?;
-    let arm = output.probe.map_or_else(crate::scene::Vec3::zeros, |probe| body.rotation * probe);
+    let arm = output.probe.map_or_else(crate::machine::Vec3::zeros, |probe| body.rotation * probe);
     Some(body.position + arm)
 }
 
@@ -88,7 +89,7 @@ impl SceneView {
         let moved = near.as_ref().map(|near| near.frame(ideal));
         let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
         let ideal = moved.as_ref().unwrap_or(ideal);
-        let output = &shot.scene.output;
+        let output = &shot.scene.machine.output;
         let (Some(from), Some(to)) = (output_point(output, ideal), output_point(output, shot.frame)) else {
             return;
         };

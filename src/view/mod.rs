@@ -54,7 +54,7 @@ pub use shot::Shot;
 pub use theme::{Colour, Ghost, GhostLook, Palette, Theme};
 
 /// Converts a physics vector to the view's type.
-pub fn to_f32(v: &crate::scene::Vec3) -> glam::Vec3 {
+pub fn to_f32(v: &crate::machine::Vec3) -> glam::Vec3 {
     glam::Vec3::new(v.x as f32, v.y as f32, v.z as f32)
 }
 

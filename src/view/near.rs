@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::{Camera, Shot, to_f32};
-use crate::scene;
 use crate::simulate::Frame;
 
 /// Distance of the target from the origin, in distances from the eye, beyond which positions are measured from it.
@@ -46,7 +45,7 @@ impl Near {
 /// `frame` measured from `origin`, world axes, m.
 fn frame_from(frame: &Frame, origin: Vec3) -> Frame {
     let [x, y, z] = origin.to_array().map(f64::from);
-    let origin = scene::Vec3::new(x, y, z);
+    let origin = crate::machine::Vec3::new(x, y, z);
     let mut near = frame.clone();
     near.origin += origin;
     for body in &mut near.bodies {

@@ -216,16 +216,16 @@ fn round_up_125(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene;
+    use crate::machine;
     use crate::simulate::JointReport;
 
     fn frame(time: f64, normal: f64) -> Frame {
-        let report = JointReport { normal_force: scene::Vec3::new(0.0, 0.0, normal), ..Default::default() };
+        let report = JointReport { normal_force: machine::Vec3::new(0.0, 0.0, normal), ..Default::default() };
         Frame { time, joints: vec![report], ..Default::default() }
     }
 
     fn peak(time: f64, normal: f64, impacts: u32) -> [Peak; 1] {
-        [Peak { normal, time, normal_force: scene::Vec3::new(normal, 0.0, 0.0), impacts, ..Default::default() }]
+        [Peak { normal, time, normal_force: machine::Vec3::new(normal, 0.0, 0.0), impacts, ..Default::default() }]
     }
 
     fn mark(marks: &PeakMarks, frame: &Frame) -> Option<Mark> {

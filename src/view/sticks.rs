@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::scene::{Geometry, JointKind, Scene, Shape, Vec3};
+use crate::machine::{Geometry, JointKind, Shape, Vec3};
+use crate::scene::Scene;
 
 /// Radii of the bars and of the ball at the centroid, in lengths of the longest bar.
 const BAR: f64 = 0.03;
@@ -10,12 +11,12 @@ const BALL: f64 = 0.08;
 
 /// Shapes of the bodies that have none, by body.
 pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
-    let bare = scene.bodies.iter().enumerate();
+    let bare = scene.machine.bodies.iter().enumerate();
     let bare = bare.filter(|(_, body)| body.shapes.is_empty());
     let mut points: BTreeMap<usize, Vec<Vec3>> = bare.map(|(i, _)| (i, Vec::new())).collect();
-    let bound = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+    let bound = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     let tree = bound.flat_map(|joint| joint.points());
-    let balls = scene.ball_joints.iter();
+    let balls = scene.machine.ball_joints.iter();
     let balls = balls.flat_map(|joint| [joint.socket, joint.ball]);
     for end in tree.chain(balls) {
         if let Some(points) = end.body.and_then(|body| points.get_mut(&body)) {
@@ -23,7 +24,7 @@ pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
         }
     }
     let shapes = points.into_iter().map(|(body, points)| {
-        let centre = scene.bodies[body].centre;
+        let centre = scene.machine.bodies[body].centre;
         let lengths = points.iter().map(|point| (point - centre).norm());
         let longest = lengths.fold(0.0, f64::max);
         let bars = points.iter().map(|point| Geometry::Capsule { from: centre, to: *point, radius: BAR * longest });

@@ -6,7 +6,8 @@ use parry3d::query::Ray;
 use super::cast::cast;
 use super::drawn::{DrawnJoint, DrawnShape, Pose, Solid};
 use super::to_f32;
-use crate::scene::{Joint, JointKind, Role, Scene};
+use crate::machine::{Joint, JointKind, Role};
+use crate::scene::Scene;
 use crate::simulate::Frame;
 
 /// Radii of a pin in parts of the hub's width, and, at most, of the scene's radius; without a hub.
@@ -65,9 +66,9 @@ pub(super) fn symbols(
     radius: f32,
 ) -> Vec<Symbol> {
     let mut shapes: Vec<Vec<(Role, Solid<'_>)>> = Vec::new();
-    shapes.resize_with(scene.bodies.len() + 1, Vec::new);
+    shapes.resize_with(scene.machine.bodies.len() + 1, Vec::new);
     // The world last.
-    let of = |body: Option<usize>| body.unwrap_or(scene.bodies.len());
+    let of = |body: Option<usize>| body.unwrap_or(scene.machine.bodies.len());
     for part in parts {
         let shapes = &mut shapes[of(part.body)];
         if shapes.len() < MOST_SHAPES {
@@ -75,7 +76,7 @@ pub(super) fn symbols(
         }
     }
     let mut symbols = Vec::new();
-    let joined = scene.joints.iter().chain(&scene.closing_joints);
+    let joined = scene.machine.joints.iter().chain(&scene.machine.closing_joints);
     for joint in joined.filter(|joint| joint.drawn) {
         let (parent, child) = (Pose::in_frame(frame, joint.parent), Pose::in_frame(frame, Some(joint.child)));
         let own: &[_] = match joint.parent {

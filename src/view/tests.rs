@@ -111,13 +111,13 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
     let mut checked = 0;
     for name in crate::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
-        let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+        let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let view = SceneView::new(&scene, &frame);
         let plain = drawn::joints(&scene, &frame, 1.0);
         // Twelve loose joints take their time.
-        let later: &[f64] = match scene.ball_joints.len() {
+        let later: &[f64] = match scene.machine.ball_joints.len() {
             0..=8 => &[0.1, 0.4],
             _ => &[],
         };
@@ -128,7 +128,7 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
             assert!(m > 15.0, "{name}: ×{m}");
             let joints = drawn::joints(&scene, &frame, m);
             for (i, joint) in joints.iter().enumerate() {
-                let ball = scene.ball_joints[i].ball.body;
+                let ball = scene.machine.ball_joints[i].ball.body;
                 for part in view.parts.iter().filter(|part| part.body != ball) {
                     let solid = part.place(&frame, &joints);
                     let Some(distance) = super::cast::distance(&solid, joint.socket_centre) else {
@@ -367,7 +367,7 @@ fn a_spring_is_in_the_picture_from_end_to_end() {
                 [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = \"0 0 -200 mm\" }\n\
                 [[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\nstiffness = \"1 N/m\"\n";
     let scene = Scene::parse(text, None, &[]).unwrap();
-    let mut simulation = crate::simulate::Simulation::new(&scene).unwrap();
+    let mut simulation = crate::simulate::Simulation::new(&scene.machine).unwrap();
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let view = SceneView::new(&scene, &frame);
@@ -386,7 +386,7 @@ fn started(text: &str, files: &[(&str, &str)]) -> (Scene, Frame) {
     let files = files.map(|(name, text)| ((*name).to_owned(), Arc::from(*text)));
     let scene = Scene::parse_with(text, None, &files.collect(), &[]).unwrap();
     let mut frame = Frame::default();
-    Simulation::new(&scene).unwrap().sample(0.0, &mut frame);
+    Simulation::new(&scene.machine).unwrap().sample(0.0, &mut frame);
     (scene, frame)
 }
 
@@ -499,7 +499,7 @@ fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_o
     let turned = text + "start = { angular_velocity = \"1000 rad/s\" }\n";
     let (scene, first) = started(&turned, &[]);
     let view = SceneView::new(&scene, &first);
-    let (mut simulation, mut frame) = (Simulation::new(&scene).unwrap(), Frame::default());
+    let (mut simulation, mut frame) = (Simulation::new(&scene.machine).unwrap(), Frame::default());
     simulation.advance_to(1e-3).unwrap();
     simulation.sample(1e-3, &mut frame);
     let (marks, camera, mut drawn) = (PeakMarks::new(), view.camera(), DrawList::default());

@@ -1,6 +1,6 @@
 //! Colours of the picture, light and dark. Colours are sRGB-encoded here; the shader linearises them.
 
-use crate::scene::Role;
+use crate::machine::Role;
 
 /// Light or dark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -322,14 +322,14 @@ impl Laboratory {
         let now = self.ctx.input(|input| input.time);
         if self.noted.is_none_or(|noted| now - noted > NOTE_INTERVAL) {
             self.noted = Some(now);
-            let scene = self.app.player().wanted();
+            let scene = self.app.player().pending();
             crash::note(scene, &self.renderer, self.app.session());
         }
     }
 
     fn impacts(&self, time: f64) -> String {
         let player = self.app.player();
-        let joints = &player.scene().ball_joints;
+        let joints = &player.running().ball_joints;
         let shown = player.pacer.shown();
         let ended = player.simulation().impacts();
         let ended = ended.filter(|impact| impact.end > time && impact.end <= shown);
@@ -349,7 +349,7 @@ impl Laboratory {
 
     fn state(&self) -> String {
         let player = self.app.player();
-        let scene = player.scene();
+        let scene = player.running();
         let changes: serde_json::Map<_, _> =
             scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
         // A camera that was not moved shows everything.

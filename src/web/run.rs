@@ -50,7 +50,7 @@ impl Run {
             })
             .collect::<Result<_, JsError>>()?;
         let scene = Scene::load(scene, &changes)?;
-        let simulation = Simulation::new(&scene).map_err(|e| JsError::new(&e.located(&scene).to_string()))?;
+        let simulation = Simulation::new(&scene.machine).map_err(|e| JsError::new(&scene.locate(&e).to_string()))?;
         Ok(Self { simulation })
     }
 

@@ -17,7 +17,7 @@ fn link() -> (String, u64) {
     player.run_to(0.041);
     let hash = player.simulation().state_hash();
     let link = Link {
-        scene: SceneText::of(player.wanted()),
+        scene: SceneText::of(player.pending()),
         log: player.log(),
         steps: Some(player.steps()),
         time: Some(player.pacer.shown()),

@@ -9,7 +9,8 @@ use jointplay::analysis::{
     AnalysisError, End, RunContext, Setting, WorkBudget, WorkPrecision, presets, work_precision,
 };
 use jointplay::integrate::Method;
-use jointplay::scene::{Preset, Scene};
+use jointplay::machine::Preset;
+use jointplay::scene::Scene;
 use serde_json::Value as Json;
 
 use crate::program::{jointplay, names};

@@ -1,6 +1,6 @@
 //! What no frame may show, whatever the scene and the method.
 
-use jointplay::scene::{BallJoint, Scene, Vec3};
+use jointplay::machine::{BallJoint, Machine, Vec3};
 use jointplay::simulate::{Frame, JointReport};
 
 /// Penetration over ball radius beyond which a ball has left its socket.
@@ -34,17 +34,17 @@ pub fn finite(frame: &Frame) -> bool {
 }
 
 /// What no frame may show; `None` where all is well.
-pub fn fault(frame: &Frame, scene: &Scene, form: &str) -> Option<String> {
+pub fn fault(frame: &Frame, machine: &Machine, form: &str) -> Option<String> {
     if !finite(frame) {
         return Some(format!("not finite at t = {:e} s", frame.time));
     }
     for b in &frame.bodies {
-        let skew = (b.rotation.tr_mul(&b.rotation) - jointplay::scene::Mat3::identity()).amax();
+        let skew = (b.rotation.tr_mul(&b.rotation) - jointplay::machine::Mat3::identity()).amax();
         if skew > 1e-9 {
             return Some(format!("orientation off by {skew:e} at t = {:e} s", frame.time));
         }
     }
-    let pairs = frame.joints.iter().zip(&scene.ball_joints);
+    let pairs = frame.joints.iter().zip(&machine.ball_joints);
     pairs
         .filter_map(|(report, joint)| joint_fault(report, joint, form))
         .next()

@@ -7,7 +7,7 @@ pub mod matrix;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
-use jointplay::scene::Scene;
+use jointplay::scene::{LiveScene, Scene};
 use jointplay::simulate::{Frame, Simulation};
 
 /// Calls `kill` with instants within `length`, `JOINTPLAY_KILLS` of them or `few`.
@@ -80,9 +80,14 @@ pub fn free_ball(place: f64, speed: f64, gravity: f64, contact: &str) -> String 
     )
 }
 
-/// A running built-in scene.
+/// The machine of a built-in scene in motion.
 pub fn simulation(name: &str, changes: &Changes) -> Simulation {
-    Simulation::new(&scene(name, changes)).unwrap()
+    Simulation::new(&scene(name, changes).machine).unwrap()
+}
+
+/// A built-in scene in motion, whose parameters may be changed.
+pub fn live(name: &str, changes: &Changes) -> LiveScene {
+    LiveScene::new(&scene(name, changes)).unwrap()
 }
 
 /// Steps exactly to `end`, the last step cut.
@@ -126,7 +131,7 @@ pub fn looks<const MICROSECONDS: u32>() -> f64 {
 /// Mean size of every contact force over a span, N, sampled at a thousand instants.
 pub fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
     let mut frame = Frame::default();
-    let mut sums = vec![0.0; simulation.scene().ball_joints.len()];
+    let mut sums = vec![0.0; simulation.machine().ball_joints.len()];
     for n in 0..=1000 {
         let t = from + (to - from) * f64::from(n) / 1000.0;
         simulation.advance_to(t).unwrap();

@@ -68,7 +68,7 @@ pub fn check(bytes: &[u8]) -> Fate {
             return Fate::Refused;
         }
     };
-    let warnings = scene.warnings().into_iter().map(|w| w.to_string());
+    let warnings = scene.machine.warnings().into_iter().map(|w| w.to_string());
     for words in warnings.chain([scene.title.clone(), scene.name.clone()]) {
         assert_eq!(visible(&words), *words);
     }
@@ -99,10 +99,10 @@ pub fn check(bytes: &[u8]) -> Fate {
 
 /// Starts `scene` and takes some steps.
 fn run(scene: &Scene) -> Fate {
-    let mut simulation = match Simulation::new(scene) {
+    let mut simulation = match Simulation::new(&scene.machine) {
         Ok(simulation) => simulation,
         Err(error) => {
-            assert!(!said(&error.located(scene)).is_empty());
+            assert!(!said(&scene.locate(&error)).is_empty());
             return Fate::NoStart;
         }
     };
@@ -111,7 +111,7 @@ fn run(scene: &Scene) -> Fate {
     for body in &frame.bodies {
         assert!(body.position.iter().all(|x| x.is_finite()));
     }
-    if scene.bodies.len() > MOST_BODIES {
+    if scene.machine.bodies.len() > MOST_BODIES {
         return Fate::Starts;
     }
     for _ in 0..STEPS {

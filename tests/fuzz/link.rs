@@ -24,7 +24,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     assert_eq!(Link::parse(&link.format()).as_ref(), Ok(&link));
     match link.load() {
         Ok(scene) if scene.bodies.len() <= MOST_BODIES => {
-            if let Ok(mut simulation) = Simulation::new(&scene) {
+            if let Ok(mut simulation) = Simulation::new(&scene.machine) {
                 let _ = simulation.step();
             }
         }

@@ -163,8 +163,8 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
 
     let player = harness.state_mut().player_mut();
     player.set_playing(false);
-    let scene = player.simulation().scene();
-    assert!((scene.contact.clearance - 0.4e-3).abs() < 1e-15);
+    let scene = player.simulation().pending();
+    assert!((scene.machine.contact.clearance - 0.4e-3).abs() < 1e-15);
     // Sections at phase 0 are at T, 2 T, …; the first was discarded, and the second kept one was clicked.
     let steps = player.steps();
     let log = player.log().clone();
@@ -287,11 +287,11 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     harness.get_by_role_and_label(Role::Dialog, "Change the running scene?");
     harness.get_by_label("Scene: spcmm instead of pendulum");
     click(&mut harness, Role::Button, "Close");
-    assert_eq!(harness.state().player().scene().name, "pendulum");
+    assert_eq!(harness.state().player().running().name, "pendulum");
     click_point(&mut harness);
     click(&mut harness, Role::Button, "Change and run");
     assert!(harness.state().loading().is_some());
-    assert_eq!(harness.state().player().scene().name, "spcmm");
+    assert_eq!(harness.state().player().running().name, "spcmm");
 }
 
 #[test]
@@ -504,12 +504,12 @@ fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it(
         click(&mut harness, Role::Button, ready.name);
         harness.run_steps(2);
         let player = harness.state().player();
-        assert_eq!(player.scene().name, ready.scene);
+        assert_eq!(player.running().name, ready.scene);
         for (key, value) in ready.changes {
-            let changes = &player.scene().changes;
+            let changes = &player.running().changes;
             assert!(changes.iter().any(|(k, v)| k == key && v == value), "{key}");
         }
-        let mut expected = ready.task(player.wanted());
+        let mut expected = ready.task(player.pending());
         let Some(Job::Sweep(task, _)) = asked.borrow_mut().pop() else {
             panic!("{}: no sweep", ready.name);
         };
@@ -541,10 +541,10 @@ fn a_ready_sweep_asks_before_a_changed_scene_is_replaced() {
         click(&mut harness, Role::Button, READY[0].name);
         harness.run_steps(2);
         harness.get_by_label("Clearance 0.5 mm");
-        assert_eq!(harness.state().player().scene().name, "pendulum");
+        assert_eq!(harness.state().player().running().name, "pendulum");
         click(&mut harness, Role::Button, answer);
         harness.run_steps(2);
-        assert_eq!(harness.state().player().scene().name, scene);
+        assert_eq!(harness.state().player().running().name, scene);
         assert_eq!(asked.borrow().len(), sweeps);
     }
 }

@@ -196,7 +196,7 @@ const CLAIMS: &[Claim] = &[
         s.joints().all(|joint| (s.joint(joint).clearance - 0.3e-3).abs() < 1e-9)
     }),
     ("clearance", 2, Begins, "the clearance was just doubled, to 0.6 mm", |s| {
-        s.app().player().scene().contact.clearance == 0.6e-3 && s.joint(0).clearance == 0.6e-3
+        s.app().player().running().machine.contact.clearance == 0.6e-3 && s.joint(0).clearance == 0.6e-3
     }),
     ("clearance", 2, Begins, "S1 is in free flight", |s| s.is_free(0) && s.microscope(0)),
     ("clearance", 2, Ends, "it just flies on, with farther to go", |s| s.joint(0).clearance == 0.6e-3),
@@ -230,14 +230,14 @@ const CLAIMS: &[Claim] = &[
         s.plots(&["Normal force, N", "Friction force, N"])
     }),
     ("friction", 3, Begins, "The same machine from the start, without friction", |s| {
-        s.time() == 0.0 && s.app().player().scene().contact.friction == 0.0
+        s.time() == 0.0 && s.app().player().running().machine.contact.friction == 0.0
     }),
     ("friction", 4, Begins, "Here nothing brakes the balls along their walls", |s| {
         s.joints().all(|joint| s.joint(joint).friction_force.norm() == 0.0)
     }),
     ("friction", 5, Begins, "Two things take energy", |s| s.plots(&["Energy balance, mJ"])),
     ("friction", 6, Begins, "the instant at which friction is switched on", |s| {
-        s.app().player().scene().contact.friction == 0.15 && (s.time() - 60e-3).abs() < 1e-9
+        s.app().player().running().machine.contact.friction == 0.15 && (s.time() - 60e-3).abs() < 1e-9
     }),
     ("friction", 6, Ends, "then the balls rest on their walls", |s| s.all_rest()),
     ("slow-motion", 1, Begins, "At the time scale 1:1000", |s| {
@@ -273,20 +273,20 @@ const CLAIMS: &[Claim] = &[
     }),
     ("ideal", 3, Begins, "The probe sits below the platform", |s| {
         let frame = s.app().player().frame();
-        let gravity = s.app().player().scene().gravity;
-        let output = &s.app().player().scene().output;
+        let gravity = s.app().player().running().machine.gravity;
+        let output = &s.app().player().running().machine.output;
         let body = &frame.bodies[output.body];
         let probe = body.position + body.rotation * output.probe.expect("a probe");
         frame.joints.iter().all(|joint| (probe - joint.ball_centre).dot(&gravity) > 0.0)
     }),
     ("ideal", 4, Begins, "The balls rest on the walls of their sockets", |s| s.all_rest()),
     ("ideal", 5, Begins, "The vertical of this machine is x; y and z are level", |s| {
-        let gravity = s.app().player().scene().gravity;
+        let gravity = s.app().player().running().machine.gravity;
         gravity.x > 9.0 && gravity.y == 0.0 && gravity.z == 0.0
     }),
     ("ideal", 6, Ends, "It goes from", |s| s.plots(&["Tip error by axis"])),
     ("forces", 1, Begins, "Between the needles the line lies at 0", |s| {
-        let mut run = Simulation::new(s.app().player().scene()).expect("starts");
+        let mut run = Simulation::new(&s.app().player().running().machine).expect("starts");
         let mut impacts = Vec::new();
         let mut seen = Vec::new();
         let mut frame = jointplay::simulate::Frame::default();
@@ -416,7 +416,7 @@ fn the_error_of_a_machine_that_is_turned_over_turns_too() {
     let along = |gravity: &str| {
         let change = [("gravity.x".to_owned(), gravity.to_owned())];
         let scene = jointplay::scene::Scene::load("spcmm", &change).expect("in range");
-        let mut run = Simulation::new(&scene).expect("starts");
+        let mut run = Simulation::new(&scene.machine).expect("starts");
         run.advance_to(0.4).expect("runs");
         let mut frame = jointplay::simulate::Frame::default();
         run.sample(0.4, &mut frame);

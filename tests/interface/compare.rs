@@ -64,7 +64,7 @@ fn the_grey_curves_are_the_run_that_would_have_been() {
     harness.run_steps(200);
     let app = harness.state();
     let kept = &app.comparison().kept()[0];
-    let mut other = Player::new(app.player().scene()).expect("starts");
+    let mut other = Player::new(app.player().running()).expect("starts");
     other.set("contact.clearance", "0.3 mm").expect("is allowed");
     other.reset().expect("starts");
     other.run_to(0.02);
@@ -122,7 +122,7 @@ fn another_parameter_is_another_change_however_soon_it_comes() {
         assert_eq!(names(&harness), [before]);
     }
     let kept = harness.state().comparison().kept()[0].run();
-    assert_eq!(kept.scene().contact.clearance, 9e-4);
+    assert_eq!(kept.running().machine.contact.clearance, 9e-4);
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
     assert_eq!(app.player().pacer.shown(), 0.0);
     let kept = app.comparison().kept()[0].run();
     assert!(kept.reached() >= 0.02 && force(kept, 0.0, 0.02).len() > 100);
-    assert_eq!(kept.scene().contact.clearance, 3e-4);
+    assert_eq!(kept.running().machine.contact.clearance, 3e-4);
     // This one was changed on its way: it begins anew with what it had last.
     harness.state_mut().run_to(0.01);
     set(&mut harness, "Clearance", 0.7);
@@ -144,7 +144,7 @@ fn a_reset_keeps_the_record_of_a_run_that_was_never_changed() {
     harness.state_mut().reset();
     harness.run_steps(3);
     let kept = harness.state().comparison().kept()[0].run();
-    assert_eq!((kept.reached(), kept.scene().contact.clearance), (0.0, 7e-4));
+    assert_eq!((kept.reached(), kept.running().machine.contact.clearance), (0.0, 7e-4));
 }
 
 #[test]

@@ -196,19 +196,19 @@ fn theme_type_size_and_scenes_are_remembered_and_start_as_new_forgets_them() {
     click(&mut harness, "Open");
     click(&mut harness, "one.toml");
     harness.run();
-    assert_eq!(harness.state().player().scene().name, "chain");
+    assert_eq!(harness.state().player().running().name, "chain");
     std::fs::remove_file(file("two.toml")).expect("there");
     click(&mut harness, "Open");
     click(&mut harness, "two.toml");
     harness.run();
-    assert_eq!(harness.state().player().scene().name, "chain", "it stays");
+    assert_eq!(harness.state().player().running().name, "chain", "it stays");
     assert!(harness.query_all_by_label_contains("two.toml").next().is_some(), "a message names it");
 
     click(&mut harness, "Open");
     click(&mut harness, "Start as new…");
     click(&mut harness, "Start as new");
     harness.run_steps(3);
-    assert_eq!(harness.state().player().scene().name, DEFAULT_SCENE);
+    assert_eq!(harness.state().player().running().name, DEFAULT_SCENE);
     assert_eq!(harness.ctx.zoom_factor(), 1.0);
     assert!(harness.ctx.options(|options| options.theme_preference == ThemePreference::System));
     let now = stored(&path);

@@ -43,7 +43,7 @@ fn embed_leaves_the_picture_and_the_panels_that_it_names_and_links_keep_it() {
         if sliders {
             harness.get_by_role_and_label(Role::Slider, "Clearance").set_value_accesskit(0.45);
             harness.run_steps(2);
-            assert_eq!(harness.state().player().wanted().contact.clearance, 0.45e-3);
+            assert_eq!(harness.state().player().pending().machine.contact.clearance, 0.45e-3);
         }
     }
     let error = AppOptions::from_link("?embed=sliders").expect_err("no panel");

@@ -91,7 +91,7 @@ const PICTURED: [&str; 8] = [
 /// [`PICTURED`]: it must leave room for other drivers, in which a digit would hide.
 #[track_caller]
 pub fn compare_window(harness: &mut Harness<'_, App>, name: &str) {
-    let method = harness.state().player().scene().solver.method;
+    let method = harness.state().player().running().machine.solver.method;
     assert_eq!(method, Method::RungeKutta4, "{name} follows the steps of an adaptive method");
     let path = format!("{}/{STORED}/{name}.txt", env!("CARGO_MANIFEST_DIR"));
     let mut texts = String::new();

@@ -47,7 +47,7 @@ fn a_size_that_cannot_be_drawn_is_refused() {
 #[test]
 fn the_overlay_adds_to_the_plain_picture() {
     let scene = Scene::load("spcmm", &[]).expect("built in");
-    let mut simulation = Simulation::new(&scene).expect("starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("starts");
     simulation.advance_to(7.85e-3).expect("runs");
     let mut frame = Frame::default();
     simulation.sample(7.85e-3, &mut frame);

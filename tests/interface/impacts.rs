@@ -16,7 +16,7 @@ fn of_run(app: &App, time: f64) -> Vec<Impact> {
 
 /// The same, with the instant at which the force of each was largest, s.
 pub fn peaks_of_run(app: &App, time: f64) -> Vec<(Impact, f64)> {
-    let mut simulation = Simulation::new(app.player().scene()).expect("starts");
+    let mut simulation = Simulation::new(&app.player().running().machine).expect("starts");
     let (mut impacts, mut latest, mut peaks) = (Vec::new(), Vec::new(), Vec::<(usize, Peak)>::new());
     while simulation.time() < time {
         simulation.step().expect("runs");

@@ -139,7 +139,7 @@ fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_lin
     let at = place(&harness, 5e-3);
     drag(&mut harness, &[at]);
     let player = harness.state_mut().player_mut();
-    assert_eq!(player.wanted().contact.friction, 0.15, "as it was then");
+    assert_eq!(player.pending().machine.contact.friction, 0.15, "as it was then");
     player.set("contact.clearance", "0.6 mm").expect("in range");
     let left = player.abandoned_future().expect("left");
     assert!((left.from - 5e-3).abs() < 1e-4 && left.to == 30e-3);
@@ -156,7 +156,7 @@ fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_lin
 /// A link to the instant on show leads there again, to the same bits.
 fn follows(player: &Player) {
     let link = Link {
-        scene: SceneText::of(player.scene()),
+        scene: SceneText::of(player.running()),
         log: player.log(),
         steps: Some(player.steps()),
         time: Some(player.pacer.shown()),
@@ -348,8 +348,8 @@ fn wear_and_a_pull_show_what_is_stored() {
 /// A point of the picture on the platform at t = 0.
 pub(crate) fn platform(harness: &Harness<'_, App>) -> Pos2 {
     let app = harness.state();
-    let scene = app.player().scene();
-    let platform = scene.bodies.iter().position(|body| body.name == "platform");
+    let scene = app.player().running();
+    let platform = scene.machine.bodies.iter().position(|body| body.name == "platform");
     let body = &app.player().frame().bodies[platform.expect("there")];
     app.place_in_view(&body.position).expect("in sight")
 }
@@ -502,16 +502,16 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     // 3: the clearance doubled while it runs.
     class.key(Key::Space);
     class.slide("Clearance", 0.62);
-    let clearance = class.app().player().scene().contact.clearance;
+    let clearance = class.app().player().running().machine.contact.clearance;
     assert!((0.5e-3..0.8e-3).contains(&clearance), "{clearance}");
     assert!(class.app().player().is_playing());
     class.done("clearance live");
 
     // 4: friction off, and on again.
     class.slide("Friction coefficient", 0.0);
-    assert_eq!(class.app().player().scene().contact.friction, 0.0);
+    assert_eq!(class.app().player().running().machine.contact.friction, 0.0);
     class.click(Role::Button, "Reset Friction coefficient");
-    assert_eq!(class.app().player().scene().contact.friction, 0.15);
+    assert_eq!(class.app().player().running().machine.contact.friction, 0.15);
     class.done("friction off and on");
 
     // 5: an impact a thousand times slower, the next one, the one before.
@@ -643,16 +643,16 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     // 3
     class.tap(Role::Button, "Play");
     class.swipe("Clearance", 0.62);
-    let clearance = class.app().player().scene().contact.clearance;
+    let clearance = class.app().player().running().machine.contact.clearance;
     assert!((0.5e-3..0.8e-3).contains(&clearance), "{clearance}");
     assert!(class.app().player().is_playing());
     class.done("clearance live");
 
     // 4
     class.swipe("Friction coefficient", -0.1);
-    assert_eq!(class.app().player().scene().contact.friction, 0.0);
+    assert_eq!(class.app().player().running().machine.contact.friction, 0.0);
     class.tap(Role::Button, "Reset Friction coefficient");
-    assert_eq!(class.app().player().scene().contact.friction, 0.15);
+    assert_eq!(class.app().player().running().machine.contact.friction, 0.15);
     class.done("friction off and on");
 
     // 5

@@ -45,7 +45,7 @@ fn plain(name: &str) -> Arc<Lesson> {
     });
     let lesson = Lesson::parse(name, &lines.collect::<String>(), None).unwrap_or_else(|error| panic!("{error}"));
     for run in &lesson.runs {
-        assert_eq!(run.scene.solver.method, Method::RungeKutta4, "{name}: {}", run.name);
+        assert_eq!(run.scene.machine.solver.method, Method::RungeKutta4, "{name}: {}", run.name);
     }
     Arc::new(lesson)
 }
@@ -170,14 +170,14 @@ fn a_lecturer_may_play_with_any_control_and_next_sets_the_machine() {
     harness.get_by_label("Set the step again").click();
     settle(&mut harness);
     assert!(!says(&harness, "The machine was changed"));
-    assert_eq!(harness.state().player().scene().contact.friction, 0.15);
+    assert_eq!(harness.state().player().running().machine.contact.friction, 0.15);
     set(&mut harness);
     press(&mut harness, Key::PageDown);
     assert_eq!(step(&harness), 2);
-    assert_eq!(harness.state().player().scene().contact.friction, 0.15);
+    assert_eq!(harness.state().player().running().machine.contact.friction, 0.15);
     settle(&mut harness);
     // Where the step before ends: just after the first impact of S1, which the view follows.
-    let mut alone = Simulation::new(harness.state().player().scene()).expect("starts");
+    let mut alone = Simulation::new(&harness.state().player().running().machine).expect("starts");
     alone.advance_to(20e-3).expect("runs");
     let of_s1 = alone.impacts().filter(|impact| impact.joint == 0);
     let [first, second] = of_s1.map(|impact| impact.start).take(2).collect::<Vec<_>>()[..] else {
@@ -212,7 +212,7 @@ fn a_lesson_changes_no_bit_of_the_run() {
     let mut harness = taught("rattle", 4, WIDE);
     play(&mut harness);
     let player = harness.state().player();
-    let mut alone = Simulation::new(player.scene()).expect("starts");
+    let mut alone = Simulation::new(&player.running().machine).expect("starts");
     while alone.statistics().steps < player.steps() {
         alone.step().expect("runs");
     }
@@ -349,7 +349,7 @@ fn a_scene_that_was_opened_during_a_lesson_stays_when_that_ends() {
     harness.run_steps(2);
     harness.get_by_label("Leave the lesson").click();
     harness.run_steps(2);
-    assert_eq!(harness.state().player().scene().name, "delta");
+    assert_eq!(harness.state().player().running().name, "delta");
     harness.get_by_label("Accuracy");
 }
 

@@ -19,7 +19,8 @@ use egui_kittest::{
 };
 use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window};
 use jointplay::cli::output::Table;
-use jointplay::scene::{DEFAULT_SCENE, DriveData, Scene, Value};
+use jointplay::machine::Drive;
+use jointplay::scene::{DEFAULT_SCENE, Scene, Value};
 use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
 
 /// What a host was asked for.
@@ -173,14 +174,14 @@ fn a_copied_link_opens_the_same_state_with_the_same_bits() {
     assert!(link.len() < 600, "{} characters", link.len());
 
     let options = AppOptions::from_link(&link).expect("a link");
-    assert_eq!(options.scene.contact.clearance, 0.3e-3, "the change came on the way");
+    assert_eq!(options.scene.machine.contact.clearance, 0.3e-3, "the change came on the way");
     let (mut copy, _) = open(options, LARGE);
     assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
     copy.run();
     assert_eq!(hash(&copy), hash(&harness));
     let (mine, theirs) = (harness.state().player(), copy.state().player());
     assert_eq!(mine.pacer.shown().to_bits(), theirs.pacer.shown().to_bits());
-    assert_eq!(theirs.scene().contact.friction, 0.4);
+    assert_eq!(theirs.running().machine.contact.friction, 0.4);
     assert!(!theirs.is_playing());
     let words = format!("State reproduced: hash {:016x} agrees", hash(&harness));
     assert!(label(&copy, &words));
@@ -246,7 +247,7 @@ fn a_bad_link_is_explained_and_the_default_scene_waits_behind_it() {
         assert!(label(&harness, "link: "));
         assert!(harness.state().announcement().contains(words), "{link}: {}", harness.state().announcement());
         let player = harness.state().player();
-        assert_eq!(player.scene().name, DEFAULT_SCENE);
+        assert_eq!(player.running().name, DEFAULT_SCENE);
         assert!(!player.is_playing() && harness.state().is_refused());
         assert_eq!(
             harness.state().embedded().map(|panels| panels.write()),
@@ -260,7 +261,7 @@ fn a_bad_link_is_explained_and_the_default_scene_waits_behind_it() {
     }
     let options = AppOptions::from_link_or_default("?scene=pendulum&c=0.5mm&scale=1:10");
     assert_eq!((options.problem, options.playing, options.time_scale), (None, true, 0.1));
-    assert_eq!(options.scene.contact.clearance, 0.5e-3);
+    assert_eq!(options.scene.machine.contact.clearance, 0.5e-3);
 }
 
 #[test]
@@ -593,10 +594,10 @@ fn scene_record_and_picture_are_saved() {
     assert_eq!((saved.name.as_str(), saved.mime), ("spcmm.toml", "application/toml"));
     let text = String::from_utf8(saved.bytes).expect("text");
     let scene = Scene::parse(&text, Some("spcmm.toml"), &[]).expect("a scene");
-    assert_eq!(scene.contact.clearance, 0.45e-3);
+    assert_eq!(scene.machine.contact.clearance, 0.45e-3);
     let changes = [("contact.clearance".to_owned(), "0.45 mm".to_owned())];
     let hashes = [scene, Scene::load("spcmm", &changes).expect("in range")].map(|scene| {
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         simulation.advance_to(20e-3).expect("runs");
         simulation.state_hash()
     });
@@ -790,13 +791,13 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
         calls.borrow_mut().to_open.push_back(file("mine.toml", bad));
         harness.run_steps(3);
         assert!(label(&harness, words), "{words}");
-        assert_eq!(harness.state().player().scene().name, "spcmm");
+        assert_eq!(harness.state().player().running().name, "spcmm");
     }
     let text = Scene::load("pendulum", &[]).expect("built in").source.text;
     let mine = text.replace("name = \"pendulum\"", "name = \"mine\"");
     calls.borrow_mut().to_open.push_back(file("mine.toml", Ok(mine.into_bytes())));
     harness.run_steps(3);
-    assert_eq!(harness.state().player().scene().name, "mine");
+    assert_eq!(harness.state().player().running().name, "mine");
     assert!(!label(&harness, "it is gone"));
     // The file travels in the link.
     let options = AppOptions::from_link(&harness.state().share_state()).expect("a link");
@@ -806,7 +807,7 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     harness.input_mut().dropped_files.push(Arc::new(dropped));
     harness.run_steps(3);
     assert!(label(&harness, "bad.toml:2"));
-    assert_eq!(harness.state().player().scene().name, "mine");
+    assert_eq!(harness.state().player().running().name, "mine");
 }
 
 const LIFTED: &str = "name = \"lifted\"\ninclude = [\"own.toml\"]\n[[body]]\nname = \"a\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
@@ -833,25 +834,25 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
     drop(&["lifted.toml", "a.obj", "own.toml"], &mut harness);
     assert!(label(&harness, "joint.a.drive.file = \"lift.csv\""));
     assert!(label(&harness, "choose or drop that file and the scene's at once"));
-    assert_eq!(harness.state().player().scene().name, "pendulum");
+    assert_eq!(harness.state().player().running().name, "pendulum");
     drop(&["lift.csv", "a.obj"], &mut harness);
     assert!(label(&harness, "lift.csv, a.obj: no scene among them"));
 
     drop(&["lifted.toml", "lift.csv", "own.toml", "a.obj"], &mut harness);
-    let scene = harness.state().player().scene().clone();
+    let scene = harness.state().player().running().clone();
     assert_eq!(scene.name, "lifted", "{}", harness.state().announcement());
     assert_eq!(scene.get("parameter.reach").expect("included"), Value::Number(2e-3));
     let names: Vec<&String> = scene.source.beside.keys().collect();
     assert_eq!(names, ["lift.csv", "own.toml", "parts/a.obj"]);
-    let drive = scene.joints[0].drive.as_ref().expect("driven");
-    let DriveData::Points { points, .. } = &drive.data else {
+    let drive = scene.machine.joints[0].drive.as_ref().expect("driven");
+    let Drive::Table { points, .. } = drive else {
         panic!("{drive:?}");
     };
     assert_eq!(points[..], [[0.0, 0.0], [0.5, 3e-3], [1.0, 0.0]]);
     // A reset reads them again, from what was dropped.
     harness.key_press(Key::R);
     harness.run_steps(3);
-    assert_eq!(harness.state().player().scene().source.beside, scene.source.beside);
+    assert_eq!(harness.state().player().running().source.beside, scene.source.beside);
     assert!(!label(&harness, "no folder"));
 
     // Chosen in the host's own dialog, with another scene after it.
@@ -859,7 +860,7 @@ fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
     files[0].content = Ok(LIFTED.replace("lifted", "again").into_bytes());
     calls.borrow_mut().to_open.push_back(files.to_vec());
     harness.run_steps(3);
-    assert_eq!(harness.state().player().scene().name, "again");
+    assert_eq!(harness.state().player().running().name, "again");
 }
 
 #[test]
@@ -922,15 +923,15 @@ fn recorded_channels_have_the_columns_of_a_run() {
     for name in jointplay::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
         let mut frame = Frame::default();
-        Simulation::new(&scene).expect("starts").sample(0.0, &mut frame);
+        Simulation::new(&scene.machine).expect("starts").sample(0.0, &mut frame);
         let table = Table::new(&scene, &frame);
-        for channel in Channels::of(&scene).list() {
+        for channel in Channels::of(&scene.machine).list() {
             // A run has friction as a vector, energies instead of their changes, no live change that does work, no hand that pulls,
             // and no ghost.
             let in_other_words = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
             let own = matches!(channel.quantity, Quantity::FrictionForce | Quantity::TipError)
                 || in_other_words.contains(&channel.column())
-                || (channel.column() == "external_work_J" && scene.elements.is_empty());
+                || (channel.column() == "external_work_J" && scene.machine.elements.is_empty());
             let there = table.names().iter().any(|name| name == channel.column());
             assert_eq!(there, !own, "{name}: {}", channel.column());
         }
@@ -1013,7 +1014,7 @@ fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
         harness.run_steps(2);
         harness.get_by_role_and_label(Role::Button, "Open").click();
         harness.run_steps(3);
-        assert_eq!(harness.state().player().scene().name, "pendulum");
+        assert_eq!(harness.state().player().running().name, "pendulum");
         assert!(harness.query_by_label("Path").is_none());
     }
 }
@@ -1116,7 +1117,7 @@ fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
                 // Without a sign of a link before it, text is left alone only where it has no pairs.
                 other.event(Event::Paste("some words".to_owned()));
                 other.run_steps(2);
-                assert_eq!(other.state().player().scene().name, "pendulum");
+                assert_eq!(other.state().player().running().name, "pendulum");
                 continue;
             } else {
                 other.event(Event::Paste(link.clone()));
@@ -1155,14 +1156,14 @@ fn a_visitor_meets_a_machine_that_goes_on_and_is_one_click_from_the_papers() {
     let (mut harness, _) = open(AppOptions::from_link("").expect("a link"), LARGE);
     assert!(label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
     // The change is one like any other: shown as such, and taken back.
-    assert_eq!(harness.state().player().wanted().changes[0].0, "spcmm.frequency");
+    assert_eq!(harness.state().player().pending().changes[0].0, "spcmm.frequency");
     harness.run_steps(120);
     let turns = harness.state().player().pacer.shown() * 6.0;
     assert!((0.4..1.2).contains(&turns), "{turns}");
     harness.get_by_label("The paper's settings").click();
     harness.run_steps(3);
     let player = harness.state().player();
-    assert!(player.wanted().changes.is_empty() && player.is_playing());
+    assert!(player.pending().changes.is_empty() && player.is_playing());
     assert_eq!(player.pacer.scale(), 0.02);
     assert!(!label(&harness, "Driven at 6 Hz; in the paper at 0.5 Hz"));
     // Dismissed, it is silent.

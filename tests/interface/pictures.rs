@@ -135,7 +135,7 @@ fn motion(law: &str, keys: &str) -> Vec<(f64, f64)> {
          drive = {{ law = \"{law}\", {keys} }}\n"
     );
     let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let mut simulation = Simulation::new(&scene.machine).unwrap_or_else(|error| panic!("{error}"));
     let mut frame = Frame::default();
     let mut at = |k: i32| {
         let t = f64::from(k) / 200.0;

@@ -44,7 +44,7 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
         }
 
         // The caption is of the last impact that has ended at the instant shown.
-        let mut simulation = Simulation::new(harness.state().player().scene()).expect("starts");
+        let mut simulation = Simulation::new(&harness.state().player().running().machine).expect("starts");
         let mut impacts = Vec::new();
         while simulation.time() < 30e-3 {
             simulation.step().expect("runs");
@@ -55,7 +55,7 @@ fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_r
         let words = harness.state().last_impact().expect("an impact");
         harness.get_by_label(&words);
         let mut parts = words.split(", ");
-        let joints = &simulation.scene().ball_joints;
+        let joints = &simulation.machine().ball_joints;
         assert_eq!(parts.next(), Some(joints[last.joint].name.as_str()));
         let number = |text: &str| -> f64 {
             let digits: String = text.chars().take_while(|c| !c.is_whitespace()).collect();

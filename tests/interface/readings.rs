@@ -9,7 +9,8 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::app::App;
-use jointplay::simulate::{Frame, Quantity, Simulation};
+use jointplay::scene::LiveScene;
+use jointplay::simulate::{Frame, Quantity};
 
 use crate::window::sized;
 
@@ -56,7 +57,7 @@ fn the_box_under_the_pointer_has_the_values_of_the_run_s_rows() {
     harness.state_mut().player_mut().pacer.set_scale(1e-3);
     harness.state_mut().player_mut().run_to(8.5e-3);
     harness.run();
-    let mut simulation = Simulation::new(harness.state().player().scene()).expect("starts");
+    let mut simulation = LiveScene::new(harness.state().player().running()).expect("starts");
     let mut sample = |time: f64| {
         let mut frame = Frame::default();
         simulation.reset().expect("starts");

@@ -94,7 +94,7 @@ fn says(harness: &Harness<'_, App>, words: &str) -> bool {
 }
 
 fn friction(harness: &Harness<'_, App>) -> f64 {
-    harness.state().player().wanted().contact.friction
+    harness.state().player().pending().machine.contact.friction
 }
 
 /// The text with another friction.
@@ -122,12 +122,12 @@ fn a_saved_file_is_shown_at_the_same_instant_by_the_same_camera() {
     let player = harness.state().player();
     assert_eq!(player.pacer.shown(), 12.5e-3);
     assert!(!player.is_playing());
-    assert_eq!(player.wanted().source.file.as_deref(), Some(NAME));
+    assert_eq!(player.pending().source.file.as_deref(), Some(NAME));
     assert_eq!(harness.state().link().camera, before);
     assert!(says(&harness, "Reloaded at 12.500 ms"), "{}", harness.state().announcement());
     // The run is that of the new file from its start.
     let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
-    let mut simulation = jointplay::simulate::Simulation::new(&scene).expect("starts");
+    let mut simulation = jointplay::simulate::Simulation::new(&scene.machine).expect("starts");
     simulation.advance_to(12.5e-3).expect("runs");
     assert_eq!(player.simulation().state_hash(), simulation.state_hash());
     // Still watched, without asking again.
@@ -176,7 +176,7 @@ fn changes_made_here_stay_unless_the_file_says_something_else() {
     let changes = [("contact.friction", "0.4"), ("contact.restitution", "0.7")];
     let (mut harness, calls) = window(&changes, still);
     save(&mut harness, &calls, NAME, &rougher());
-    let contact = harness.state().player().wanted().contact;
+    let contact = harness.state().player().pending().machine.contact;
     assert_eq!((contact.friction, contact.restitution), (0.25, 0.7));
     assert!(says(&harness, "Reloaded from the start, keeping 1 change"));
 }
@@ -187,7 +187,7 @@ fn only_the_file_of_the_shown_scene_is_watched() {
     harness.state_mut().open("spcmm").expect("a scene");
     harness.run_steps(2);
     save(&mut harness, &calls, NAME, &rougher());
-    assert_eq!(harness.state().player().wanted().name, "spcmm");
+    assert_eq!(harness.state().player().pending().name, "spcmm");
     let link = {
         let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
         let other = shown(scene, still, Box::new(DesktopHost::default()));
@@ -197,7 +197,7 @@ fn only_the_file_of_the_shown_scene_is_watched() {
     harness.state_mut().open_link(&ctx, &link).expect("a link");
     harness.run_steps(2);
     // The scene has the file's name, but a link makes the program read no file.
-    let scene = harness.state().player().wanted();
+    let scene = harness.state().player().pending();
     assert_eq!(scene.source.file.as_deref(), Some("mine.toml"));
     assert_eq!(calls.borrow().watched, [Some(NAME.to_owned()), None, None]);
 }
@@ -229,7 +229,7 @@ fn files_beside_the_scene_are_read_again_with_it_and_watched() {
     let scene = Scene::load(path("mine.toml"), &changes).expect("a scene");
     let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
     let get = |harness: &Harness<'_, App>, key: &str| {
-        let scene = harness.state().player().wanted();
+        let scene = harness.state().player().pending();
         scene.get(key).map(|value| format!("{value:?}")).ok()
     };
     let before = get(&harness, "parameter.reach");
@@ -282,7 +282,7 @@ fn a_dropped_scene_finds_its_files_and_that_of_a_link_does_not() {
     harness.input_mut().dropped_files.push(file);
     harness.run_steps(3);
     assert_eq!(friction(&harness), 0.25, "{}", harness.state().announcement());
-    let source = &harness.state().player().wanted().source;
+    let source = &harness.state().player().pending().source;
     assert!(source.beside.contains_key("own.toml"));
 
     let name = path.display().to_string();

@@ -61,7 +61,7 @@ fn frame(harness: &mut Harness<'_, App>, heard: &Heard) -> (f64, f64, Vec<Click>
 
 /// All impacts of the scene that end up to `time`, s, by a run of its own.
 fn impacts(harness: &Harness<'_, App>, time: f64) -> Vec<Impact> {
-    let mut simulation = Simulation::new(harness.state().player().scene()).expect("starts");
+    let mut simulation = Simulation::new(&harness.state().player().running().machine).expect("starts");
     let mut impacts = Vec::new();
     while simulation.time() < time {
         simulation.step().expect("runs");
@@ -83,7 +83,7 @@ fn while_it_plays_the_clicks_are_the_impacts_of_the_run_at_any_speed() {
         let stretches: Vec<_> = (0..frames).map(|_| frame(&mut harness, &heard)).collect();
         let all = impacts(&harness, shown(&harness));
         assert!(all.len() > 5, "{scene}: {} impacts", all.len());
-        let mass: f64 = harness.state().player().scene().bodies.iter().map(|body| body.mass).sum();
+        let mass: f64 = harness.state().player().running().machine.bodies.iter().map(|body| body.mass).sum();
         let mut told = 0;
         for (from, to, clicks) in stretches {
             let within = |impact: &&Impact| from < impact.end && impact.end <= to;

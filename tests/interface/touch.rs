@@ -17,7 +17,7 @@ fn rect(harness: &Harness<'_, App>, role: Role, name: &str) -> Rect {
 }
 
 fn clearance(harness: &Harness<'_, App>) -> f64 {
-    harness.state().player().wanted().contact.clearance
+    harness.state().player().pending().machine.contact.clearance
 }
 
 /// The way of a finger from `from` by `way`, in steps as short as a screen reports them; it rests at the end, so that nothing glides
@@ -43,12 +43,12 @@ fn a_finger_on_a_slider_scrolls_up_and_down_and_moves_it_sideways() {
 
     // Back, sideways later on: what the finger does stays decided.
     let there = rect(&harness, Role::Slider, "Friction coefficient").center();
-    let friction = harness.state().player().wanted().contact.friction;
+    let friction = harness.state().player().pending().machine.contact.friction;
     let mut way = path(there, vec2(0.0, 90.0));
     way.extend(path(there + vec2(0.0, 90.0), vec2(80.0, 60.0)));
     fingers(&mut harness, &[&way]);
     harness.run();
-    assert_eq!(harness.state().player().wanted().contact.friction, friction);
+    assert_eq!(harness.state().player().pending().machine.contact.friction, friction);
     assert_eq!(rect(&harness, Role::Slider, "Clearance").top(), track.top());
 
     // A tap is no drag.

@@ -12,11 +12,11 @@ fn window() -> Harness<'static, App> {
 }
 
 fn friction(harness: &Harness<'_, App>) -> f64 {
-    harness.state().player().wanted().contact.friction
+    harness.state().player().pending().machine.contact.friction
 }
 
 fn clearance(harness: &Harness<'_, App>) -> f64 {
-    harness.state().player().wanted().contact.clearance
+    harness.state().player().pending().machine.contact.clearance
 }
 
 fn press(harness: &mut Harness<'_, App>, modifiers: Modifiers) {

@@ -33,7 +33,7 @@ pub(crate) fn shown(harness: &Harness<'_, App>) -> f64 {
 }
 
 fn clearance(harness: &Harness<'_, App>) -> f64 {
-    harness.state().player().simulation().scene().contact.clearance
+    harness.state().player().simulation().pending().machine.contact.clearance
 }
 
 /// Largest normal force since the reset, N.
@@ -91,7 +91,7 @@ fn a_live_change_of_clearance_reaches_the_running_joints() {
 #[test]
 fn a_drag_on_the_friction_slider_moves_friction() {
     let mut harness = window("spcmm");
-    let before = harness.state().player().simulation().scene().contact.friction;
+    let before = harness.state().player().simulation().pending().machine.contact.friction;
     let track = harness.get_by_role_and_label(Role::Slider, "Friction coefficient").rect();
     harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
     harness.step();
@@ -99,7 +99,7 @@ fn a_drag_on_the_friction_slider_moves_friction() {
     harness.step();
     harness.drop_at(track.right_center() - egui::vec2(4.0, 0.0));
     harness.run();
-    let after = harness.state().player().simulation().scene().contact.friction;
+    let after = harness.state().player().simulation().pending().machine.contact.friction;
     assert!(after > before, "{before} to {after}");
 }
 
@@ -271,7 +271,7 @@ fn the_list_of_scenes_says_what_each_is() {
     }
     harness.get_by_role_and_label(Role::Button, "chain").click();
     harness.run();
-    assert_eq!(harness.state().player().scene().name, "chain");
+    assert_eq!(harness.state().player().running().name, "chain");
 }
 
 #[test]
@@ -281,20 +281,20 @@ fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
     harness.run();
     harness.get_by_label("pendulum").click();
     harness.run();
-    assert_eq!(harness.state().player().simulation().scene().name, "pendulum");
+    assert_eq!(harness.state().player().simulation().pending().name, "pendulum");
 
     click(&mut harness, "Open…");
     type_into(&mut harness, "Path", "missing/scene.toml");
     harness.run();
     harness.get_by_label_contains("missing/scene.toml");
-    assert_eq!(harness.state().player().simulation().scene().name, "pendulum");
+    assert_eq!(harness.state().player().simulation().pending().name, "pendulum");
 }
 
 #[test]
 fn a_value_that_waits_for_the_reset_says_so() {
     let mut harness = window("spcmm");
     let frequency = |harness: &Harness<'_, App>| {
-        harness.state().player().simulation().scene().spcmm.expect("the paper's scene").frequency
+        harness.state().player().simulation().pending().machine.spcmm.expect("the paper's scene").frequency
     };
     harness.state_mut().player_mut().run_to(1e-3);
     harness.state_mut().player_mut().set("spcmm.frequency", "0.4 Hz").expect("in range");
@@ -327,7 +327,7 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
     harness.run();
     let length = |harness: &Harness<'_, App>| {
         let player = harness.state().player();
-        player.simulation().scene().ball_joints[0].socket.point.x
+        player.simulation().pending().machine.ball_joints[0].socket.point.x
     };
     // In sight without opening a group, with its unit.
     assert!(harness.query_all_by_label("Crank radius").count() > 1);
@@ -388,8 +388,8 @@ fn a_narrow_window_keeps_the_controls_within_reach() {
 fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewhere() {
     let mut harness = window("spcmm");
     let friction = |harness: &Harness<'_, App>| {
-        let scene = harness.state().player().simulation().scene();
-        scene.contact.friction
+        let scene = harness.state().player().simulation().pending();
+        scene.machine.contact.friction
     };
     let steps = |harness: &Harness<'_, App>| harness.state().player().steps();
     let track = harness.get_by_role_and_label(Role::Slider, "Friction coefficient").rect();
@@ -823,7 +823,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     let player = harness.state().player();
     let impact = *player.simulation().impacts().next_back().expect("hit");
     assert!(impact.steps >= 10, "{impact:?}");
-    let joint = &player.scene().ball_joints[impact.joint].name;
+    let joint = &player.running().machine.ball_joints[impact.joint].name;
     let own = impact.has_own_restitution();
     let kind = match (own, impact.disturbed) {
         (true, _) => "undisturbed",

@@ -3,7 +3,8 @@
 use crate::common::matrix::{FORMULATIONS, for_every};
 use crate::elements::at;
 use crate::joint_elements::{momenta, started};
-use jointplay::scene::{Quat, Scene, Vec3};
+use jointplay::machine::{Quat, Vec3};
+use jointplay::scene::Scene;
 
 /// One free body of 0.5 kg at (0.1, 0.2, 0.3) m with `start` besides, and a bushing at its centroid to the world with `more`.
 fn one(start: &str, more: &str) -> String {
@@ -129,7 +130,7 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
         for (method, formulation) in ways.into_iter().skip(if more.is_empty() { 0 } else { 3 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = started(&format!("{pair}{more}"), &changes);
-            let scene = simulation.scene().clone();
+            let machine = simulation.machine().clone();
             let before = at(&mut simulation, 0.0);
             let mut furthest: f64 = 0.0;
             for sample in 1..=20 {
@@ -140,7 +141,7 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
             assert!(furthest > 0.7 && furthest < 3.0, "{furthest}");
             let frame = at(&mut simulation, 1.0);
             let label = format!("{method} {formulation} {}", more.len());
-            for (then, now) in momenta(&before, &scene).iter().zip(&momenta(&frame, &scene)) {
+            for (then, now) in momenta(&before, &machine).iter().zip(&momenta(&frame, &machine)) {
                 let off = (now - then).norm() / then.norm();
                 assert!(off < 1e-8, "{label}: {off:e}");
             }
@@ -168,7 +169,7 @@ fn a_body_on_a_bushing_does_not_fly_freely() {
                    stiffness = \"0 2 0 N/m\"\nrotation = { axis = [1, 0, 0], angle = \"0 deg\" }\n\
                    turning_stiffness = \"0 0 0.4 N m/rad\"\n";
     let scene = Scene::parse(&format!("{text}\n{bushing}"), None, &[]).unwrap();
-    let mut simulation = jointplay::simulate::Simulation::new(&scene).unwrap();
+    let mut simulation = jointplay::simulate::Simulation::new(&scene.machine).unwrap();
     at(&mut simulation, 0.05);
     let residual = simulation.ledger().unwrap().relative_residual();
     assert!(residual.abs() < 1e-4, "{residual:e}");

@@ -301,7 +301,7 @@ fn both_coordinates_driven_leave_nothing_to_solve_and_carry_what_hangs_on_them()
         }
         let (name, kind) = (first.kind, first.coordinate);
         let scene = crate::common::parse(&text, &[]);
-        let (columns, _) = jointplay::simulate::run_columns(&scene, tree);
+        let (columns, _) = jointplay::simulate::run_columns(&scene.machine, tree);
         let own: &[&str] = match name {
             "cylindrical" => &["j_actuator_N", "j_angle_actuator_Nm"],
             _ => &["j_angle_actuator_Nm", "j_child_angle_actuator_Nm"],
@@ -338,11 +338,11 @@ fn what_acts_on_coordinates_of_two_keeps_momentum_and_its_energy_balance_closes(
     {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
         let mut simulation = started(TUMBLING, &changes);
-        let scene = simulation.scene().clone();
+        let machine = simulation.machine().clone();
         let before = at(&mut simulation, 0.0);
         let frame = at(&mut simulation, 0.3);
         let label = format!("{formulation} {method}");
-        let (then, now) = (momenta(&before, &scene), momenta(&frame, &scene));
+        let (then, now) = (momenta(&before, &machine), momenta(&frame, &machine));
         for (then, now) in then.iter().zip(&now) {
             let off = (now - then).norm() / then.norm();
             assert!(off < 2e-8, "{label}: {off:e}");

@@ -119,7 +119,8 @@ fn each_doubt_is_told_once_and_names_its_joint() {
 #[test]
 fn a_reset_forgets_what_the_run_met_and_a_snapshot_keeps_it() {
     let changes = [("contact.impact_speed_floor", "10 m/s")];
-    let mut simulation = ran("pendulum", &changes, 0.03);
+    let mut simulation = crate::common::live("pendulum", &changes);
+    run_until(&mut simulation, 0.03);
     let kept = simulation.doubts();
     assert_eq!(kept.len(), 1);
     let snapshot = simulation.snapshot();
@@ -165,7 +166,7 @@ fn steady_drift_is_marked_however_often_energy_was_exchanged() {
     ];
     for (changes, drifts) in cases {
         let changes = [changes, &[("contact.normal_law", "hertz")]].concat();
-        let mut simulation = Simulation::new(&parse(&text, &changes)).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &changes).machine).unwrap();
         run_until(&mut simulation, 10.0);
         let ledger = simulation.ledger().unwrap();
         let share = ledger.residual().abs() / (0.1 * 9.81 * 3e-4);
@@ -186,7 +187,7 @@ fn a_ball_at_rest_under_a_load_raises_no_doubt() {
         &[("contact.normal_law", "hertz"), ("contact.restitution", "1"), ("solver.tolerance", "1e-5")],
         &[("contact.normal_law", "hertz"), ("contact.restitution", "1"), ("solver.tolerance", "1e-7")],
     ] {
-        let mut simulation = Simulation::new(&parse(&text, changes)).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, changes).machine).unwrap();
         run_until(&mut simulation, 1.0);
         assert_eq!(simulation.doubts(), [], "{changes:?}");
         let force = frame_now(&mut simulation).joints[0].normal_force.norm();
@@ -224,7 +225,7 @@ fn a_machine_that_starts_inside_a_stop_says_how_deep_and_how_hard() {
             "#
         )
     };
-    let doubts = |start: &str| words(&Simulation::new(&parse(&text(start), &[])).unwrap());
+    let doubts = |start: &str| words(&Simulation::new(&parse(&text(start), &[]).machine).unwrap());
     let said = "end: the machine starts 40 mm inside this stop, whose depth is 0.1 mm: it pushes with 800000 N; the start or the \
                 limit is wrong.";
     assert_eq!(doubts("50"), [said]);

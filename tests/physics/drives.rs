@@ -14,7 +14,7 @@ fn hanging(drive: &str, changes: &Changes) -> Simulation {
          start = {{ position = [0, 0, 0] }}\n\
          [[ball_joint]]\nname = \"S1\"\nsocket = {{ body = \"slider\" }}\nball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\n"
     );
-    Simulation::new(&parse(&text, changes)).unwrap()
+    Simulation::new(&parse(&text, changes).machine).unwrap()
 }
 
 /// A slider-crank whose crank has this drive, without play: its motion is a function of time alone.
@@ -33,7 +33,7 @@ fn kinematic(drive: &str, changes: &Changes) -> Simulation {
          start = {{ position = \"196 mm\" }}\n\
          [[ball_joint]]\nname = \"S1\"\nsocket = {{ body = \"slider\" }}\nball = {{ body = \"rod\", at = \"100 0 0 mm\" }}\n"
     );
-    Simulation::new(&parse(&text, changes)).unwrap()
+    Simulation::new(&parse(&text, changes).machine).unwrap()
 }
 
 /// Laws that move a slide by some millimetres within a third of a second.
@@ -180,7 +180,7 @@ fn libm_sin(x: f64) -> f64 {
 fn a_hinge_turns_by_a_ramp_to_where_it_should() {
     let law = "law = \"ramp\", from = \"10 deg\", to = \"70 deg\", duration = \"0.1 s\"";
     let mut simulation = kinematic(law, &[]);
-    let bodies = &simulation.scene().bodies;
+    let bodies = &simulation.machine().bodies;
     let crank = bodies.iter().position(|body| body.name == "crank").unwrap();
     let before = frame_now(&mut simulation).bodies[crank].rotation;
     run_until(&mut simulation, 0.2);

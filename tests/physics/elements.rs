@@ -2,7 +2,8 @@
 
 use crate::common::matrix::every_way;
 use crate::common::{FOUR_WAYS, parse};
-use jointplay::scene::{Scene, Vec3};
+use jointplay::machine::Vec3;
+use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
 const MASS: f64 = 0.5;
@@ -16,7 +17,7 @@ fn floating(more: &str, changes: &[(&str, &str)]) -> Simulation {
     );
     let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
     let changes: Vec<(String, String)> = changes.iter().map(own).collect();
-    Simulation::new(&Scene::parse(&text, None, &changes).unwrap()).unwrap()
+    Simulation::new(&Scene::parse(&text, None, &changes).unwrap().machine).unwrap()
 }
 
 /// The frame at `time`, s.
@@ -162,7 +163,7 @@ fn elements_are_fixed_to_links_of_a_chain() {
     let with = |element: &str| Scene::parse(&format!("{text}\n{element}"), None, &[]);
     // Strong beside gravity: long before a ball has crossed its play the link moves as if it were alone.
     let scene = with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");
-    let mut simulation = Simulation::new(&scene.unwrap()).unwrap();
+    let mut simulation = Simulation::new(&scene.unwrap().machine).unwrap();
     let before = at(&mut simulation, 0.0).bodies[2].position;
     let frame = at(&mut simulation, 1e-3);
     assert!(frame.joints.iter().all(|joint| joint.normal_force.norm() == 0.0));
@@ -206,7 +207,7 @@ fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
         [[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"slide\" }\nlength = \"100 mm\"\nstiffness = \"300 N/m\"\n";
     for formulation in ["tree", "lagrange"] {
         let changes = [("formulation".to_owned(), formulation.to_owned())];
-        let mut simulation = Simulation::new(&Scene::parse(text, None, &changes).unwrap()).unwrap();
+        let mut simulation = Simulation::new(&Scene::parse(text, None, &changes).unwrap().machine).unwrap();
         let frame = at(&mut simulation, 0.2);
         let stored = 0.5 * 300.0 * 0.01 * 0.01;
         assert!((frame.elastic - stored).abs() < 1e-6 * stored, "{formulation}");
@@ -244,7 +245,7 @@ fn where_nothing_moves_by_itself_a_quick_load_is_still_followed() {
     let text = crate::common::scene("spcmm", &[]).source.text.clone()
         + "\n[[load]]\nname = \"shake\"\non = { body = \"platform\" }\nforce = \"0 20 0 N\"\nfrequency = \"200 Hz\"\n";
     let scene = crate::common::parse(&text, &[("contact.clearance", "0")]);
-    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut simulation = Simulation::new(&scene.machine).unwrap();
     at(&mut simulation, 0.3);
     let ledger = *simulation.ledger().unwrap();
     assert!(ledger.external_work.abs() > 1e-5, "{ledger:?}");
@@ -321,7 +322,7 @@ side = \"push\"
 ";
     for (method, formulation) in FOUR_WAYS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
-        let mut simulation = Simulation::new(&parse(text, &changes)).unwrap();
+        let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         // Where it leaves the spring: half k 0.04^2 - m g 0.04 = half m v^2.
         let speed = (2000.0 * 0.04_f64.powi(2) / 0.5 - 2.0 * 9.81 * 0.04).sqrt();
         let top = 0.1 + speed * speed / (2.0 * 9.81);
@@ -341,7 +342,7 @@ side = \"push\"
     // Preloaded and damped: energy balances though the spring goes slack.
     let damped =
         text.replace("stiffness = \"2 kN/m\"", "stiffness = \"2 kN/m\"\ndamping = \"5 N s/m\"\npreload = \"-10 N\"");
-    let mut simulation = Simulation::new(&parse(&damped, &[("solver.tolerance", "1e-9")])).unwrap();
+    let mut simulation = Simulation::new(&parse(&damped, &[("solver.tolerance", "1e-9")]).machine).unwrap();
     simulation.advance_to(1.0).unwrap();
     let ledger = simulation.ledger().unwrap();
     // What is left in the spring as it lets go is lost in its damper, while the mass is in free flight and steps are long.

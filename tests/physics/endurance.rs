@@ -7,7 +7,8 @@ use std::sync::Mutex;
 use crate::common::invariants::{fault, finite};
 use crate::common::matrix::side_by_side;
 use crate::common::{frame_now, scene};
-use jointplay::scene::Mat3;
+use jointplay::machine::Mat3;
+use jointplay::scene::LiveScene;
 use jointplay::simulate::{Frame, Simulation};
 
 /// Numbers from a seed (xorshift64*), so that every run of a test is the same.
@@ -28,7 +29,7 @@ impl Numbers {
 
 /// One frame's change: a key and its value.
 fn change(numbers: &mut Numbers, simulation: &Simulation) -> (String, String) {
-    let joints = &simulation.running_scene().ball_joints;
+    let joints = &simulation.machine().ball_joints;
     let joint = numbers.below(2 * joints.len());
     let of = match joints.get(joint) {
         Some(joint) => format!("joint.{}", joint.name),
@@ -49,15 +50,15 @@ fn frame_on(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
     simulation.sample(target, frame);
     assert!(finite(frame), "t = {target}");
     let now = frame_now(simulation);
-    let scene = simulation.running_scene().clone();
-    assert_eq!(fault(&now, &scene, "tree"), None, "t = {target}");
+    let machine = simulation.machine().clone();
+    assert_eq!(fault(&now, &machine, "tree"), None, "t = {target}");
 }
 
 /// `frames` frames of a sixtieth of a second at `pace` simulated seconds a second.
 fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64) {
     let mut numbers = Numbers(seed);
     let changes = [("solver.preset", preset)];
-    let mut simulation = Simulation::new(&scene(name, &changes)).unwrap();
+    let mut simulation = LiveScene::new(&scene(name, &changes)).unwrap();
     let mut frame = Frame::default();
     let mut shown = 0.0;
     let (mut restored, mut n) = (0, 0);
@@ -77,7 +78,7 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
             1 => {
                 let snapshot = simulation.snapshot();
                 let mut way = Vec::new();
-                let play = |simulation: &mut Simulation, way: &[(String, String)]| {
+                let play = |simulation: &mut LiveScene, way: &[(String, String)]| {
                     for (n, (key, value)) in way.iter().enumerate() {
                         simulation.set(key, value).unwrap();
                         simulation.advance_to(shown + (n + 1) as f64 * pace / 60.0).unwrap();
@@ -90,7 +91,7 @@ fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64)
                 let first = play(&mut simulation, &way);
                 simulation.restore(&snapshot);
                 assert_eq!(play(&mut simulation, &way), first, "seed {seed}, t = {shown}");
-                let mut other = Simulation::new(&scene(name, &[])).unwrap();
+                let mut other = LiveScene::new(&scene(name, &[])).unwrap();
                 other.restore(&snapshot);
                 assert_eq!(play(&mut other, &way), first, "elsewhere, seed {seed}, t = {shown}");
                 simulation.restore(&snapshot);
@@ -232,7 +233,7 @@ const FAST: [&str; 2] = ["preview", "real-time"];
 /// Runs at least `duration`, looks twice a period, and compares the ends of the periods.
 fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
     let changes = [of.changes, &[("solver.preset", FAST[preset])]].concat();
-    let mut simulation = Simulation::new(&scene(of.scene, &changes)).unwrap();
+    let mut simulation = LiveScene::new(&scene(of.scene, &changes)).unwrap();
     let mut drift = Drift::default();
     let mut kinetic = 0.0_f64;
     let mut frame = Frame::default();
@@ -246,10 +247,10 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
         assert!(finite(&frame));
         // At the step's end: inside it the interpolated state may lie in the wall by as much as the tolerance allows.
         let end = frame_now(&mut simulation);
-        let running = simulation.running_scene();
-        assert_eq!(fault(&end, running, "tree"), None);
+        let running = simulation.running();
+        assert_eq!(fault(&end, &running.machine, "tree"), None);
         kinetic = kinetic.max(frame.kinetic);
-        for (joint, of_scene) in frame.joints.iter().zip(&running.ball_joints) {
+        for (joint, of_scene) in frame.joints.iter().zip(&running.machine.ball_joints) {
             if of_scene.contact.clearance == 0.0 {
                 drift.open = drift.open.max(joint.eccentricity.norm());
             }

@@ -56,13 +56,13 @@ fn ideal_pendulum(angle: &str, angular_velocity: &str) -> Simulation {
         &format!("rotation = {{ axis = [0, 1, 0], angle = \"{angle}\" }}\nangular_velocity = \"{angular_velocity}\""),
     );
     let changes = [("contact.clearance", "0"), ("solver.tolerance", "1e-12")];
-    Simulation::new(&parse(&text, &changes)).unwrap()
+    Simulation::new(&parse(&text, &changes).machine).unwrap()
 }
 
 #[test]
 fn ideal_pendulum_keeps_energy_and_vertical_angular_momentum() {
     let mut simulation = ideal_pendulum("-50 deg", "1 2 3 rad/s");
-    let body = simulation.scene().bodies[0].clone();
+    let body = simulation.machine().bodies[0].clone();
     let momentum = |frame: &Frame| {
         let b = &frame.bodies[0];
         let spin = b.rotation * (body.inertia * b.rotation.tr_mul(&b.angular_velocity));
@@ -89,7 +89,7 @@ fn ideal_pendulum_keeps_energy_and_vertical_angular_momentum() {
 fn small_swings_have_the_period_of_the_compound_pendulum() {
     let amplitude = 1e-3_f64;
     let mut simulation = ideal_pendulum(&format!("-{amplitude} rad"), "0 0 0 rad/s");
-    let body = &simulation.scene().bodies[0];
+    let body = &simulation.machine().bodies[0];
     let (mass, arm) = (body.mass, 0.1);
     let about_pivot = body.inertia[(1, 1)] + mass * arm * arm;
     // First term of the series in the amplitude; the next is 1e-14.
@@ -131,16 +131,16 @@ fn gauss() -> [(f64, f64); 3] {
 
 /// Work of the actuators minus change of energy, J, at its worst over `duration`; the largest |work|; impacts.
 fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) {
-    let scene = simulation.scene().clone();
+    let machine = simulation.machine().clone();
     // Driven joints hang on the world here: their axes are world axes.
-    let drives: Vec<_> = scene.joints.iter().filter(|j| j.drive.is_some()).collect();
+    let drives: Vec<_> = machine.joints.iter().filter(|j| j.drive.is_some()).collect();
     assert!(drives.iter().all(|j| j.parent.is_none()));
     let power = |frame: &Frame| -> f64 {
         assert_eq!(frame.actuators.len(), drives.len());
-        let rate = |joint: &&jointplay::scene::Joint| {
+        let rate = |joint: &&jointplay::machine::Joint| {
             let body = &frame.bodies[joint.child];
             let along = match joint.kind {
-                jointplay::scene::JointKind::Revolute => body.angular_velocity,
+                jointplay::machine::JointKind::Revolute => body.angular_velocity,
                 _ => body.velocity,
             };
             joint.axis.dot(&along)

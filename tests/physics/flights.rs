@@ -1,14 +1,14 @@
 //! Free bodies that touch nothing are left out of the evaluations that impacts elsewhere need.
 
 use crate::common::{frame_now, simulation};
-use jointplay::scene::Vec3;
+use jointplay::machine::Vec3;
 use jointplay::simulate::{ContactState, Frame, Simulation};
 
 const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e-5")];
 
 /// Whether any ball or socket of body `b` touches.
 fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
-    let joints = &simulation.scene().ball_joints;
+    let joints = &simulation.machine().ball_joints;
     joints.iter().zip(&frame.joints).any(|(joint, report)| {
         (joint.ball.body == Some(b) || joint.socket.body == Some(b)) && report.state != ContactState::Free
     })
@@ -17,7 +17,7 @@ fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
 #[test]
 fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
     let mut simulation = simulation("chain", &CHAIN);
-    let gravity = simulation.scene().gravity;
+    let gravity = simulation.machine().gravity;
     let mut inside = Frame::default();
     let (mut flew, mut stood) = (0, 0);
     while simulation.time() < 40e-3 {

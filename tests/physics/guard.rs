@@ -1,8 +1,9 @@
 //! What cannot go on stops, says where, when and what to try, and leaves the last good state.
 
-use crate::common::{frame_now, parse, run_until, scene, simulation};
-use jointplay::scene::{built_in_text, format_quantity_digits};
+use crate::common::{frame_now, live, parse, run_until, scene, simulation};
+use jointplay::scene::{LiveScene, built_in_text};
 use jointplay::simulate::{Simulation, StopAdvice, StopFault, Stopped};
+use jointplay::units::format_quantity_digits;
 
 /// Steps until the guard speaks.
 fn run_to_stop(simulation: &mut Simulation) -> Stopped {
@@ -30,7 +31,7 @@ fn still_good(simulation: &mut Simulation, stopped: &Stopped) {
         assert_eq!(again.time, stopped.time);
         assert_eq!(simulation.state_hash(), hash);
         // A step that is cut short by a row of output may succeed where the whole one cannot, but never leaves a bad state.
-        let end = simulation.time() + simulation.scene().solver.step.max(0.005);
+        let end = simulation.time() + simulation.machine().solver.step.max(0.005);
         assert!(simulation.step_until(end).is_err());
         assert_eq!(simulation.state_hash(), hash);
     }
@@ -41,16 +42,16 @@ fn still_good(simulation: &mut Simulation, stopped: &Stopped) {
 fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
     for name in ["spcmm", "pendulum", "chain"] {
         for method in ["semi-implicit-euler", "rk4"] {
-            let mut simulation = simulation(
+            let mut simulation = live(
                 name,
                 &[("solver.method", method), ("solver.step", "10 ms"), ("contact.youngs_modulus", "1000 GPa")],
             );
             let stopped = run_to_stop(&mut simulation);
             println!("{name}, {method}: {stopped}");
             let text = stopped.to_string();
-            let scene = simulation.scene();
-            let joints = scene.ball_joints.iter().map(|j| format!("ball joint {}", j.name));
-            let bodies = scene.bodies.iter().map(|b| format!("body {}", b.name));
+            let machine = simulation.machine();
+            let joints = machine.ball_joints.iter().map(|j| format!("ball joint {}", j.name));
+            let bodies = machine.bodies.iter().map(|b| format!("body {}", b.name));
             assert!(joints.chain(bodies).any(|named| text.contains(&named)), "{text}");
             assert!(
                 text.starts_with(&format!("stopped at t = {}: ", format_quantity_digits(stopped.time, "s", 7))),
@@ -69,7 +70,7 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
 
 #[test]
 fn advice_taken_in_mid_run_lets_it_go_on() {
-    let mut simulation = simulation("pendulum", &[("solver.method", "rk4"), ("solver.step", "10 ms")]);
+    let mut simulation = live("pendulum", &[("solver.method", "rk4"), ("solver.step", "10 ms")]);
     let stopped = run_to_stop(&mut simulation);
     simulation.set("solver.step", "1 us").unwrap();
     for _ in 0..100 {
@@ -79,7 +80,7 @@ fn advice_taken_in_mid_run_lets_it_go_on() {
 }
 
 fn start_error(scene: &jointplay::scene::Scene) -> String {
-    match Simulation::new(scene) {
+    match LiveScene::new(scene) {
         Ok(_) => panic!("started"),
         Err(error) => error.to_string(),
     }
@@ -111,7 +112,7 @@ fn a_trajectory_that_the_rods_cannot_reach_names_slider_and_time() {
         assert!(error.contains("needs 0.2") && error.contains("has 0.2000 m"), "{error}");
     }
     // A live change of it waits, and a reset that cannot start leaves the run as it is.
-    let mut simulation = simulation("spcmm", &[]);
+    let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.01).unwrap();
     let hash = simulation.state_hash();
     simulation.set("spcmm.amplitude_x", "100 mm").unwrap();
@@ -130,8 +131,8 @@ fn ideal_joints_that_repeat_one_another_share_the_load() {
     );
     for form in ["tree", "lagrange"] {
         let changes = [("contact.clearance", "0"), ("formulation", form)];
-        let mut double = Simulation::new(&parse(&twice, &changes)).unwrap();
-        let mut single = Simulation::new(&parse(text, &changes)).unwrap();
+        let mut double = Simulation::new(&parse(&twice, &changes).machine).unwrap();
+        let mut single = Simulation::new(&parse(text, &changes).machine).unwrap();
         run_until(&mut double, 0.1);
         run_until(&mut single, 0.1);
         let (two, one) = (frame_now(&mut double), frame_now(&mut single));
@@ -141,7 +142,7 @@ fn ideal_joints_that_repeat_one_another_share_the_load() {
             assert!(half.norm() < 1e-5, "{form}: {half}");
         }
         let one = [changes[0], ("joint.S2.clearance", "0.3 mm"), changes[1]];
-        Simulation::new(&parse(&twice, &one)).unwrap();
+        LiveScene::new(&parse(&twice, &one)).unwrap();
     }
 }
 
@@ -163,7 +164,7 @@ fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
     let text = built_in_text("slider-crank-driven").unwrap();
     let wild = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
     assert_ne!(wild, text);
-    let mut simulation = Simulation::new(&parse(&wild, &[])).unwrap();
+    let mut simulation = LiveScene::new(&parse(&wild, &[])).unwrap();
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
     let text = stopped.to_string();
@@ -265,7 +266,7 @@ fn a_dead_centre_is_named_where_it_stops_the_run() {
     let bodies: String = ["crank", "coupler", "rocker"].map(body).concat();
     let text = text.to_owned() + &bodies;
     for formulation in ["tree", "lagrange"] {
-        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
+        let mut simulation = LiveScene::new(&parse(&text, &[("formulation", formulation)])).unwrap();
         let stopped = simulation.advance_to(8.0).unwrap_err();
         assert_eq!((stopped.fault, stopped.advice), (StopFault::SingularLoops, StopAdvice::Dependent), "{formulation}");
         assert!((stopped.time - 1.64336).abs() < 1e-4, "{formulation}: {}", stopped.time);

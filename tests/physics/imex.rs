@@ -1,8 +1,9 @@
 //! The method that is implicit in the contacts alone: stable and right on settled contacts at steps that resolve no impact,
 //! and it creates no energy.
 
-use crate::common::{frame_now, mean_forces, scene, simulation, slope};
-use jointplay::simulate::{Frame, Simulation};
+use crate::common::{frame_now, live, mean_forces, scene, simulation, slope};
+use jointplay::scene::LiveScene;
+use jointplay::simulate::Frame;
 
 #[test]
 fn settled_forces_are_right_within_a_per_cent_at_steps_far_beyond_the_contacts_period() {
@@ -19,11 +20,11 @@ fn settled_forces_are_right_within_a_per_cent_at_steps_far_beyond_the_contacts_p
     ] {
         let base = [&[("formulation", formulation)], changes].concat();
         let close = [&base[..], &[("solver.tolerance", "1e-8")]].concat();
-        let mut exact = simulation(name, &close);
+        let mut exact = live(name, &close);
         crate::common::run_until(&mut exact, 0.3);
         let start = exact.snapshot();
         let expected = mean_forces(&mut exact, 0.3, 0.5);
-        let mut fixed = simulation(name, &base);
+        let mut fixed = live(name, &base);
         fixed.restore(&start);
         fixed.set("solver.method", "imex-euler").unwrap();
         fixed.set("solver.step", step).unwrap();
@@ -100,14 +101,14 @@ fn no_step_creates_energy() {
 
 #[test]
 fn on_settled_contacts_the_error_shrinks_with_the_step() {
-    let mut exact = simulation("spcmm", &[("solver.tolerance", "1e-8")]);
+    let mut exact = live("spcmm", &[("solver.tolerance", "1e-8")]);
     exact.advance_to(0.3).unwrap();
     let start = exact.snapshot();
     let end = exact.time() + 0.02;
     crate::common::run_until(&mut exact, end);
     let exact = exact.state().to_vec();
     let points = [200.0, 100.0, 50.0, 25.0].map(|step| {
-        let mut simulation = Simulation::new(&scene("spcmm", &[])).unwrap();
+        let mut simulation = LiveScene::new(&scene("spcmm", &[])).unwrap();
         simulation.restore(&start);
         simulation.set("solver.method", "imex-euler").unwrap();
         simulation.set("solver.step", &format!("{step} us")).unwrap();
@@ -124,6 +125,6 @@ fn on_settled_contacts_the_error_shrinks_with_the_step() {
 
 #[test]
 fn too_long_a_step_is_announced_as_what_it_costs() {
-    let warnings = scene("spcmm", &[("solver.method", "imex-euler"), ("solver.step", "100 us")]).warnings();
+    let warnings = scene("spcmm", &[("solver.method", "imex-euler"), ("solver.step", "100 us")]).machine.warnings();
     assert!(warnings.iter().any(|w| w.to_string().contains("stays stable")), "{warnings:?}");
 }

@@ -2,7 +2,7 @@
 
 use crate::common::{frame_now, parse};
 use jointplay::contact::{NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution};
-use jointplay::scene::Vec3;
+use jointplay::machine::Vec3;
 use jointplay::simulate::{ContactState, Frame, Simulation};
 
 const MASS: f64 = 0.5;
@@ -51,7 +51,7 @@ opening = [0, 0, 1]
         vector(velocity, "m/s"),
         vector(spin, "rad/s"),
     );
-    Simulation::new(&parse(&text, changes)).unwrap()
+    Simulation::new(&parse(&text, changes).machine).unwrap()
 }
 
 /// Restitution of m v dv = -K delta^1.5 (1 + chi v / v0) d delta by quadrature of both halves of the impact:
@@ -130,7 +130,7 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
 fn elastic_impacts_have_the_peak_of_hertz() {
     let speed = 0.1;
     let (_, simulation) = rebound(speed, &[("contact.normal_law", "hertz")]);
-    let contact = simulation.scene().contact;
+    let contact = simulation.machine().contact;
     let k = hertz_stiffness(&contact, CLEARANCE);
     // m v^2 / 2 = 2/5 K delta^2.5.
     let deepest = (1.25 * MASS * speed * speed / k).powf(0.4);

@@ -43,7 +43,7 @@ fn theirs(name: &str, changes: &Changes, equations: &str, solver: &str, end: f64
 
 /// The program's own run to `time`, and its contacts as in [`Run`].
 fn program(name: &str, changes: &Changes, time: f64) -> (Simulation, Vec<Contact>) {
-    let mut simulation = Simulation::new(&scene(name, changes)).unwrap();
+    let mut simulation = Simulation::new(&scene(name, changes).machine).unwrap();
     let mut contacts: Vec<Contact> = Vec::new();
     let mut peaks = Vec::new();
     while simulation.time() < time {
@@ -145,7 +145,7 @@ fn the_measuring_mechanism_moves_the_same_under_another_solver() {
 
 /// How far the program's positions are from those of another solver, m or rad.
 fn off(simulation: &Simulation, theirs: &Run) -> f64 {
-    let positions = Mechanism::new(simulation.scene()).unwrap().positions();
+    let positions = Mechanism::new(simulation.machine()).unwrap().positions();
     assert_eq!(simulation.state().len(), theirs.state.len());
     let pairs = simulation.state()[..positions].iter().zip(&theirs.state);
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
@@ -155,7 +155,7 @@ fn off(simulation: &Simulation, theirs: &Run) -> f64 {
 /// program's, m or rad.
 pub fn moves_the_same(name: &str, changes: &Changes, end: f64) -> (usize, f64) {
     let theirs = theirs(name, changes, "borrowed", "Bdf", end);
-    let mut simulation = Simulation::new(&scene(name, &[changes, &[TIGHT]].concat())).unwrap();
+    let mut simulation = Simulation::new(&scene(name, &[changes, &[TIGHT]].concat()).machine).unwrap();
     run_until(&mut simulation, end);
     let off = off(&simulation, &theirs);
     println!("{name}: off by {off:.1e} m or rad, {} contacts", theirs.contacts.len());

@@ -2,7 +2,8 @@
 
 use crate::common::matrix::{FORMULATIONS, for_every};
 use crate::elements::at;
-use jointplay::scene::{Scene, Vec3};
+use jointplay::machine::{Machine, Vec3};
+use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
 /// One body on a joint with the world: what a coordinate of it is worth, and how it is written.
@@ -14,7 +15,7 @@ enum On {
 use On::{Hinge, Slide};
 
 pub fn started(text: &str, changes: &[(&str, &str)]) -> Simulation {
-    Simulation::new(&crate::common::parse(text, changes)).unwrap()
+    Simulation::new(&crate::common::parse(text, changes).machine).unwrap()
 }
 
 impl On {
@@ -221,9 +222,9 @@ const TUMBLING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
     start = { position = \"5 mm\", velocity = \"0.2 m/s\" }\n";
 
 /// Momentum and angular momentum about the world's origin of bodies whose frames are at their centroids.
-pub fn momenta(frame: &Frame, scene: &Scene) -> [Vec3; 2] {
+pub fn momenta(frame: &Frame, machine: &Machine) -> [Vec3; 2] {
     let mut sums = [Vec3::zeros(); 2];
-    for (body, m) in scene.bodies.iter().zip(&frame.bodies) {
+    for (body, m) in machine.bodies.iter().zip(&frame.bodies) {
         let momentum = m.velocity * body.mass;
         let spin = m.rotation.tr_mul(&m.angular_velocity);
         sums[0] += momentum;
@@ -253,7 +254,7 @@ fn what_acts_on_joints_keeps_momentum_and_its_energy_balance_closes() {
         for (formulation, method) in ways.into_iter().skip(if damped { 2 } else { 0 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
             let mut simulation = started(&text, &changes);
-            let scene = simulation.scene().clone();
+            let machine = simulation.machine().clone();
             let before = at(&mut simulation, 0.0);
             let mut stopped = [false; 2];
             for sample in 1..=30 {
@@ -269,7 +270,7 @@ fn what_acts_on_joints_keeps_momentum_and_its_energy_balance_closes() {
             let frame = at(&mut simulation, 0.3);
             let label = format!("{formulation} {method} damped {damped}");
             assert!(damped || (stopped[0] && stopped[1]), "{label}: untouched");
-            let (then, now) = (momenta(&before, &scene), momenta(&frame, &scene));
+            let (then, now) = (momenta(&before, &machine), momenta(&frame, &machine));
             for (then, now) in then.iter().zip(&now) {
                 let off = (now - then).norm() / then.norm();
                 assert!(off < 2e-8, "{label}: {off:e}");
@@ -517,8 +518,8 @@ fn columns_and_pictures_follow_what_the_joint_is() {
     let columns = |on: On| {
         let text = on.text([0.13, 0.0], &on.spring(200.0, 0.0));
         let scene = Scene::parse(&text, None, &[]).unwrap();
-        let frame = at(&mut Simulation::new(&scene).unwrap(), 0.0);
-        jointplay::simulate::run_columns(&scene, &frame).0.join(",")
+        let frame = at(&mut Simulation::new(&scene.machine).unwrap(), 0.0);
+        jointplay::simulate::run_columns(&scene.machine, &frame).0.join(",")
     };
     let (slide, hinge) = (columns(Slide), columns(Hinge));
     assert!(slide.contains("s_force_x_N,s_force_y_N,s_force_z_N") && !slide.contains("s_torque"));

@@ -1,6 +1,6 @@
 //! The energy ledger: every joule is accounted for. That keeping it changes nothing, `promises.rs` checks.
 
-use crate::common::{Changes, METHODS, SCENES, run_until, simulation};
+use crate::common::{Changes, METHODS, SCENES, live, run_until, simulation};
 use jointplay::simulate::{Frame, Ledger, Simulation};
 
 /// What the ledger promises of the preset `accurate`, of the energy exchanged.
@@ -192,7 +192,7 @@ fn live_changes_are_booked() {
     for method in ["automatic", "rk4"] {
         // Fixed steps that keep up with the hard impacts at the end.
         let changes = [("solver.method", method), ("solver.step", "2 us")];
-        let mut simulation = simulation("spcmm", &changes);
+        let mut simulation = live("spcmm", &changes);
         let bound = if method == "rk4" { 5e-4 } else { PROMISE };
         simulation.advance_to(0.4).unwrap();
         // Settled: the balls stand against their walls, which close now.
@@ -229,7 +229,7 @@ fn live_changes_are_booked() {
 #[test]
 fn a_contact_under_load_books_what_softening_releases() {
     // Soft enough that the stored energy is no trifle.
-    let mut simulation = simulation("pendulum", &[("contact.youngs_modulus", "1 GPa")]);
+    let mut simulation = live("pendulum", &[("contact.youngs_modulus", "1 GPa")]);
     simulation.advance_to(0.3).unwrap();
     let before = ledger(&simulation);
     simulation.set("contact.youngs_modulus", "100 GPa").unwrap();
@@ -241,7 +241,7 @@ fn a_contact_under_load_books_what_softening_releases() {
 
 #[test]
 fn it_starts_anew_at_a_reset_which_its_switch_waits_for() {
-    let mut simulation = simulation("pendulum", &[]);
+    let mut simulation = live("pendulum", &[]);
     simulation.advance_to(0.05).unwrap();
     let here = ledger(&simulation);
     simulation.reset().unwrap();

@@ -4,7 +4,7 @@ use crate::common::{Changes, frame_now, free_ball, parse, run_until, simulation}
 use jointplay::contact::{
     NormalLaw, Parameters, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
 };
-use jointplay::scene::Vec3;
+use jointplay::machine::Vec3;
 use jointplay::simulate::{ContactState, Frame, Simulation};
 
 /// Whether the page has this sentence, however its lines are broken.
@@ -28,7 +28,7 @@ fn on_the_wall(angle: f64, start: &str, changes: &Changes) -> Simulation {
     let from = "position = \"0 0 0 mm\", velocity = \"0 0 0 m/s\"";
     assert!(text.contains(from), "{text}");
     let to = format!("position = \"{:e} 0 {:e} mm\"{start}", distance * angle.sin(), -distance * angle.cos());
-    Simulation::new(&parse(&text.replace(from, &to), &changes)).unwrap()
+    Simulation::new(&parse(&text.replace(from, &to), &changes).machine).unwrap()
 }
 
 /// Where a ball lies in its socket beside the lowest point, degrees.
@@ -116,7 +116,7 @@ fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
     // Relative changes within two seconds.
     let drift = |changes: &Changes| {
         let changes = [&[("solver.tolerance", "1e-9"), ("contact.approach_speed", "largest")], changes].concat();
-        let mut simulation = Simulation::new(&parse(IN_SPACE, &changes)).unwrap();
+        let mut simulation = Simulation::new(&parse(IN_SPACE, &changes).machine).unwrap();
         let [p, l] = momenta(&frame_now(&mut simulation));
         let mut most = [0.0_f64; 2];
         for k in 1..=20 {
@@ -149,7 +149,7 @@ fn what_a_law_gives_and_how_large_a_patch_is() {
         simulation.step().unwrap();
         simulation.take_impacts(&mut impacts);
     }
-    let contact = &simulation.scene().ball_joints[0].contact;
+    let contact = &simulation.machine().ball_joints[0].contact;
     let (r, c) = (contact.ball_radius, contact.clearance);
     let force = (0..3).map(|j| simulation.peak(j).0).fold(0.0, f64::max);
     let depth = settled_penetration(hertz_stiffness(contact, c), force);

@@ -1,11 +1,12 @@
 //! Parameters changed while the simulation runs: no burst, no jump, nothing changed by what is refused.
 
-use crate::common::{frame_now, simulation};
+use crate::common::{frame_now, live, simulation};
+use jointplay::scene::LiveScene;
 use jointplay::simulate::{CLEARANCE_SPEED, Effect, Frame, Simulation};
 
 /// The default scene with its balls at rest on their socket walls.
-fn settled() -> Simulation {
-    let mut simulation = simulation("spcmm", &[]);
+fn settled() -> LiveScene {
+    let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.3).unwrap();
     simulation
 }
@@ -112,11 +113,13 @@ fn a_clearance_under_way_can_change_its_mind() {
     let due = 0.3e-3 - 2e-3 * (simulation.time() - start);
     assert!(due > 0.2e-3, "it is under way");
     assert!(here.iter().all(|c| (c - due).abs() < 1e-15), "{here:?}");
-    simulation.advance_to(simulation.time() + 0.06).unwrap();
+    let end = simulation.time() + 0.06;
+    simulation.advance_to(end).unwrap();
     assert_eq!(clearances(&mut simulation), [0.2e-3; 3]);
     // And back open, half way.
     simulation.set("contact.clearance", "0.1 mm").unwrap();
-    simulation.advance_to(simulation.time() + 0.02).unwrap();
+    let end = simulation.time() + 0.02;
+    simulation.advance_to(end).unwrap();
     simulation.set("contact.clearance", "0.3 mm").unwrap();
     assert_eq!(clearances(&mut simulation), [0.3e-3; 3]);
     let seen = watch(&mut simulation, 0.6);
@@ -161,9 +164,9 @@ fn changes_act_from_the_next_step_on() {
         ("solver.tolerance", "1e-9"),
         ("solver.preset", "preview"),
     ] {
-        let mut plain = simulation("spcmm", &[]);
+        let mut plain = live("spcmm", &[]);
         plain.advance_to(0.012).unwrap();
-        let mut changed = Simulation::new(plain.scene()).unwrap();
+        let mut changed = LiveScene::new(plain.pending()).unwrap();
         changed.restore(&plain.snapshot());
         let hash = plain.state_hash();
         assert_eq!(changed.set(key, value), Ok(Effect::Now), "{key}");
@@ -179,7 +182,7 @@ fn changes_act_from_the_next_step_on() {
 
 #[test]
 fn the_step_of_a_fixed_method_changes_at_once() {
-    let mut simulation = simulation("spcmm", &[("solver.method", "rk4")]);
+    let mut simulation = live("spcmm", &[("solver.method", "rk4")]);
     simulation.step().unwrap();
     simulation.set("solver.step", "3 us").unwrap();
     simulation.step().unwrap();
@@ -194,7 +197,7 @@ fn the_step_of_a_fixed_method_changes_at_once() {
 #[test]
 fn restitution_zero_is_calmer_than_one() {
     let kinetic_excess = |restitution: &str| {
-        let mut simulation = simulation("spcmm", &[("contact.friction", "0")]);
+        let mut simulation = live("spcmm", &[("contact.friction", "0")]);
         simulation.advance_to(0.012).unwrap();
         simulation.set("contact.restitution", restitution).unwrap();
         simulation.advance_to(0.1).unwrap();
@@ -207,24 +210,24 @@ fn restitution_zero_is_calmer_than_one() {
 
 #[test]
 fn clearance_to_and_from_zero_waits_for_the_reset() {
-    let mut simulation = simulation("spcmm", &[]);
+    let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.02).unwrap();
     let hash = simulation.state_hash();
     assert_eq!(simulation.set("joint.S1.clearance", "0"), Ok(Effect::AtReset));
     assert_eq!(simulation.state_hash(), hash);
-    assert_eq!(simulation.running_scene().ball_joints[0].contact.clearance, 0.3e-3);
-    assert_eq!(simulation.scene().ball_joints[0].contact.clearance, 0.0);
+    assert_eq!(simulation.running().machine.ball_joints[0].contact.clearance, 0.3e-3);
+    assert_eq!(simulation.pending().machine.ball_joints[0].contact.clearance, 0.0);
     simulation.advance_to(0.025).unwrap();
     // Other changes still act now while that one waits.
     assert_eq!(simulation.set("contact.friction", "0.4"), Ok(Effect::Now));
-    assert_eq!(simulation.running_scene().ball_joints[0].contact.friction, 0.4);
+    assert_eq!(simulation.machine().ball_joints[0].contact.friction, 0.4);
     assert_eq!(simulation.set("joint.S2.clearance", "0.4 mm"), Ok(Effect::Now));
     assert_eq!(clearances(&mut simulation), [0.3e-3, 0.4e-3, 0.3e-3]);
     simulation.reset().unwrap();
     assert_eq!(simulation.mechanism().summary().ideal_joints, 1);
     let frame = frame_now(&mut simulation);
     assert_eq!(frame.joints[0].state, jointplay::simulate::ContactState::Ideal);
-    assert_eq!(simulation.running_scene().ball_joints[1].contact.friction, 0.4);
+    assert_eq!(simulation.machine().ball_joints[1].contact.friction, 0.4);
     // And back.
     assert_eq!(simulation.set("joint.S1.clearance", "0.2 mm"), Ok(Effect::AtReset));
     simulation.advance_to(0.01).unwrap();
@@ -246,7 +249,7 @@ fn drives_and_equations_wait_for_the_reset() {
         ("formulation", "lagrange"),
     ] {
         let mut plain = simulation("spcmm", &[]);
-        let mut changed = simulation("spcmm", &[]);
+        let mut changed = live("spcmm", &[]);
         plain.advance_to(0.009).unwrap();
         changed.advance_to(0.009).unwrap();
         assert_eq!(changed.set(key, value), Ok(Effect::AtReset), "{key}");
@@ -261,7 +264,7 @@ fn drives_and_equations_wait_for_the_reset() {
 
 #[test]
 fn refused_values_change_nothing() {
-    let mut simulation = simulation("spcmm", &[]);
+    let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.011).unwrap();
     let hash = simulation.state_hash();
     let frame = format!("{:?}", frame_now(&mut simulation));
@@ -286,9 +289,9 @@ fn refused_values_change_nothing() {
         assert_eq!(simulation.state_hash(), hash, "{key} = {value}");
         assert_eq!(format!("{:?}", frame_now(&mut simulation)), frame, "{key} = {value}");
     }
-    assert!(simulation.scene().changes.is_empty());
+    assert!(simulation.pending().changes.is_empty());
     simulation.advance_to(0.015).unwrap();
-    let mut plain = Simulation::new(&crate::common::scene("spcmm", &[])).unwrap();
+    let mut plain = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();
     plain.restore(&snapshot);
     plain.advance_to(0.015).unwrap();
     assert_eq!(simulation.state_hash(), plain.state_hash());
@@ -322,7 +325,7 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
     ];
     let run = |seed: u64| {
         let mut dice = Dice(seed);
-        let mut simulation = simulation("spcmm", &[("solver.step", "5 us")]);
+        let mut simulation = live("spcmm", &[("solver.step", "5 us")]);
         let (mut frame, mut peaks) = (Frame::default(), Vec::new());
         let (mut force, mut kinetic) = (0.0_f64, 0.0_f64);
         for i in 1..=200 {
@@ -332,11 +335,12 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
             let end = f64::from(i) * 2.5e-3;
             while simulation.time() < end {
                 let step = simulation.step();
-                assert!(step.is_ok(), "{step:?} after {:?}", simulation.scene().changes);
+                assert!(step.is_ok(), "{step:?} after {:?}", simulation.pending().changes);
                 simulation.take_peaks(&mut peaks);
                 force = peaks.iter().map(|p| p.normal).fold(force, f64::max);
             }
-            simulation.sample(simulation.time(), &mut frame);
+            let now = simulation.time();
+            simulation.sample(now, &mut frame);
             let text = format!("{frame:?}");
             assert!(!text.contains("NaN") && !text.contains("inf"), "{key} = {value}: {text}");
             kinetic = kinetic.max(frame.kinetic);
@@ -361,7 +365,7 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
 fn a_force_that_jumps_with_a_change_has_no_peak_that_never_was() {
     // Gravity turned up pulls the reactions of the ideal joints up at once; a parabola through both sides of that
     // jump would overshoot it by an eighth.
-    let mut simulation = simulation("spcmm", &[("contact.clearance", "0")]);
+    let mut simulation = live("spcmm", &[("contact.clearance", "0")]);
     simulation.advance_to(0.1).unwrap();
     let change = simulation.set("gravity.x", "50 m/s^2");
     assert_eq!(change, Ok(Effect::Now));
@@ -396,9 +400,9 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
              [[ball_joint]]\nname = \"S1\"\nsocket = {{ body = \"world\" }}\nball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\n"
         )
     };
-    let clearance = |scene: &jointplay::scene::Scene| scene.ball_joints[0].contact.clearance;
+    let clearance = |scene: &jointplay::scene::Scene| scene.machine.ball_joints[0].contact.clearance;
     let run = |mass: &str| {
-        let mut simulation = Simulation::new(&crate::common::parse(&scene(mass), &[])).unwrap();
+        let mut simulation = LiveScene::new(&crate::common::parse(&scene(mass), &[])).unwrap();
         simulation.advance_to(1e-3).unwrap();
         simulation
     };
@@ -411,24 +415,25 @@ fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_
         assert_eq!(by_parameter.set("parameter.gap", own), Ok(Effect::Now));
         assert_eq!(by_key.set(key, value), Ok(Effect::Now));
         for simulation in [&mut by_parameter, &mut by_key] {
-            simulation.advance_to(simulation.time() + 5e-3).unwrap();
+            let end = simulation.time() + 5e-3;
+            simulation.advance_to(end).unwrap();
         }
         assert_eq!(by_parameter.state_hash(), by_key.state_hash());
-        assert_eq!(clearance(by_parameter.running_scene()), clearance(by_key.running_scene()));
+        assert_eq!(clearance(by_parameter.running()), clearance(by_key.running()));
     }
     assert_eq!(by_parameter.set("parameter.weight", "1.62"), Ok(Effect::Now));
-    assert_eq!(by_parameter.running_scene().gravity.z, -1.62);
+    assert_eq!(by_parameter.running().machine.gravity.z, -1.62);
     by_parameter.advance_to(20e-3).unwrap();
     // What else follows it waits, and the contact with it.
     let mut waiting = run("0.384 kg * (1 + gap / 1 m)");
     let hash = waiting.state_hash();
     assert_eq!(waiting.set("parameter.gap", "0.2 mm"), Ok(Effect::AtReset));
-    assert_eq!(clearance(waiting.scene()), 0.4e-3);
-    assert_eq!(clearance(waiting.running_scene()), 0.2e-3);
+    assert_eq!(clearance(waiting.pending()), 0.4e-3);
+    assert_eq!(clearance(waiting.running()), 0.2e-3);
     assert_eq!(waiting.state_hash(), hash);
     assert_eq!(waiting.set("body.rod.mass", "0.4 kg"), Ok(Effect::AtReset));
     waiting.reset().unwrap();
-    assert_eq!(clearance(waiting.running_scene()), 0.4e-3);
+    assert_eq!(clearance(waiting.running()), 0.4e-3);
     // And an ideal joint is another machine.
     assert_eq!(by_parameter.set("parameter.gap", "0 mm"), Ok(Effect::AtReset));
 }

@@ -7,7 +7,7 @@ use crate::common::{frame_now, parse, run_until};
 use crate::elements::at;
 use crate::joint_elements::started;
 use crate::two_degrees::differ;
-use jointplay::scene::{Mat3, Quat, Vec3};
+use jointplay::machine::{Mat3, Quat, Vec3};
 use jointplay::simulate::{BodyMotion, Frame, Simulation};
 
 const G: f64 = 9.81;
@@ -582,8 +582,8 @@ fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
 
 fn start_error(text: &str) -> String {
     let scene = parse(text, &[]);
-    let error = Simulation::new(&scene).err().expect("does not start");
-    error.located(&scene).to_string()
+    let error = Simulation::new(&scene.machine).err().expect("does not start");
+    scene.locate(&error).to_string()
 }
 
 #[test]
@@ -615,7 +615,7 @@ fn a_guess_is_assembled_and_what_moved_is_known() {
     let guess = Bar { start: "ideal", driven: [Some(12.0), None], off, ..PLAIN };
     for start in ["ideal", "settled"] {
         let text = four_bar(&Bar { start, ..guess });
-        let mut simulation = Simulation::new(&parse(&text, &[])).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &[]).machine).unwrap();
         let assembly = simulation.mechanism().assembly();
         let (joint, gap) = assembly.widest.unwrap();
         let chord = 2.0 * BAR[1] * (0.5 * off).sin();

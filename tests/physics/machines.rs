@@ -3,7 +3,8 @@
 
 use super::independent::moves_the_same;
 use crate::common::{Changes, MACHINES, SCENES, frame_now, parse, run_until, scene, simulation};
-use jointplay::scene::{BUILT_IN, Mat3, Scene, Value, Vec3};
+use jointplay::machine::{Machine, Mat3, Vec3};
+use jointplay::scene::{BUILT_IN, Value};
 use jointplay::simulate::{ContactState, Frame, Simulation};
 use std::f64::consts::{PI, TAU};
 
@@ -17,17 +18,17 @@ fn they_and_the_others_are_all_there_are() {
 }
 
 /// Pose of body `name`: position and axes.
-fn pose(scene: &Scene, frame: &Frame, name: &str) -> (Vec3, Mat3) {
-    let at = scene.bodies.iter().position(|body| body.name == name);
+fn pose(machine: &Machine, frame: &Frame, name: &str) -> (Vec3, Mat3) {
+    let at = machine.bodies.iter().position(|body| body.name == name);
     let body = &frame.bodies[at.expect("a body of this name")];
     (body.position, body.rotation)
 }
 
 /// Calls `check` with the frames of an ideal run of `name` at some instants up to `end`; `more` are further changes.
-fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Scene, &Frame)) {
+fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Machine, &Frame)) {
     let changes = [&[IDEAL], more].concat();
     let mut simulation = simulation(name, &changes);
-    let scene = simulation.scene().clone();
+    let machine = simulation.machine().clone();
     let mut frame = Frame::default();
     for n in 0..=16 {
         let time = end * f64::from(n) / 16.0;
@@ -37,7 +38,7 @@ fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Scene, &Frame))
             assert_eq!(joint.state, ContactState::Ideal, "{name}");
             assert!(joint.eccentricity.norm() < 1e-9, "{name} at {time} s");
         }
-        check(&scene, &frame);
+        check(&machine, &frame);
     }
 }
 
@@ -194,8 +195,8 @@ fn play_lifts_the_ram_of_the_press_at_the_bottom() {
         let mut simulation = simulation("press", &changes);
         // Half a turn; slowly, so that nothing rattles there.
         run_until(&mut simulation, 1.5);
-        let scene = simulation.scene().clone();
-        pose(&scene, &frame_now(&mut simulation), "ram").0.z
+        let machine = simulation.machine().clone();
+        pose(&machine, &frame_now(&mut simulation), "ram").0.z
     };
     let lift = bottom("0.1 mm") - bottom("0");
     assert!((2.0e-4..2.3e-4).contains(&lift), "{lift:e} m");
@@ -397,15 +398,15 @@ fn the_suspension_swings_as_its_linear_model() {
             ("tyre.tyre.radius", "468 mm"),
         ],
     );
-    let scene = simulation.scene().clone();
+    let machine = simulation.machine().clone();
     let mut frame = Frame::default();
     let samples: Vec<[f64; 2]> = (0..=12_000)
         .map(|n| {
             let time = f64::from(n) * 0.5e-3;
             simulation.advance_to(time).unwrap();
             simulation.sample(time, &mut frame);
-            let axes = pose(&scene, &frame, "lower-arm").1;
-            let z = pose(&scene, &frame, "chassis").0.z;
+            let axes = pose(&machine, &frame, "lower-arm").1;
+            let z = pose(&machine, &frame, "chassis").0.z;
             [z, axes[(2, 1)].atan2(axes[(1, 1)])]
         })
         .collect();
@@ -448,7 +449,7 @@ fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
             let time = 1e-3 * f64::from(n);
             simulation.advance_to(time).unwrap();
             simulation.sample(time, &mut frame);
-            let axes = pose(simulation.scene(), &frame, "upright").1;
+            let axes = pose(simulation.machine(), &frame, "upright").1;
             let toe = axes[(1, 0)].atan2(axes[(0, 0)]);
             (least, most) = (least.min(toe), most.max(toe));
         }
@@ -465,8 +466,8 @@ fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
 fn the_tie_rod_sets_the_toe() {
     let toe = |length: &str| {
         let mut simulation = simulation("suspension", &[IDEAL, ("parameter.tie_rod", length)]);
-        let scene = simulation.scene().clone();
-        let axes = pose(&scene, &frame_now(&mut simulation), "upright").1;
+        let machine = simulation.machine().clone();
+        let axes = pose(&machine, &frame_now(&mut simulation), "upright").1;
         axes[(1, 0)].atan2(axes[(0, 0)])
     };
     assert!(toe("0 mm").abs() < 1e-9);
@@ -515,7 +516,7 @@ fn nothing_speaks_against_their_default_settings() {
         let mut simulation = simulation(name, &[]);
         run_until(&mut simulation, 0.04);
         assert_eq!(simulation.doubts(), [], "{name}");
-        let warnings = simulation.scene().warnings();
+        let warnings = simulation.machine().warnings();
         assert!(warnings.is_empty(), "{name}: {warnings:?}");
     }
 }
@@ -540,7 +541,8 @@ fn each_assembles_at_the_ends_of_its_parameters() {
             let mut changes: Vec<(&str, &str)> = ends.iter().map(|(k, v)| (*k, &**v)).collect();
             changes.push(IDEAL);
             let scene = parse(&plain.source.text, &changes);
-            let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{name} {ends:?}: {error}"));
+            let mut simulation =
+                Simulation::new(&scene.machine).unwrap_or_else(|error| panic!("{name} {ends:?}: {error}"));
             for joint in frame_now(&mut simulation).joints {
                 assert!(joint.eccentricity.norm() < 1e-9, "{name} {ends:?}");
             }
@@ -565,7 +567,7 @@ fn the_tool_point_of_the_hexapod_strays_by_twice_the_play() {
             let [loose, ideal] = runs.each_mut().map(|run| {
                 run.advance_to(time).unwrap();
                 run.sample(time, &mut frame);
-                let (position, axes) = pose(run.scene(), &frame, "platform");
+                let (position, axes) = pose(run.machine(), &frame, "platform");
                 position + axes * Vec3::new(0.0, 0.0, -0.100)
             });
             most = most.max((loose - ideal).norm());
@@ -591,7 +593,7 @@ fn the_rocker_of_the_four_bar_stands_low_or_leads_and_lags() {
             let [loose, ideal] = runs.each_mut().map(|run| {
                 run.advance_to(time).unwrap();
                 run.sample(time, &mut frame);
-                let axes = pose(run.scene(), &frame, "rocker").1;
+                let axes = pose(run.machine(), &frame, "rocker").1;
                 0.120 * axes[(0, 2)].atan2(axes[(2, 2)])
             });
             (least, most) = (least.min(loose - ideal), most.max(loose - ideal));

@@ -51,7 +51,7 @@ fn equal_imex_steps(m: &mut Mechanism, start: &[f64], duration: f64, steps: u32)
 fn slopes_of_the_error_are_the_orders() {
     const DURATION: f64 = 0.32;
     let scene = scene("spcmm", &[]);
-    let mut mechanism = Mechanism::new(&scene).unwrap();
+    let mut mechanism = Mechanism::new(&scene.machine).unwrap();
     let mut start = mechanism.start().unwrap();
     let n = start.len();
     for (rate, i) in start[mechanism.positions()..].iter_mut().zip([0, 0, 0, 6, -9, 5, 20, -15, 10]) {

@@ -5,7 +5,7 @@ use jointplay::mechanism::{Mechanism, Summary};
 use jointplay::simulate::ContactState;
 
 fn summary(name: &str, changes: &[(&str, &str)]) -> Summary {
-    Mechanism::new(&scene(name, changes)).unwrap().summary()
+    Mechanism::new(&scene(name, changes).machine).unwrap().summary()
 }
 
 const IDEAL: (&str, &str) = ("contact.clearance", "0");
@@ -25,7 +25,7 @@ fn rigid_scenes_evaluate_no_contact() {
             assert!(frame.joints.iter().all(|j| j.state == ContactState::Ideal));
             let summary = simulation.mechanism().summary();
             assert_eq!((summary.contacts, summary.frictional_contacts), (0, 0));
-            assert_eq!(summary.ideal_joints, simulation.scene().ball_joints.len());
+            assert_eq!(summary.ideal_joints, simulation.machine().ball_joints.len());
         }
         // With play there are evaluations to count.
         let mut simulation = simulation(name, &[]);

@@ -5,7 +5,8 @@
 
 use crate::common::matrix::every_way;
 use crate::common::{frame_now, parse, run_until};
-use jointplay::scene::{Quat, Scene, Vec3};
+use jointplay::machine::{Quat, Vec3};
+use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
 const G: f64 = 9.81;
@@ -212,7 +213,7 @@ fn differ(a: f64, b: f64) -> f64 {
 }
 
 fn start_error(scene: &Scene) -> String {
-    match Simulation::new(scene) {
+    match Simulation::new(&scene.machine) {
         Ok(_) => panic!("started"),
         Err(error) => error.to_string(),
     }
@@ -225,7 +226,7 @@ fn a_four_bar_closed_by_an_ideal_ball_joint_moves_as_its_geometry_and_energy_say
         [(Quat::identity(), "tree"), (Quat::identity(), "lagrange"), (tilted(), "tree"), (tilted(), "lagrange")]
     {
         let scene = bar.scene(turn, PLAIN, &[("formulation", form)]);
-        let mut simulation = Simulation::new(&scene).unwrap();
+        let mut simulation = Simulation::new(&scene.machine).unwrap();
         let summary = simulation.mechanism().summary();
         assert_eq!((summary.dependent_rows, summary.degrees_of_freedom), (1, 1));
         assert_eq!(simulation.not_unique().reactions, [0]);
@@ -268,12 +269,13 @@ fn every_method_takes_a_planar_loop_ideal_driven_and_with_play() {
         let with = Extras { start: "ideal", clearance, driven, ..PLAIN };
         let reference = {
             let scene = GRASHOF.scene(Quat::identity(), with, &[]);
-            let mut simulation = Simulation::new(&scene).unwrap();
+            let mut simulation = Simulation::new(&scene.machine).unwrap();
             run_until(&mut simulation, 0.02);
             frame_now(&mut simulation)
         };
         for way in every_way() {
-            let mut simulation = Simulation::new(&GRASHOF.scene(Quat::identity(), with, &way.changes())).unwrap();
+            let mut simulation =
+                Simulation::new(&GRASHOF.scene(Quat::identity(), with, &way.changes()).machine).unwrap();
             run_until(&mut simulation, 0.02);
             let frame = frame_now(&mut simulation);
             let impacts = simulation.statistics().impacts[0];
@@ -299,7 +301,7 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
             ("solver.step", "50 us"),
         ];
         let with = Extras { driven, ..PLAIN };
-        let mut simulation = Simulation::new(&bar.scene(tilted(), with, &changes)).unwrap();
+        let mut simulation = Simulation::new(&bar.scene(tilted(), with, &changes).machine).unwrap();
         let stopped = simulation.advance_to(0.5).err();
         (simulation, stopped)
     };
@@ -330,7 +332,7 @@ fn a_parallelogram_passes_its_flat_poses_and_does_not_start_in_one() {
     let loose = Extras { clearance: "0.3 mm", ..with };
     for start in ["as-given", "ideal"] {
         let loose = Extras { start, ..loose };
-        let mut simulation = Simulation::new(&flat.scene(Quat::identity(), loose, &[])).unwrap();
+        let mut simulation = Simulation::new(&flat.scene(Quat::identity(), loose, &[]).machine).unwrap();
         run_until(&mut simulation, 0.02);
     }
 }
@@ -360,14 +362,14 @@ fn two_drives_of_a_parallelogram_share_the_load_or_are_refused() {
     for form in ["tree", "lagrange"] {
         let both = Extras { driven: &[0, 2], ..PLAIN };
         let scene = bar.scene(Quat::identity(), both, &[("formulation", form)]);
-        let mut simulation = Simulation::new(&scene).unwrap();
+        let mut simulation = Simulation::new(&scene.machine).unwrap();
         let loose = simulation.not_unique();
         assert_eq!((loose.reactions, loose.actuators), (vec![0], vec![0, 1]));
         run_until(&mut simulation, 0.1);
         let frame = frame_now(&mut simulation);
         // One motor alone would need the same work from it.
         let alone = Extras { driven: &[0], ..PLAIN };
-        let mut single = Simulation::new(&bar.scene(Quat::identity(), alone, &[])).unwrap();
+        let mut single = Simulation::new(&bar.scene(Quat::identity(), alone, &[]).machine).unwrap();
         assert_eq!(single.not_unique().actuators, [0; 0]);
         run_until(&mut single, 0.1);
         let work = frame_now(&mut single).actuators[0];
@@ -409,13 +411,13 @@ fn two_ball_joints_make_a_hinge() {
         ball("low", -0.4),
         ball("high", 0.6)
     );
-    let mut hinged = Simulation::new(&parse(&hinge, &[])).unwrap();
+    let mut hinged = Simulation::new(&parse(&hinge, &[]).machine).unwrap();
     run_until(&mut hinged, 0.5);
     let expected = frame_now(&mut hinged);
     let weight = 2.0 * (expected.bodies[0].acceleration + Vec3::new(0.0, 0.0, G));
     for form in ["tree", "lagrange"] {
         let scene = parse(&balls, &[("formulation", form)]);
-        let mut simulation = Simulation::new(&scene).unwrap();
+        let mut simulation = Simulation::new(&scene.machine).unwrap();
         assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 1);
         run_until(&mut simulation, 0.5);
         let frame = frame_now(&mut simulation);
@@ -434,7 +436,7 @@ fn what_the_assembly_moved_is_known() {
     let close = GRASHOF.angles(GRASHOF.angle);
     let guess = [close[0], close[1] + 8.0 * degrees, close[2]];
     let with = Extras { start: "ideal", driven: &[0], pose: Some(guess), ..PLAIN };
-    let simulation = Simulation::new(&GRASHOF.scene(tilted(), with, &[])).unwrap();
+    let simulation = Simulation::new(&GRASHOF.scene(tilted(), with, &[]).machine).unwrap();
     let assembly = simulation.mechanism().assembly();
     let (joint, gap) = assembly.widest.unwrap();
     // Chord of 8 degrees at the end of the coupler.
@@ -459,7 +461,7 @@ fn another_assembly_mode_than_the_guess_s_is_told() {
             let with =
                 Extras { start: "ideal", driven: &[0], pose: Some([GRASHOF.angle, guess[0], guess[1]]), ..PLAIN };
             let scene = GRASHOF.scene(Quat::identity(), with, &[]);
-            let Ok(mut simulation) = Simulation::new(&scene) else {
+            let Ok(mut simulation) = Simulation::new(&scene.machine) else {
                 continue;
             };
             let frame = frame_now(&mut simulation);

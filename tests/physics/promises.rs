@@ -10,7 +10,8 @@ use crate::common::matrix::{FORMULATIONS, Way, every_way, for_every};
 use crate::common::{FOUR_WAYS, MACHINES, METHODS, SCENES, frame_now, parse, run_until, scene};
 use crate::planar_loops::{Extras, GRASHOF, PLAIN};
 use crate::{loop_joints, two_degrees};
-use jointplay::scene::{Quat, Scene, built_in_text};
+use jointplay::machine::Quat;
+use jointplay::scene::{LiveScene, Scene, built_in_text};
 use jointplay::simulate::{Frame, Ledger, Simulation};
 
 /// Steps before the instant at which a run without contacts is kept, and after it.
@@ -32,22 +33,22 @@ fn into_contact(simulation: &mut Simulation) -> u32 {
         assert!(steps < SOON, "no impact");
     }
     simulation.step().unwrap();
-    let joints = 0..simulation.scene().ball_joints.len();
+    let joints = 0..simulation.machine().ball_joints.len();
     assert!(joints.into_iter().any(|j| simulation.contact_memory(j).active), "nothing touches");
     steps + 1
 }
 
 /// What a user does there: one change acts at once, a clearance takes its time, and another formulation waits for a reset.
-fn change(simulation: &mut Simulation) {
+fn change(simulation: &mut LiveScene) {
     simulation.set("contact.friction", "0.1").unwrap();
-    let scene = simulation.scene().clone();
-    let loose = scene.ball_joints.iter().find(|joint| joint.contact.clearance > 0.0);
+    let machine = simulation.machine().clone();
+    let loose = machine.ball_joints.iter().find(|joint| joint.contact.clearance > 0.0);
     if let Some(joint) = loose {
         let key = format!("joint.{}.clearance", joint.name);
         let less = format!("{:e} m", 0.9 * joint.contact.clearance);
         simulation.set(&key, &less).unwrap();
     }
-    let other = FORMULATIONS.into_iter().find(|word| *word != scene.formulation.word()).expect("two");
+    let other = FORMULATIONS.into_iter().find(|word| *word != machine.formulation.word()).expect("two");
     simulation.set("formulation", other).unwrap();
 }
 
@@ -75,14 +76,14 @@ fn watched_step(simulation: &mut Simulation, way: Way) {
         simulation.sample(from + part * (to - from), &mut frame);
         assert!(finite(&frame), "t = {}", frame.time);
     }
-    assert_eq!(fault(&frame, simulation.running_scene(), way.formulation), None);
+    assert_eq!(fault(&frame, simulation.machine(), way.formulation), None);
     simulation.take_peaks(&mut Vec::new());
     simulation.take_impacts(&mut Vec::new());
 }
 
 /// Puts a run of `scene` through all of it; the hash at its end.
 fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
-    let mut plain = Simulation::new(scene).unwrap();
+    let mut plain = LiveScene::new(scene).unwrap();
     let start = plain.state_hash();
     let steps = into_contact(&mut plain);
     let here = look(&mut plain);
@@ -94,7 +95,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     let first = go_on(&mut plain);
 
     // Watched all the way, with a map of its wear, after a reset in mid run.
-    let mut watched = Simulation::new(scene).unwrap();
+    let mut watched = LiveScene::new(scene).unwrap();
     (0..BEFORE).for_each(|_| watched_step(&mut watched, way));
     watched.reset().unwrap();
     assert_eq!((watched.time(), watched.state_hash()), (0.0, start));
@@ -116,7 +117,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     // Without books.
     let mut silent = scene.clone();
     silent.set("solver.energy_ledger", "off").unwrap();
-    let mut silent = Simulation::new(&silent).unwrap();
+    let mut silent = LiveScene::new(&silent).unwrap();
     (0..steps).for_each(|_| silent.step().unwrap());
     change(&mut silent);
     (0..AFTER).for_each(|_| silent.step().unwrap());
@@ -124,12 +125,12 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     assert_eq!((silent.state(), silent.statistics()), (plain.state(), plain.statistics()));
 
     // Restored into itself, into one of other settings that never saw the run, and as a copy.
-    let stranger = Simulation::new(&crate::common::scene("spcmm", &[])).unwrap();
+    let stranger = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();
     let now = {
         plain.restore(&snapshot);
         look(&mut plain)
     };
-    for mut other in [plain, stranger, Simulation::of(&snapshot)] {
+    for mut other in [plain, stranger, LiveScene::of(&snapshot)] {
         other.restore(&snapshot);
         other.take_peaks(&mut again);
         assert_eq!(again, peaks);
@@ -137,7 +138,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
         assert!(go_on(&mut other) == first, "restored");
     }
     // From a file.
-    let mut later = Simulation::new(scene).unwrap();
+    let mut later = LiveScene::new(scene).unwrap();
     later.go_on_from(&serde_json::from_str(&saved).unwrap()).unwrap();
     assert_eq!(later.state_hash(), here.0, "read again");
     change(&mut later);
@@ -234,14 +235,14 @@ fn a_state_is_restored_where_no_start_would_be_accepted() {
     for (joint, text) in eccentric() {
         for way in four_ways() {
             let scene = parse(&text, &way.changes());
-            let mut simulation = Simulation::new(&scene).unwrap();
+            let mut simulation = LiveScene::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
             simulation.set(&format!("joint.{joint}.clearance"), "0.05 mm").unwrap();
-            assert!(Simulation::new(simulation.running_scene()).is_err(), "{joint}, {way}");
+            assert!(LiveScene::new(simulation.running()).is_err(), "{joint}, {way}");
             simulation.advance_to(4e-3).unwrap();
             let snapshot = simulation.snapshot();
             let first = go_on(&mut simulation);
-            let mut other = Simulation::new(&scene).unwrap();
+            let mut other = Simulation::new(&scene.machine).unwrap();
             for target in [&mut simulation, &mut other] {
                 target.restore(&snapshot);
                 assert!(go_on(target) == first, "{joint}, {way}");
@@ -252,7 +253,7 @@ fn a_state_is_restored_where_no_start_would_be_accepted() {
 
 #[test]
 fn what_waits_in_a_snapshot_takes_effect_at_the_reset_of_a_copy() {
-    let mut simulation = crate::common::simulation("spcmm", &[]);
+    let mut simulation = crate::common::live("spcmm", &[]);
     run_until(&mut simulation, 0.05);
     simulation.set("contact.clearance", "0.1 mm").unwrap();
     simulation.set("spcmm.frequency", "1 Hz").unwrap();
@@ -260,11 +261,11 @@ fn what_waits_in_a_snapshot_takes_effect_at_the_reset_of_a_copy() {
     run_until(&mut simulation, 0.06);
     let clearance = frame_now(&mut simulation).joints[0].clearance;
     assert!(clearance > 0.1e-3 && clearance < 0.3e-3, "{clearance}");
-    let mut fresh = Simulation::new(&scene("spcmm", &[])).unwrap();
+    let mut fresh = LiveScene::new(&scene("spcmm", &[])).unwrap();
     fresh.restore(&simulation.snapshot());
-    assert_eq!(fresh.running_scene().contact.friction, 0.3);
+    assert_eq!(fresh.running().machine.contact.friction, 0.3);
     fresh.reset().unwrap();
-    assert_eq!(fresh.scene().spcmm.unwrap().frequency, 1.0);
-    assert_eq!(fresh.running_scene().spcmm.unwrap().frequency, 1.0);
+    assert_eq!(fresh.pending().machine.spcmm.unwrap().frequency, 1.0);
+    assert_eq!(fresh.running().machine.spcmm.unwrap().frequency, 1.0);
     assert_eq!(frame_now(&mut fresh).joints[0].clearance, 0.1e-3);
 }

@@ -5,8 +5,9 @@ use std::sync::LazyLock;
 
 use crate::common::invariants::finite;
 use crate::common::{METHODS, SCENES};
-use jointplay::scene::{BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table};
-use jointplay::simulate::{Doubt, Frame, Simulation};
+use jointplay::machine::Doubt as MachineDoubt;
+use jointplay::scene::{BUILT_IN, Kind, LiveScene, Parameter, Scene, Scope, Value, table};
+use jointplay::simulate::{Doubt, Frame};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError};
 
@@ -69,7 +70,7 @@ fn rows() -> impl Strategy<Value = &'static Parameter> {
 /// A row of the table that `scene` has, as a key: of all joints, or of one of them.
 fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
     // Twice in three of all.
-    let joints = &scene.ball_joints;
+    let joints = &scene.machine.ball_joints;
     match parameter.key.strip_prefix("contact.") {
         Some(part) if joint.is_multiple_of(3) => {
             format!("joint.{}.{part}", joints[joint / 3 % joints.len()].name)
@@ -136,7 +137,7 @@ fn mixed() -> impl Strategy<Value = Mixed> {
             if scene == "chain" {
                 changes.push(("chain.links".to_owned(), "3".to_owned()));
             }
-            let names = Scene::load(scene, &changes).unwrap().ball_joints;
+            let names = Scene::load(scene, &changes).unwrap().machine.ball_joints;
             for (joint, clearance) in names.iter().zip(&joints) {
                 let key = format!("joint.{}.clearance", joint.name);
                 let value = clearance.map_or("0".to_owned(), |c| format!("{c:.4} mm"));
@@ -163,10 +164,10 @@ proptest! {
             Ok(scene) => scene,
             Err(error) => return is_clear(&error.to_string(), &mixed.changes),
         };
-        let (Ok(mut plain), Ok(mut sampled)) = (Simulation::new(&scene), Simulation::new(&scene)) else {
+        let (Ok(mut plain), Ok(mut sampled)) = (LiveScene::new(&scene), LiveScene::new(&scene)) else {
             return Ok(());
         };
-        let joints = scene.ball_joints.len();
+        let joints = scene.machine.ball_joints.len();
         let mut frame = Frame::default();
         let (mut rows, mut impacts) = (vec![0.0_f64; joints], Vec::new());
         while plain.time() < 0.012 && plain.step().is_ok() {
@@ -183,10 +184,10 @@ proptest! {
         }
         prop_assert_eq!(plain.state_hash(), sampled.state_hash());
         let statistics = plain.statistics();
-        let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Scene(SceneDoubt::Step { .. }));
+        let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Machine(MachineDoubt::Step { .. }));
         // What happens within a step that is longer than an impact is a matter of interpolation, and marked.
         let resolved = !plain.doubts().iter().any(unresolved);
-        for (j, joint) in scene.ball_joints.iter().enumerate() {
+        for (j, joint) in scene.machine.ball_joints.iter().enumerate() {
             let (row, name) = (rows[j], &joint.name);
             // What a run prints after its rows, and what a sweep, which has none, prints.
             let (printed, found) = (sampled.peak(j).0, statistics.peak_normal[j]);
@@ -229,10 +230,10 @@ proptest! {
                 prop_assert_eq!(row.read(text), Ok(value), "{} = {}", key, text);
             }
         }
-        prop_assert!(scene.warnings().iter().all(|warning| warning.to_string().ends_with('.')));
-        let mut simulation = match Simulation::new(&scene) {
+        prop_assert!(scene.machine.warnings().iter().all(|warning| warning.to_string().ends_with('.')));
+        let mut simulation = match LiveScene::new(&scene) {
             Ok(simulation) => simulation,
-            Err(error) => return is_clear(&error.located(&scene).to_string(), &changes),
+            Err(error) => return is_clear(&scene.locate(&error).to_string(), &changes),
         };
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
@@ -261,7 +262,7 @@ proptest! {
 
     #[test]
     fn any_changes_of_a_running_scene_are_taken_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
-        let mut simulation = Simulation::new(built_in(name)).unwrap();
+        let mut simulation = LiveScene::new(built_in(name)).unwrap();
         // Somewhere in the first impacts.
         simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;
         let mut frame = Frame::default();
@@ -284,12 +285,12 @@ proptest! {
         }
         // What waited for a reset takes effect, or says why not; what ran goes on.
         let time = simulation.time();
-        let scene = simulation.scene().clone();
+        let scene = simulation.pending().clone();
         match simulation.reset() {
             Ok(()) => prop_assert_eq!(simulation.time(), 0.0),
             Err(error) => {
                 prop_assert_eq!(simulation.time(), time);
-                is_clear(&error.located(&scene).to_string(), &changes)?;
+                is_clear(&scene.locate(&error).to_string(), &changes)?;
             }
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::common::matrix::FORMULATIONS;
 use crate::common::{parse, scene};
-use jointplay::scene::{JointKind, Scene, Vec3};
+use jointplay::machine::{JointKind, Vec3};
+use jointplay::scene::Scene;
 use jointplay::simulate::{BodyMotion, Frame, Simulation};
 
 /// A frame that asks for reactions.
@@ -46,7 +47,7 @@ fn the_pin_of_a_pendulum_bears_weight_and_centrifugal_force() {
     let start = 20_f64.to_radians();
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
-        let mut simulation = Simulation::new(&parse(&text, &changes)).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &changes).machine).unwrap();
         for time in [0.0, 0.1, 0.23, 0.4] {
             let frame = at(&mut simulation, time);
             // The angle by which it hangs below the horizontal, with the right-hand rule about y.
@@ -78,7 +79,7 @@ fn a_slide_bears_what_is_across_it() {
         body("box", "")
     );
     for formulation in FORMULATIONS {
-        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)]).machine).unwrap();
         for time in [0.0, 0.3] {
             let frame = at(&mut simulation, time);
             let [force, torque] = reaction(&frame, 0);
@@ -103,7 +104,7 @@ fn a_driven_crank_is_held_and_turned() {
         body("weight", "centre = \"0 0 20 mm\"")
     );
     for formulation in FORMULATIONS {
-        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)])).unwrap();
+        let mut simulation = Simulation::new(&parse(&text, &[("formulation", formulation)]).machine).unwrap();
         for time in [0.0, 0.011, 0.05] {
             let frame = at(&mut simulation, time);
             let turn = frame.bodies[0].rotation;
@@ -130,9 +131,10 @@ fn a_driven_crank_is_held_and_turned() {
 fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
     let centre = |b: usize| {
         let m = &frame.bodies[b];
-        m.position + m.rotation * scene.bodies[b].centre
+        m.position + m.rotation * scene.machine.bodies[b].centre
     };
     let mut left: Vec<[Vec3; 2]> = scene
+        .machine
         .bodies
         .iter()
         .zip(&frame.bodies)
@@ -141,7 +143,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
             let (w, alpha) = (m.angular_velocity, m.angular_acceleration);
             let acceleration = m.acceleration + alpha.cross(&arm) + w.cross(&w.cross(&arm));
             let inertia = m.rotation * body.inertia * m.rotation.transpose();
-            [body.mass * (acceleration - scene.gravity), inertia * alpha + w.cross(&(inertia * w))]
+            [body.mass * (acceleration - scene.machine.gravity), inertia * alpha + w.cross(&(inertia * w))]
         })
         .collect();
     let mut push = |body: Option<usize>, point: Vec3, force: Vec3, torque: Vec3| {
@@ -150,7 +152,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
             left[b][1] -= torque + (point - centre(b)).cross(&force);
         }
     };
-    let holding = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+    let holding = scene.machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
     for (i, joint) in holding.enumerate() {
         let [force, torque] = reaction(frame, i);
         let m = &frame.bodies[joint.child];
@@ -158,12 +160,12 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
         push(Some(joint.child), point, force, torque);
         push(joint.parent, point, -force, -torque);
     }
-    for (joint, report) in scene.ball_joints.iter().zip(&frame.joints) {
+    for (joint, report) in scene.machine.ball_joints.iter().zip(&frame.joints) {
         let force = report.normal_force + report.friction_force;
         push(joint.ball.body, report.contact_point, force, Vec3::zeros());
         push(joint.socket.body, report.contact_point, -force, Vec3::zeros());
     }
-    for (element, report) in scene.elements.iter().zip(&frame.elements) {
+    for (element, report) in scene.machine.elements.iter().zip(&frame.elements) {
         let torque = report.torque.unwrap_or_else(Vec3::zeros);
         match &element.points[..] {
             [only] => push(only.body, report.points[1], report.force, torque),
@@ -210,12 +212,12 @@ fn with_them_every_body_obeys_newton_and_euler() {
     for formulation in FORMULATIONS {
         let changes = [("formulation", formulation), ("solver.tolerance", "1e-11")];
         let scene = parse(&text, &changes);
-        let mut simulation = Simulation::new(&scene).unwrap();
+        let mut simulation = Simulation::new(&scene.machine).unwrap();
         for time in [0.0, 0.07, 0.2] {
             let frame = at(&mut simulation, time);
             assert_eq!(frame.reactions.as_ref().map(Vec::len), Some(4));
             for (b, left) in unbalanced(&scene, &frame).into_iter().enumerate() {
-                let name = &scene.bodies[b].name;
+                let name = &scene.machine.bodies[b].name;
                 assert!(left[0].norm() < 1e-9 && left[1].norm() < 1e-9, "{formulation} {time} {name}: {left:?}");
             }
             found.push(frame);
@@ -238,7 +240,7 @@ fn contacts_load_them_too() {
         for formulation in FORMULATIONS {
             let changes = [("formulation", formulation), ("solver.method", "dopri5"), ("solver.tolerance", "1e-8")];
             let scene = scene(name, &changes);
-            let mut simulation = Simulation::new(&scene).unwrap();
+            let mut simulation = Simulation::new(&scene.machine).unwrap();
             let mut touched = false;
             for n in 0..4 {
                 simulation.advance_to(0.01 * f64::from(n)).unwrap();
@@ -246,8 +248,8 @@ fn contacts_load_them_too() {
                 let frame = at(&mut simulation, time);
                 touched |= frame.joints.iter().any(|joint| joint.normal_force.norm() > 1.0);
                 for (b, left) in unbalanced(&scene, &frame).into_iter().enumerate() {
-                    let body = &scene.bodies[b].name;
-                    let size = scene.bodies[b].mass * 1e3;
+                    let body = &scene.machine.bodies[b].name;
+                    let size = scene.machine.bodies[b].mass * 1e3;
                     assert!(left[0].norm() < 1e-9 * size, "{name} {formulation} {time} {body}: {left:?}");
                 }
             }

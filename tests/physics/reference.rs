@@ -9,7 +9,7 @@ fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
 }
 
 fn simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
-    Simulation::new(&scene(name, changes)).unwrap()
+    Simulation::new(&scene(name, changes).machine).unwrap()
 }
 
 /// Rows of a file in `tests/reference/`: 16 columns.
@@ -178,8 +178,8 @@ fn free_slider_crank_passes_through_its_anchors_and_keeps_its_energy() {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let energy = frame.kinetic + frame.potential;
-    let crank = simulation.scene().bodies.iter().position(|b| b.name == "crank").unwrap();
-    let slider = simulation.scene().bodies.iter().position(|b| b.name == "slider").unwrap();
+    let crank = simulation.machine().bodies.iter().position(|b| b.name == "crank").unwrap();
+    let slider = simulation.machine().bodies.iter().position(|b| b.name == "slider").unwrap();
     for (time, theta, theta_rate, x) in
         [(0.1, 0.55187518, None, 0.22636019), (0.2, 1.23040441, Some(8.77212174), 0.26052243)]
     {

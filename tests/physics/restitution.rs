@@ -1,8 +1,8 @@
 //! The restitution check: each impact says what was asked for, what its law gives, and what it really gave.
 
-use crate::common::{Changes, METHODS, parse, simulation};
+use crate::common::{Changes, METHODS, live, parse, simulation};
 use jointplay::contact::{NormalLaw, damping_factor, undisturbed_restitution};
-use jointplay::scene::built_in_text;
+use jointplay::scene::{LiveScene, built_in_text};
 use jointplay::simulate::{Doubt, Impact, Simulation};
 
 /// All impacts that finish before `end`, taken step by step.
@@ -20,14 +20,14 @@ fn of(name: &str, changes: &Changes, end: f64) -> Vec<Impact> {
 }
 
 /// The pendulum's rod flung along its axis without gravity or friction: nothing but the law of its one contact acts.
-fn flung(changes: &Changes) -> Simulation {
+fn flung(changes: &Changes) -> LiveScene {
     let text = built_in_text("pendulum").unwrap();
     let start = "rotation = { axis = [0, 1, 0], angle = \"-30 deg\" }";
     assert!(text.contains(start));
     let text = text.replace(start, "velocity = \"0 0 -0.1 m/s\"");
     let mut all = vec![("gravity.z", "0"), ("contact.friction", "0")];
     all.extend(changes);
-    Simulation::new(&parse(&text, &all)).unwrap()
+    LiveScene::new(&parse(&text, &all)).unwrap()
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn methods_agree_about_the_first_impacts() {
 #[test]
 fn a_live_change_disturbs_an_impact_or_ends_it() {
     let until_touching = || {
-        let mut simulation = simulation("pendulum", &[]);
+        let mut simulation = live("pendulum", &[]);
         while !simulation.contact_memory(0).active {
             simulation.step().unwrap();
         }
@@ -169,14 +169,14 @@ fn a_live_change_disturbs_an_impact_or_ends_it() {
 
 #[test]
 fn the_latest_are_kept_all_can_be_taken_and_snapshots_hold_them() {
-    let mut simulation = simulation("chain", &[]);
+    let mut simulation = live("chain", &[]);
     let mut taken = Vec::new();
     while taken.len() < 150 {
         simulation.step().unwrap();
         simulation.take_impacts(&mut taken);
     }
     let begun: u64 = simulation.statistics().impacts.iter().sum();
-    let joints = simulation.scene().ball_joints.len();
+    let joints = simulation.machine().ball_joints.len();
     let touching = (0..joints).filter(|&j| simulation.contact_memory(j).active);
     assert_eq!(begun as usize, taken.len() + touching.count());
     let latest: Vec<Impact> = simulation.impacts().copied().collect();
@@ -185,8 +185,8 @@ fn the_latest_are_kept_all_can_be_taken_and_snapshots_hold_them() {
     assert!(taken.windows(2).all(|pair| pair[0].end <= pair[1].end));
 
     let snapshot = simulation.snapshot();
-    let go_on = |simulation: &mut Simulation| {
-        let end = simulation.running_scene().solver.step * 2000.0 + simulation.time();
+    let go_on = |simulation: &mut LiveScene| {
+        let end = simulation.machine().solver.step * 2000.0 + simulation.time();
         let mut more = Vec::new();
         while simulation.time() < end {
             simulation.step().unwrap();
@@ -205,7 +205,7 @@ fn the_latest_are_kept_all_can_be_taken_and_snapshots_hold_them() {
 
 /// The pendulum's rod upright, its ball about to touch the bottom of its socket at 2 mm/s, and then under a hundred times its
 /// weight: what a blow by a neighbour does to a joint that touches softly.
-fn struck(method: &str, approach_speed: &str) -> Simulation {
+fn struck(method: &str, approach_speed: &str) -> LiveScene {
     let text = built_in_text("pendulum").unwrap();
     let start = "position = [0, 0, 0]\nrotation = { axis = [0, 1, 0], angle = \"-30 deg\" }";
     assert!(text.contains(start));
@@ -218,7 +218,7 @@ fn struck(method: &str, approach_speed: &str) -> Simulation {
         ("solver.step", "0.2 us"),
         ("solver.tolerance", "1e-9"),
     ];
-    let mut simulation = Simulation::new(&parse(&text.replace(start, touching), &changes)).unwrap();
+    let mut simulation = LiveScene::new(&parse(&text.replace(start, touching), &changes)).unwrap();
     while !simulation.contact_memory(0).active {
         simulation.step().unwrap();
     }
@@ -230,8 +230,8 @@ fn struck(method: &str, approach_speed: &str) -> Simulation {
 /// Returns the largest force and the largest damping over elastic force of the first 200 us.
 fn blow(largest: bool) -> (f64, f64) {
     let scene = crate::common::scene("pendulum", &[]);
-    let c = jointplay::contact::Coefficients::new(&scene.contact, scene.contact.clearance);
-    let (mass, g, h) = (scene.bodies[0].mass, 981.0, 1e-9);
+    let c = jointplay::contact::Coefficients::new(&scene.machine.contact, scene.machine.contact.clearance);
+    let (mass, g, h) = (scene.machine.bodies[0].mass, 981.0, 1e-9);
     let (mut x, mut v, mut v0) = (0.0_f64, 2e-3_f64, 2e-3_f64);
     let (mut force, mut ratio) = (0.0_f64, 0.0_f64);
     for _ in 0..200_000 {

@@ -36,7 +36,7 @@ fn a_resumed_implicit_run_gives_the_same_bits() {
         simulation.restore(&snapshot);
         simulation.advance_to(0.4).unwrap();
         assert_eq!(simulation.state_hash(), expected, "{method}");
-        let mut fresh = Simulation::new(simulation.running_scene()).unwrap();
+        let mut fresh = Simulation::new(simulation.machine()).unwrap();
         fresh.restore(&snapshot);
         fresh.advance_to(0.4).unwrap();
         assert_eq!(fresh.state_hash(), expected, "{method}, fresh");
@@ -60,6 +60,6 @@ fn both_formulations_settle_alike_under_the_implicit_method() {
 #[test]
 fn a_scene_too_large_for_a_dense_matrix_is_refused_by_name() {
     let scene = crate::common::scene("chain", &[("chain.links", "200"), ("solver.method", "radau5")]);
-    let error = Simulation::new(&scene).err().unwrap().to_string();
+    let error = Simulation::new(&scene.machine).err().unwrap().to_string();
     assert!(error.contains("1200 velocity coordinates") && error.contains("automatic"), "{error}");
 }

@@ -1,11 +1,12 @@
 //! `start = "settled"`: balls begin where the machine without play presses them.
 
 use crate::common::{frame_now, scene};
-use jointplay::scene::{BallJoint, Scene, StartRule};
+use jointplay::machine::{BallJoint, StartRule};
+use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
 fn started(name: &str, changes: &[(&str, &str)]) -> Simulation {
-    Simulation::new(&scene(name, changes)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    Simulation::new(&scene(name, changes).machine).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 /// Reactions of the ball joints of the scene without play, N.
@@ -25,7 +26,7 @@ fn every_contact_begins_with_the_force_of_the_ideal_joint() {
             let mut simulation = started(name, &changes);
             let frame: Frame = frame_now(&mut simulation);
             let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
-            let loose = simulation.scene().ball_joints.iter().filter(loose).count();
+            let loose = simulation.machine().ball_joints.iter().filter(loose).count();
             let touching = frame.joints.iter().filter(|joint| joint.penetration > 0.0);
             assert_eq!(touching.count(), loose, "{name}");
             for (joint, ideal) in frame.joints.iter().zip(reactions(name)) {
@@ -46,7 +47,7 @@ fn a_settled_start_does_not_drop() {
             let changes = [("start", start), ("contact.friction", "0")];
             let mut simulation = started(name, &changes);
             simulation.advance_to(0.02).expect("runs");
-            let peaks = (0..simulation.scene().ball_joints.len()).map(|j| {
+            let peaks = (0..simulation.machine().ball_joints.len()).map(|j| {
                 let (force, _) = simulation.peak(j);
                 force
             });
@@ -65,11 +66,11 @@ fn a_hanging_pendulum_hangs_from_the_wall() {
     let scene = Scene::parse(text, None, &[]).expect("reads");
     let mut scene = scene;
     scene.set("start", "settled").expect("a choice");
-    assert_eq!(scene.start, StartRule::Settled);
-    let mut simulation = Simulation::new(&scene).expect("starts");
+    assert_eq!(scene.machine.start, StartRule::Settled);
+    let mut simulation = Simulation::new(&scene.machine).expect("starts");
     let frame = frame_now(&mut simulation);
     let joint = &frame.joints[0];
-    let contact = &scene.ball_joints[0].contact;
+    let contact = &scene.machine.ball_joints[0].contact;
     // Hertz: F = K delta^1.5, the force the ideal joint's.
     let stiffness = jointplay::contact::Coefficients::new(contact, contact.clearance).stiffness;
     let depth = (reactions("pendulum")[0] / stiffness).powf(2.0 / 3.0);

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use crate::common::matrix::for_every;
 use crate::common::{FOUR_WAYS, parse};
 use crate::elements::at;
+use jointplay::machine::{Elastic, ElementKind};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 
@@ -71,7 +72,7 @@ impl On {
     }
 
     fn starts(self, points: &[[f64; 2]], more: &str, changes: &[(&str, &str)]) -> Simulation {
-        Simulation::new(&parse(&self.text(points, more), changes)).unwrap()
+        Simulation::new(&parse(&self.text(points, more), changes).machine).unwrap()
     }
 
     /// Coordinate from where the spring is unstretched, and its rate.
@@ -170,7 +171,7 @@ fn points_on_a_line_are_the_spring_of_that_line() {
             let plain = format!("{}{keys}{}", &text[..from], &text[to..]);
             let [mut a, mut b] = [&text, &plain].map(|text| {
                 let scene = parse(text, &[("solver.tolerance", "1e-10")]);
-                Simulation::new(&scene).unwrap()
+                Simulation::new(&scene.machine).unwrap()
             });
             let offset = at(&mut a, 0.0).elastic - at(&mut b, 0.0).elastic;
             for n in 1..20 {
@@ -194,7 +195,7 @@ fn a_buffer_that_only_pushes_gives_back_what_it_took() {
         characteristic = [[\"-50 mm\", \"-200 N\"], [\"-30 mm\", \"-40 N\"], [\"-10 mm\", \"-5 N\"], [0, 0], [\"10 mm\", \"4 N\"]]\n";
     for (method, formulation) in FOUR_WAYS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
-        let mut simulation = Simulation::new(&parse(text, &changes)).unwrap();
+        let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         let mut highest = 0.0_f64;
         let energy = at(&mut simulation, 0.0);
         let whole = energy.elastic + 0.5 * 9.81 * 0.06;
@@ -223,8 +224,11 @@ fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
     let coil = folder.path().join("coil.csv");
     std::fs::write(&coil, "# measured\nlength_mm, tension [N]\n0, 0\n100, 10\n200, 40\n").unwrap();
     let scene = Scene::load(&scene, &[]).unwrap();
-    assert_eq!(scene.elements[0].curve.as_deref(), Some(&POINTS[..]));
-    let mut simulation = Simulation::new(&scene).unwrap();
+    let ElementKind::Spring(spring) = &scene.machine.elements[0].kind else {
+        panic!("a spring");
+    };
+    assert_eq!(spring.elastic, Elastic::Curve(POINTS.to_vec()));
+    let mut simulation = Simulation::new(&scene.machine).unwrap();
     let (passes, _) = passes();
     assert!(On::Body.state(&at(&mut simulation, passes))[0].abs() < 1e-4);
 }

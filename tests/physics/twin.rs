@@ -49,7 +49,7 @@ fn contacts_follow_the_displacement_and_keep_their_memory() {
     moved(&mut simulation, 0, -5e-5);
     assert!(memory(&simulation).iter().all(|m| !m.active));
     moved(&mut simulation, 0, 5e-5);
-    let floor = simulation.running_scene().contact.impact_speed_floor;
+    let floor = simulation.machine().contact.impact_speed_floor;
     for m in memory(&simulation) {
         assert!(m.active && m.approach_speed >= floor);
     }
@@ -138,7 +138,7 @@ fn sections_are_those_of_the_run_without_a_twin() {
     let plain = sections(false);
     assert_eq!(plain, sections(true));
     // And they lie at the drive phase: the machine stands where it stands at 6 s.
-    let mut simulation = Simulation::new(&scene).unwrap();
+    let mut simulation = Simulation::new(&scene.machine).unwrap();
     for end in [2.0, 4.0, 6.0] {
         run_until(&mut simulation, end);
     }

@@ -4,7 +4,7 @@ use crate::common::matrix::{FORMULATIONS, every_way};
 use crate::common::{frame_now, slope};
 use crate::elements::at;
 use crate::joint_elements::started;
-use jointplay::scene::{Quat, Vec3};
+use jointplay::machine::{Quat, Vec3};
 use jointplay::simulate::Frame;
 
 pub const G: f64 = 9.81;

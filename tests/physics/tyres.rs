@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use crate::common::matrix::for_every;
 use crate::common::{FOUR_WAYS, parse};
 use crate::elements::at;
-use jointplay::scene::{Scene, Vec3};
-use jointplay::simulate::{Frame, Simulation};
+use jointplay::machine::Vec3;
+use jointplay::scene::{LiveScene, Scene};
+use jointplay::simulate::Frame;
 
 const MASS: f64 = 20.0;
 const STIFFNESS: f64 = 50e3;
@@ -26,8 +27,8 @@ fn wheel(height: f64, tyre: &str) -> String {
     )
 }
 
-fn started(text: &str, changes: &[(&str, &str)]) -> Simulation {
-    Simulation::new(&parse(text, changes)).unwrap()
+fn started(text: &str, changes: &[(&str, &str)]) -> LiveScene {
+    LiveScene::new(&parse(text, changes)).unwrap()
 }
 
 /// Height from that at rest on level ground of a wheel with `damping` on a ground a sin(w t), started at rest there.

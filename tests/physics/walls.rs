@@ -1,10 +1,11 @@
 //! Contacts that begin where no sign changes: a ball that starts on its wall, or is there exactly where a search ends a piece.
 
 use crate::common::{free_ball, parse};
+use jointplay::scene::LiveScene;
 use jointplay::simulate::{Impact, Simulation};
 
 fn impacts_of(text: &str, changes: &[(&str, &str)], duration: f64) -> (Simulation, Vec<Impact>) {
-    let mut simulation = Simulation::new(&parse(text, changes)).expect("starts");
+    let mut simulation = Simulation::new(&parse(text, changes).machine).expect("starts");
     let mut impacts = Vec::new();
     while simulation.time() < duration {
         simulation.step_until(duration).expect("runs");
@@ -68,7 +69,7 @@ fn a_contact_begins_where_a_step_or_a_change_ends_on_the_wall() {
     let (_, impacts) = impacts_of(&text, &fixed, 2e-3);
     assert_eq!(impacts[0].approach_speed, 0.25);
     let mut simulation =
-        Simulation::new(&parse(&free_ball(0.0, 0.25, 0.0, r#"clearance = "1 mm""#), &[])).expect("starts");
+        LiveScene::new(&parse(&free_ball(0.0, 0.25, 0.0, r#"clearance = "1 mm""#), &[])).expect("starts");
     simulation.step_until(2f64.powi(-12)).expect("runs");
     simulation.set("contact.clearance", &format!("{play} mm")).expect("a change");
     let mut impacts = Vec::new();

@@ -1,12 +1,13 @@
 //! Wear maps: what the cells took adds up to what the run did, lies where it did it, and changes nothing.
 
-use crate::common::{Changes, METHODS, SCENES, run_until, simulation};
-use jointplay::scene::Mat3;
+use crate::common::{Changes, METHODS, SCENES, live, run_until, simulation};
+use jointplay::machine::Mat3;
+use jointplay::scene::LiveScene;
 use jointplay::simulate::{Cell, Frame, Simulation, Wear};
 
 /// A run over `duration` with its map; the last step is cut.
-fn after(name: &str, changes: &Changes, duration: f64) -> Simulation {
-    let mut simulation = simulation(name, changes);
+fn after(name: &str, changes: &Changes, duration: f64) -> LiveScene {
+    let mut simulation = live(name, changes);
     simulation.keep_wear();
     run_until(&mut simulation, duration);
     simulation.commit_wear();
@@ -118,14 +119,14 @@ fn a_cell_lies_where_the_ball_touches() {
         simulation.advance_to(0.5).unwrap();
         simulation.keep_wear();
         let (empty, mut frame) = (wear(&simulation).clone(), Frame::default());
-        let joints = simulation.scene().ball_joints.len();
+        let joints = simulation.machine().ball_joints.len();
         let mut expected = vec![vec![0.0; empty.grid().cells()]; joints];
         while simulation.time() < 0.6 {
             simulation.step().unwrap();
             simulation.sample(simulation.time(), &mut frame);
             let h = simulation.time() - simulation.step_start();
-            let scene = simulation.scene().clone();
-            for (j, joint) in scene.ball_joints.iter().enumerate() {
+            let machine = simulation.machine().clone();
+            for (j, joint) in machine.ball_joints.iter().enumerate() {
                 let turn = match joint.socket.body {
                     Some(b) => frame.bodies[b].rotation,
                     None => Mat3::identity(),

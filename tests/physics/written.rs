@@ -3,11 +3,12 @@
 
 use crate::common::invariants::finite;
 use crate::properties::config;
+use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::{
-    ABOVE_ZERO, Absent, Dimension, ELEMENT_KINDS, FileKey, FileTable, Quat, Scene, SceneError, Takes, Texts, Vec3,
-    file_tables, si_unit,
+    ABOVE_ZERO, Absent, FileKey, FileTable, Scene, SceneError, Takes, Texts, file_tables, is_element,
 };
 use jointplay::simulate::{Frame, Simulation};
+use jointplay::units::{Dimension, si_unit};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -123,10 +124,10 @@ fn runs(text: &str) -> Result<(), TestCaseError> {
     };
     let saved = scene.to_toml();
     prop_assert_eq!(saved.as_deref(), Ok(text));
-    let mut simulation = match Simulation::new(&scene) {
+    let mut simulation = match Simulation::new(&scene.machine) {
         Ok(simulation) => simulation,
         Err(error) => {
-            prop_assert!(!error.located(&scene).to_string().contains("NaN"));
+            prop_assert!(!scene.locate(&error).to_string().contains("NaN"));
             return Ok(());
         }
     };
@@ -153,20 +154,22 @@ fn built(text: &str, files: &Texts) -> String {
 
 /// A force element with any values, on a slide or a hinge.
 fn elements() -> impl Strategy<Value = String> {
-    (0..ELEMENT_KINDS.len(), any::<bool>()).prop_flat_map(|(place, hinge)| {
-        let kind = &ELEMENT_KINDS[place];
+    let tables: Vec<&FileTable> = file_tables().into_iter().filter(|table| is_element(table)).collect();
+    (0..tables.len(), any::<bool>()).prop_flat_map(move |(place, hinge)| {
+        let table = tables[place];
+        let points = table.keys.iter().filter(|key| key.table().is_some_and(|of| of.name == "point"));
+        let points: Vec<&str> = points.map(|key| key.name).collect();
         // Of a number with another key on a hinge, the right one.
-        let other = kind.numbers.iter().filter_map(|number| {
-            let [here, there] = [hinge, !hinge].map(|hinge| number.on(hinge).0);
-            (here != there).then_some(there)
-        });
-        let skip: Vec<&str> = ["name"].into_iter().chain(kind.points.iter().copied()).chain(other).collect();
-        filled(rows(kind.section), None, hinge, &skip).prop_map(move |keys| {
+        let other = if hinge { "force" } else { "torque" };
+        let on_joint = table.key("joint", None).is_some();
+        let skip: Vec<&str> =
+            ["name"].into_iter().chain(points.iter().copied()).chain(on_joint.then_some(other)).collect();
+        filled(table, None, hinge, &skip).prop_map(move |keys| {
             let bodies = ["base", "rod"].into_iter().rev();
-            let points = kind.points.iter().zip(bodies);
+            let points = points.iter().zip(bodies);
             let point = |(key, body)| format!("{key} = {{ body = \"{body}\", at = \"0 0 10 mm\" }}\n");
             let points: String = points.map(point).collect();
-            let section = format!("\n[[{}]]\nname = \"e\"\n{points}{}\n", kind.section, keys.join("\n"));
+            let section = format!("\n[[{}]]\nname = \"e\"\n{points}{}\n", table.name, keys.join("\n"));
             machine(hinge, &section)
         })
     })
@@ -268,8 +271,8 @@ proptest! {
             list(along), list(centre), list(at)
         );
         let scene = Scene::parse(&text, None, &[]).unwrap();
-        prop_assert_eq!(scene.bodies.len(), count as usize);
-        let mut simulation = Simulation::new(&scene).unwrap();
+        prop_assert_eq!(scene.machine.bodies.len(), count as usize);
+        let mut simulation = Simulation::new(&scene.machine).unwrap();
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let [at, centre, along] = [at, centre, along].map(Vec3::from);
@@ -280,7 +283,7 @@ proptest! {
             prop_assert!((body.position - expected).norm() < 1e-12);
             let turned = body.rotation - turn.to_rotation_matrix().into_inner();
             prop_assert!(turned.amax() < 1e-12);
-            prop_assert_eq!(scene.bodies[k].mass, (k + 1) as f64);
+            prop_assert_eq!(scene.machine.bodies[k].mass, (k + 1) as f64);
         }
     }
 
@@ -325,7 +328,7 @@ proptest! {
                  shapes = [{{ form = \"{form}\", role = \"pin\", {geometry} }}]\n\
                  [[joint]]\nname = \"j\"\nkind = \"fixed\"\nchild = \"a\"\n"
             );
-            Scene::parse(&text, None, &[]).map(|scene| scene.bodies[0].clone())
+            Scene::parse(&text, None, &[]).map(|scene| scene.machine.bodies[0].clone())
         };
         let plain = body(density, [0.0; 3]).unwrap();
         let heavy = body(2.0 * density, [0.0; 3]).unwrap();

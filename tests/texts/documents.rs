@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jointplay::cli::{reference, schema};
-use jointplay::scene::{Role, Scene, Vec3, file_tables, reference_page};
+use jointplay::machine::{Role, Vec3};
+use jointplay::scene::{Scene, file_tables, reference_page};
 use jointplay::simulate::{Frame, Simulation};
 
 pub fn root() -> PathBuf {
@@ -57,7 +58,7 @@ fn every_example_of_the_page_of_scenes_runs() {
     assert!(examples.len() > 4);
     for text in examples {
         let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
-        let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let mut simulation = Simulation::new(&scene.machine).unwrap_or_else(|error| panic!("{error}"));
         let end = simulation.advance_to(0.05);
         end.unwrap_or_else(|error| panic!("{error}\n{text}"));
     }
@@ -92,10 +93,10 @@ fn the_schema_is_what_the_program_prints() {
 #[test]
 fn hinges_that_are_not_parallel_stand_where_the_page_says() {
     let scene = Scene::parse(&example("name = \"turn\""), None, &[]).expect("the example loads");
-    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
-    let arm = &frame.bodies[scene.bodies.iter().position(|body| body.name == "arm").unwrap()];
+    let arm = &frame.bodies[scene.machine.bodies.iter().position(|body| body.name == "arm").unwrap()];
     let tip = arm.position + arm.rotation * Vec3::new(0.0, 0.0, 0.1);
     let millimetres = |v: Vec3| {
         let part = |x: f64| format!("{}", (x * 1e4).round() / 10.0 + 0.0);
@@ -118,7 +119,7 @@ fn hinges_that_are_not_parallel_stand_where_the_page_says() {
 fn the_example_of_the_scene_format_runs() {
     let example = &example("name = \"rod\"\nmass = \"0.384 kg\"");
     let scene = Scene::parse(example, None, &[]).expect("the example loads");
-    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     simulation.advance_to(0.02).expect("the example runs");
     assert!(simulation.statistics().impacts[0] > 0, "a rod that is let go falls onto its socket");
 }
@@ -188,7 +189,7 @@ fn documents_name_files_that_exist() {
 #[test]
 fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
     let scene = Scene::parse(&example("name = \"s1\""), None, &[]).expect("the example loads");
-    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     // 105 mm long at the start: 5 N against a weight of 4.905 N.
@@ -203,7 +204,7 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
 #[test]
 fn the_wheel_of_the_page_rides_over_its_bump() {
     let scene = Scene::parse(&example("name = \"strut\""), None, &[]).expect("the example loads");
-    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
     let (mut highest, mut most, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
     while simulation.time() < 1.0 {
@@ -227,7 +228,7 @@ fn the_wheel_of_the_page_rides_over_its_bump() {
 #[test]
 fn the_flap_of_the_page_opens_against_its_stop_and_shuts() {
     let scene = Scene::parse(&example("name = \"flap\""), None, &[]).expect("the example loads");
-    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut simulation = Simulation::new(&scene.machine).expect("the example starts");
     let mut frame = Frame::default();
     let (mut widest, mut deepest, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);
     while simulation.time() < 1.0 {

@@ -1,6 +1,7 @@
 //! Joints of two degrees and joints that close loops, as a file gives them: what is refused says why and what is allowed.
 
-use jointplay::scene::{Freedom, JointKind, JointStart, Scene};
+use jointplay::machine::{Freedom, JointKind, JointStart};
+use jointplay::scene::Scene;
 
 /// An arm on a hinge, a rod that hangs free, and the joint `j` between them.
 fn text(joint: &str) -> String {
@@ -34,13 +35,13 @@ fn refused(text: &str, words: &[&str]) {
 #[test]
 fn a_joint_that_closes_a_loop_is_no_part_of_the_tree() {
     let scene = parse(&text("kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = true\n")).unwrap();
-    assert_eq!((scene.joints.len(), scene.closing_joints.len()), (2, 1));
-    let joint = &scene.closing_joints[0];
+    assert_eq!((scene.machine.joints.len(), scene.machine.closing_joints.len()), (2, 1));
+    let joint = &scene.machine.closing_joints[0];
     assert_eq!((joint.kind, joint.parent, joint.child), (JointKind::Revolute, Some(0), 1));
-    assert_eq!(scene.cut_joints().collect::<Vec<_>>(), ["j"]);
+    assert_eq!(scene.machine.cut_joints().collect::<Vec<_>>(), ["j"]);
     // Written out, the default.
     let hung = hung("kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = false\n");
-    assert_eq!(parse(&hung).unwrap().closing_joints.len(), 0);
+    assert_eq!(parse(&hung).unwrap().machine.closing_joints.len(), 0);
 }
 
 #[test]
@@ -49,12 +50,12 @@ fn start_values_of_two_degrees_are_keys() {
                  start = { angle = \"10 deg\", child_angular_velocity = \"60 rpm\" }\n";
     let mut scene = parse(&hung(joint)).unwrap();
     scene.set("joint.j.start.angle", "0.5 rad").unwrap();
-    let JointStart::Pair { position, velocity } = scene.joints[1].start else {
-        panic!("{:?}", scene.joints[1].start);
+    let JointStart::Pair { position, velocity } = scene.machine.joints[1].start else {
+        panic!("{:?}", scene.machine.joints[1].start);
     };
     assert_eq!(position, [0.5, 0.0]);
     assert!(velocity[0] == 0.0 && (velocity[1] - std::f64::consts::TAU).abs() < 1e-12);
-    assert_eq!(scene.joints[1].child_axis.as_slice(), [0.0, 0.0, 1.0]);
+    assert_eq!(scene.machine.joints[1].child_axis.as_slice(), [0.0, 0.0, 1.0]);
     let error = scene.set("joint.j.start.child_angle", "0.5 m").unwrap_err();
     assert!(error.to_string().contains("angle"), "{error}");
 }
@@ -123,13 +124,13 @@ fn drives_of_two_degrees_name_their_coordinates() {
     let turn = "{ law = \"constant\", velocity = \"3 rad/s\" }";
     let mut scene =
         parse(&hung(&format!("drive = {{ angle = {turn} }}\nstart = {{ velocity = \"1 m/s\" }}\n"))).unwrap();
-    let driven: Vec<_> = scene.driven().collect();
-    assert_eq!(driven, [(&scene.joints[1], Freedom::TurnOfSlide)]);
+    let driven: Vec<_> = scene.machine.driven().collect();
+    assert_eq!(driven, [(&scene.machine.joints[1], Freedom::TurnOfSlide)]);
     scene.set("joint.j.drive.angle.velocity", "4 rad/s").unwrap();
     scene.set("joint.j.start.velocity", "2 m/s").unwrap();
     let both = format!("drive = {{ angle = {turn}, position = {slide} }}\n");
     let scene = parse(&hung(&both)).unwrap();
-    assert!(scene.joints[1].is_prescribed() && scene.driven().count() == 2);
+    assert!(scene.machine.joints[1].is_prescribed() && scene.machine.driven().count() == 2);
     for (more, words) in [
         (format!("drive = {slide}\n"), ["joint.j.drive.law", "unknown key"]),
         (format!("drive = {{ angle = {slide} }}\n"), ["joint.j.drive.angle.velocity", "rad/s"]),

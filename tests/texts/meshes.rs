@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use jointplay::scene::{Geometry, LARGEST_MESH, Role, Scene, file_bytes};
+use jointplay::machine::{Geometry, Role};
+use jointplay::scene::{LARGEST_MESH, Scene, file_bytes};
 
 /// A body whose only shape is `shape`, with other keys.
 fn scene(shape: &str, keys: &str) -> String {
@@ -53,9 +54,9 @@ fn a_body_weighs_what_its_mesh_encloses() {
     let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
     let place = format!("{OBJ}, position = \"0 5 0 mm\", rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}");
     let scene = folder.read(&scene(&place, HEAVY)).unwrap();
-    let body = &scene.bodies[0];
+    let body = &scene.machine.bodies[0];
     assert!((body.mass - 0.012).abs() < 1e-12, "{}", body.mass);
-    let centre = jointplay::scene::Vec3::new(-0.01, 0.01, 0.015);
+    let centre = jointplay::machine::Vec3::new(-0.01, 0.01, 0.015);
     assert!((body.centre - centre).norm() < 1e-12, "{}", body.centre);
     let (x, y, z) = (20e-3_f64, 10e-3_f64, 30e-3_f64);
     let about = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| 0.012 * sum / 12.0);
@@ -97,7 +98,7 @@ fn a_mesh_that_does_not_fit_its_machine_is_warned_of_with_the_unit_that_does() {
     ] {
         let shape = format!("form = \"mesh\", file = \"{file}\", unit = \"{unit}\"");
         let read = folder.read(&(scene(&shape, keys) + rest)).unwrap();
-        let warnings: Vec<String> = read.warnings().iter().map(ToString::to_string).collect();
+        let warnings: Vec<String> = read.machine.warnings().iter().map(ToString::to_string).collect();
         match better {
             None => assert_eq!(warnings, [""; 0], "{file} {unit} {keys} {rest}"),
             Some(better) => {
@@ -107,7 +108,7 @@ fn a_mesh_that_does_not_fit_its_machine_is_warned_of_with_the_unit_that_does() {
         }
     }
     let two = format!("{OBJ} }}, {{ {OBJ}").replace("\"mm\"", "\"m\"");
-    let warnings = folder.read(&scene(&two, GIVEN)).unwrap().warnings();
+    let warnings = folder.read(&scene(&two, GIVEN)).unwrap().machine.warnings();
     assert!(warnings[0].to_string().contains(" (and 1 more): with the unit 1 m"), "{warnings:?}");
 }
 
@@ -122,9 +123,9 @@ fn a_mesh_is_read_once() {
     drop(folder);
     let source = &first.source;
     let again = Scene::parse_with(&source.text, Some("scene.toml"), &source.beside, &[]).unwrap();
-    assert_eq!(again.bodies, first.bodies);
+    assert_eq!(again.machine.bodies, first.machine.bodies);
     assert_eq!(first.to_toml().unwrap(), source.text);
-    let Geometry::Mesh { mesh, unit, .. } = &again.bodies[0].shapes[0].geometry else {
+    let Geometry::Mesh { mesh, unit, .. } = &again.machine.bodies[0].shapes[0].geometry else {
         panic!("a mesh");
     };
     assert_eq!((mesh.triangles().len(), *unit), (1, 1e-3));
@@ -135,7 +136,7 @@ fn shapes_of_one_file_share_its_triangles() {
     let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
     let shapes = format!("{OBJ} }}, {{ {OBJ}, position = \"1 0 0 m\"");
     let scene = folder.read(&scene(&shapes, GIVEN)).unwrap();
-    let meshes: Vec<_> = scene.bodies[0].shapes.iter().map(|shape| &shape.geometry).collect();
+    let meshes: Vec<_> = scene.machine.bodies[0].shapes.iter().map(|shape| &shape.geometry).collect();
     let [Geometry::Mesh { mesh: a, .. }, Geometry::Mesh { mesh: b, .. }] = meshes[..] else {
         panic!("two meshes");
     };
@@ -151,7 +152,7 @@ fn a_fixed_mesh_follows_a_pattern() {
         scene(OBJ, GIVEN)
     );
     let scene = folder.read(&text).unwrap();
-    let Geometry::Mesh { position, rotation, unit, .. } = scene.fixed_shapes[1].geometry else {
+    let Geometry::Mesh { position, rotation, unit, .. } = scene.machine.fixed_shapes[1].geometry else {
         panic!("a mesh");
     };
     assert!((position.x + 2.0).abs() < 1e-12 && (rotation.angle() - std::f64::consts::PI).abs() < 1e-12);
@@ -206,7 +207,7 @@ fn colours_are_read_and_refused() {
         Scene::parse(&scene(&shape, GIVEN), None, &[])
     };
     let read = sphere("#C2255c").unwrap();
-    assert_eq!(read.bodies[0].shapes[0].colour, Some([0xc2, 0x25, 0x5c]));
+    assert_eq!(read.machine.bodies[0].shapes[0].colour, Some([0xc2, 0x25, 0x5c]));
     for bad in ["red", "#12345", "#1234567", "#+12345", "#é2345", "123456", ""] {
         let error = sphere(bad).unwrap_err().to_string();
         assert!(error.contains("no colour; allowed `#` and six"), "{bad}: {error}");
@@ -232,9 +233,9 @@ fn without_a_role_a_shape_has_that_of_its_body() {
     text += &joint("base", "fixed", "");
     text += &joint("last", "revolute", axis);
     let scene = Scene::parse(&text, None, &[]).unwrap();
-    let roles = scene.body_roles();
+    let roles = scene.machine.body_roles();
     let of = |name: &str| {
-        let body = scene.bodies.iter().position(|body| body.name == name);
+        let body = scene.machine.bodies.iter().position(|body| body.name == name);
         roles[body.unwrap()]
     };
     let wanted = [

@@ -40,8 +40,8 @@ fn holds(case: &str, error: &SceneError, fragments: &[&str]) {
 #[test]
 fn the_unbroken_scene_is_read() {
     let scene = parse(GOOD).unwrap();
-    assert_eq!(scene.bodies[0].mass, 0.384);
-    assert_eq!(scene.ball_joints[0].overrides, ["restitution"]);
+    assert_eq!(scene.machine.bodies[0].mass, 0.384);
+    assert_eq!(scene.overrides(0), ["restitution"]);
 }
 
 #[test]
@@ -494,7 +494,7 @@ fn thousands_of_joints_that_differ_do_not_make_thousands_of_warnings() {
         let own = |n: usize| (format!("joint.J{n}.clearance"), format!("{n}e-9 m"));
         let mut changes = vec![("chain.links".to_owned(), links.to_string())];
         changes.extend((1..=links).map(own));
-        let warnings = Scene::load("chain", &changes).unwrap().warnings();
+        let warnings = Scene::load("chain", &changes).unwrap().machine.warnings();
         assert_eq!(warnings.len(), links.min(41), "{links}");
     }
 }

@@ -18,7 +18,7 @@ pub struct Beginning {
 impl Beginning {
     /// Of `simulation`, which is at its start and is run on.
     pub fn of(simulation: &mut Simulation) -> Self {
-        let joints = simulation.running_scene().ball_joints.len().max(1) as u64;
+        let joints = simulation.machine().ball_joints.len().max(1) as u64;
         while simulation.time() < LENGTH && simulation.statistics().evaluations < MOST_EVALUATIONS / joints {
             // Where it stops a run says why.
             if simulation.step_until(LENGTH).is_err() {

@@ -3,8 +3,9 @@
 use super::stretch::time_to;
 use super::{AnalysisError, RunContext, Setting, WorkBudget};
 use jointplay_physics::integrate::System as _;
+use jointplay_physics::machine::Preset;
 use jointplay_physics::mechanism::{Mechanism, Touching};
-use jointplay_physics::scene::{Preset, Scene};
+use jointplay_physics::scene::Scene;
 
 /// Preset used for the runs.
 const PRESET: Preset = Preset::Accurate;
@@ -103,7 +104,7 @@ fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunCo
     let mut simulation = setting.start(scene)?;
     simulation.advance_to(loaded)?;
     let (t, y) = (simulation.time(), simulation.state());
-    let mut mechanism = Mechanism::new(simulation.running_scene()).map_err(jointplay_physics::simulate::StartError)?;
+    let mut mechanism = Mechanism::new(simulation.machine()).map_err(jointplay_physics::simulate::StartError)?;
     // Starting it determines its rank.
     mechanism.start().map_err(jointplay_physics::simulate::StartError)?;
     let joints = 0..mechanism.contacts.len();

@@ -1,6 +1,7 @@
 //! The period of a scene's drives, and a running scene as an [`Orbit`].
 
 use super::orbit::Orbit;
+use jointplay_physics::machine::Machine;
 use jointplay_physics::mechanism::periods_of;
 use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Frame, Pose, Simulation, StartError, Stopped};
@@ -37,19 +38,25 @@ pub enum NoPeriod {
 /// # Errors
 /// A scene without a common period.
 pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
+    let name = || scene.name.clone();
+    let period = common_period(&scene.machine);
+    let period = period.map_err(|[first, second]| NoPeriod::Different { scene: name(), first, second })?;
+    period.ok_or_else(|| NoPeriod::None { scene: name() })
+}
+
+/// The same of a machine; `None` if nothing repeats.
+///
+/// # Errors
+/// Two periods that differ, s.
+pub fn common_period(machine: &Machine) -> Result<Option<f64>, [f64; 2]> {
     let mut period: Option<f64> = None;
-    for own in periods_of(scene) {
-        if !own.is_finite() {
-            continue;
-        }
+    for own in periods_of(machine).filter(|own| own.is_finite()) {
         match period {
-            Some(first) if (first / own - 1.0).abs() > 1e-12 => {
-                return Err(NoPeriod::Different { scene: scene.name.clone(), first, second: own });
-            }
+            Some(first) if (first / own - 1.0).abs() > 1e-12 => return Err([first, own]),
             _ => period = Some(own),
         }
     }
-    period.ok_or_else(|| NoPeriod::None { scene: scene.name.clone() })
+    Ok(period)
 }
 
 /// What a section of a scene records: pose and rates of the output body, named as in the rows of a run.
@@ -75,18 +82,18 @@ pub fn observed(pose: &Pose) -> [f64; 12] {
 }
 
 /// A running scene whose sections are the pose of its output body.
-pub struct Machine {
+pub struct ObservedRun {
     simulation: Simulation,
     frame: Frame,
 }
 
-impl Machine {
+impl ObservedRun {
     /// Starts `scene` at t = 0.
     ///
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        Ok(Self::resume(Simulation::new(scene)?))
+        Ok(Self::resume(Simulation::new(&scene.machine)?))
     }
 
     /// Continues a running simulation.
@@ -114,7 +121,7 @@ impl Machine {
 
 /// Why a machine cannot continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MachineError {
+pub enum ObservedError {
     /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
@@ -164,8 +171,7 @@ impl Orbit for Simulation {
 
     /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
     fn comparable(&self, twin: &Self) -> bool {
-        (0..self.running_scene().ball_joints.len())
-            .all(|j| self.contact_memory(j).active == twin.contact_memory(j).active)
+        (0..self.machine().ball_joints.len()).all(|j| self.contact_memory(j).active == twin.contact_memory(j).active)
     }
 
     fn observables(&self) -> usize {
@@ -180,18 +186,18 @@ impl Orbit for Simulation {
 }
 
 /// As its simulation, with room for what is observed.
-impl Orbit for Machine {
-    type Stop = MachineError;
+impl Orbit for ObservedRun {
+    type Stop = ObservedError;
 
     fn time(&self) -> f64 {
         self.simulation.time()
     }
 
-    fn step_until(&mut self, end: f64) -> Result<(), MachineError> {
+    fn step_until(&mut self, end: f64) -> Result<(), ObservedError> {
         Ok(self.simulation.step_until(end)?)
     }
 
-    fn step_beside(&mut self, other: &Self) -> Result<(), MachineError> {
+    fn step_beside(&mut self, other: &Self) -> Result<(), ObservedError> {
         Ok(self.simulation.step_beside(&other.simulation)?)
     }
 

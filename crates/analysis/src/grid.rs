@@ -5,7 +5,6 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use jointplay_physics::scene::{Kind, Scene, SceneError, Value, ValueError};
-use jointplay_physics::simulate::differs_in_conditions_alone;
 
 /// Points per block in a `follow` sweep: each block starts cold at its first point, so that neither threads nor shards
 /// affect which point continues from which.
@@ -190,7 +189,9 @@ impl ParameterRange {
             Some((parameter.at_reset, scene))
         };
         let ends = at(0).zip(at(self.count - 1));
-        ends.is_some_and(|((waits, first), (_, last))| waits && !differs_in_conditions_alone(&first, &last))
+        ends.is_some_and(|((waits, first), (_, last))| {
+            waits && !first.machine.differs_in_conditions_alone(&last.machine)
+        })
     }
 
     /// All values in order, SI.

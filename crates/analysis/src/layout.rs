@@ -100,12 +100,12 @@ impl Layout {
         for (name, whole, _) in POINT {
             add(name, whole, false);
         }
-        for joint in &scene.ball_joints {
+        for joint in &scene.machine.ball_joints {
             for (quantity, whole, _) in JOINT {
                 add(&format!("{}_{quantity}", joint.name), whole, false);
             }
         }
-        let probe = scene.output.probe.is_some();
+        let probe = scene.machine.output.probe.is_some();
         if probe {
             add("probe_error_max_um", false, false);
             add("probe_error_rms_um", false, false);
@@ -114,7 +114,7 @@ impl Layout {
         for observable in OBSERVABLES {
             add(&format!("section_{observable}"), false, true);
         }
-        Self { columns, joints: scene.ball_joints.len(), probe, kept: plan.periods - plan.discard }
+        Self { columns, joints: scene.machine.ball_joints.len(), probe, kept: plan.periods - plan.discard }
     }
 
     /// Arrays in order.

@@ -1,10 +1,11 @@
 //! One point of a sweep: a scene run through its periods, and what is recorded of it.
 
-use super::drive::{Machine, MachineError, OBSERVABLES};
+use super::drive::{OBSERVABLES, ObservedError, ObservedRun};
 use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
 use super::section::{Schedule, SectionRun};
-use jointplay_physics::scene::{Scene, Solver, Value};
+use jointplay_physics::machine::{Machine, Solver};
+use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Effect, Peak};
 
 /// Largest number of samples per period for the means and the tip error.
@@ -76,7 +77,7 @@ pub struct PointResult {
 
 /// A point being computed.
 pub struct PointRun {
-    watch: SectionRun<Machine>,
+    watch: SectionRun<ObservedRun>,
     plan: Plan,
     period: f64,
     resolution: Vec<f64>,
@@ -93,26 +94,23 @@ impl PointRun {
     ///
     /// # Errors
     /// A scene that cannot start.
-    pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, MachineError> {
+    pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, ObservedError> {
         // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
         let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
-        Ok(Self::begin(Machine::new(scene)?, plan, period, part * period))
+        Ok(Self::begin(ObservedRun::new(scene)?, plan, period, part * period))
     }
 
-    /// Continues from the latest section of another point with some parameters changed; `None` if a change takes effect
-    /// only on reset, or the scene does not accept it.
-    pub fn follow(mut machine: Machine, changes: &[(&str, Value)], plan: Plan, period: f64) -> Option<Self> {
-        for (key, value) in changes {
-            if machine.simulation_mut().set_value(key, value) != Ok(Effect::Now) {
-                return None;
-            }
+    /// Continues from the latest section of another point as `machine`; `None` if a running simulation cannot become that.
+    pub fn follow(mut run: ObservedRun, machine: &Machine, plan: Plan, period: f64) -> Option<Self> {
+        if run.simulation_mut().adopt(machine) != Ok(Effect::Now) {
+            return None;
         }
-        let first = machine.time() + period;
-        Some(Self::begin(machine, plan, period, first))
+        let first = run.time() + period;
+        Some(Self::begin(run, plan, period, first))
     }
 
-    fn begin(mut machine: Machine, plan: Plan, period: f64, first: f64) -> Self {
-        let solver = machine.simulation().running_scene().solver;
+    fn begin(mut machine: ObservedRun, plan: Plan, period: f64, first: f64) -> Self {
+        let solver = machine.simulation().machine().solver;
         let tolerance = tolerance_of(&solver);
         let schedule = Schedule { first, interval: period, sections: plan.periods, discard: plan.discard };
         // The motion of a purely kinematic scene has no neighbours.
@@ -127,7 +125,7 @@ impl PointRun {
         let joints = impacts.len();
         let started = simulation.time();
         let mut run = Self {
-            resolution: resolution(simulation.running_scene(), tolerance),
+            resolution: resolution(simulation.machine(), tolerance),
             means: Means::new(joints, period / SAMPLES),
             watch: SectionRun::new(machine, schedule, separation),
             plan,
@@ -170,7 +168,7 @@ impl PointRun {
     }
 
     /// The running scene.
-    pub fn machine(&self) -> &Machine {
+    pub fn machine(&self) -> &ObservedRun {
         self.watch.orbit()
     }
 
@@ -178,7 +176,7 @@ impl PointRun {
     ///
     /// # Errors
     /// The divergence guard: the point has diverged.
-    pub fn step(&mut self) -> Result<(), MachineError> {
+    pub fn step(&mut self) -> Result<(), ObservedError> {
         let at_section = self.watch.step()?;
         if self.watch.taken() < self.plan.discard {
             return Ok(());
@@ -204,7 +202,7 @@ impl PointRun {
     }
 
     /// The result, and the scene in the state of the latest section for the next point to follow.
-    pub fn finish(mut self) -> (PointResult, Machine) {
+    pub fn finish(mut self) -> (PointResult, ObservedRun) {
         let simulation = self.watch.orbit_mut().simulation_mut();
         simulation.take_peaks(&mut self.peaks);
         let doubts = simulation.doubts().iter().fold(0, |bits, doubt| bits | 1 << doubt.kind());
@@ -262,15 +260,15 @@ fn separation(tolerance: f64) -> f64 {
     (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1)
 }
 
-/// The same of the twin of a run of `scene`.
-pub fn separation_of(scene: &Scene) -> f64 {
-    separation(tolerance_of(&scene.solver))
+/// The same of the twin of a run of `machine`.
+pub fn separation_of(machine: &Machine) -> f64 {
+    separation(tolerance_of(&machine.solver))
 }
 
-/// Smallest differences that distinguish two sections of `scene`, in the order of [`OBSERVABLES`]: the tolerance times
+/// Smallest differences that distinguish two sections of `machine`, in the order of [`OBSERVABLES`]: the tolerance times
 /// its scales and a factor.
-pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
-    let length = scene.length_scale();
+pub fn resolution(machine: &Machine, tolerance: f64) -> Vec<f64> {
+    let length = machine.length_scale();
     let of_group = [length, 0.1, length / 0.1, 1.0];
     (0..OBSERVABLES.len()).map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3]).collect()
 }
@@ -305,13 +303,13 @@ impl Means {
         }
     }
 
-    fn begin(&mut self, machine: &mut Machine) {
+    fn begin(&mut self, machine: &mut ObservedRun) {
         self.latest = machine.time();
         self.take(machine, 0.0);
     }
 
     /// Takes a sample if the latest one is old enough.
-    fn look(&mut self, machine: &mut Machine, at_section: bool) {
+    fn look(&mut self, machine: &mut ObservedRun, at_section: bool) {
         let ago = machine.time() - self.latest;
         if ago >= self.least || (at_section && ago > 0.0) {
             self.latest = machine.time();
@@ -319,7 +317,7 @@ impl Means {
         }
     }
 
-    fn take(&mut self, machine: &mut Machine, h: f64) {
+    fn take(&mut self, machine: &mut ObservedRun, h: f64) {
         let frame = machine.frame();
         self.span += h;
         let values = self.normal.iter_mut().zip(&mut self.normal_now);

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::stretch::time_to;
 use super::work_precision::{Baseline, measure as measure_point};
 use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision};
-use jointplay_physics::scene::{Preset, Scene};
+use jointplay_physics::machine::Preset;
+use jointplay_physics::scene::Scene;
 
 /// What `jointplay tradeoff --all --write` measured.
 const RECORD: &str = include_str!("../../../assets/presets.json");
@@ -77,8 +78,8 @@ pub struct TooSlow {
 pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
     let (method, _, tolerance) = Preset::RealTime.point();
-    let asks = scene.solver.preset == Some(Preset::RealTime)
-        && (scene.solver.method, scene.solver.tolerance) == (method, tolerance)
+    let asks = scene.machine.solver.preset == Some(Preset::RealTime)
+        && (scene.machine.solver.method, scene.machine.solver.tolerance) == (method, tolerance)
         && scene.source.file.is_none();
     let pace = record.pace.get(&scene.name).copied();
     pace.filter(|pace| asks && *pace < 1.0).map(|pace| TooSlow {

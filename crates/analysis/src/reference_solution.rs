@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::stretch::advance_capped;
 use super::{AnalysisError, End, RunContext, Setting, WorkBudget};
-use jointplay_physics::scene::{Scene, Vec3};
+use jointplay_physics::machine::Vec3;
+use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Frame, Peak, Simulation, Snapshot};
 
 /// Number of impacts compared.
@@ -161,7 +162,7 @@ impl ReferenceSolution {
             setting,
             floor: Errors::default(),
         };
-        reference.lay_slots(&contacts, scene.ball_joints.len());
+        reference.lay_slots(&contacts, scene.machine.ball_joints.len());
         let (peaks, position) = reference.reference_impacts(&setting, &mut context.part(1, 2))?;
         for (slot, peak) in reference.slots.iter_mut().zip(&peaks) {
             slot.peak_n = *peak;
@@ -269,8 +270,12 @@ impl ReferenceSolution {
             return Ok(());
         };
         let from = started + WARM_UP;
-        self.settled =
-            Some(SettledSpan { from, to: from + SETTLED_SPAN, means: vec![0.0; self.scene.ball_joints.len()], start });
+        self.settled = Some(SettledSpan {
+            from,
+            to: from + SETTLED_SPAN,
+            means: vec![0.0; self.scene.machine.ball_joints.len()],
+            start,
+        });
         let budget = WorkBudget::REFERENCE;
         let mut means = [Vec::new(), Vec::new()];
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
@@ -381,7 +386,7 @@ pub(super) struct MeanForces {
 
 impl MeanForces {
     pub(super) fn new(scene: &Scene, span: (f64, f64), samples: u32) -> Self {
-        Self { span, samples, next: 0, frame: Frame::default(), means: vec![0.0; scene.ball_joints.len()] }
+        Self { span, samples, next: 0, frame: Frame::default(), means: vec![0.0; scene.machine.ball_joints.len()] }
     }
 
     /// Samples the instants that lie in the latest step.
@@ -420,8 +425,8 @@ fn first_contacts(
     context: &mut RunContext,
 ) -> Result<(Vec<Contact>, usize), AnalysisError> {
     let mut simulation = setting.start(scene)?;
-    let joints = scene.ball_joints.len();
-    if scene.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
+    let joints = scene.machine.ball_joints.len();
+    if scene.machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
         return Ok((Vec::new(), 0));
     }
     let begun_before = |j: &usize| simulation.contact_memory(*j).active;
@@ -466,8 +471,9 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<(Snap
     let mut simulation = setting.start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
     let mut since = 0.0;
-    let clearance: Vec<usize> =
-        (0..scene.ball_joints.len()).filter(|&j| scene.ball_joints[j].contact.clearance > 0.0).collect();
+    let clearance: Vec<usize> = (0..scene.machine.ball_joints.len())
+        .filter(|&j| scene.machine.ball_joints[j].contact.clearance > 0.0)
+        .collect();
     let mut settled = false;
     let budget = WorkBudget { seconds: f64::INFINITY, ..WorkBudget::FULL };
     advance_capped(&mut simulation, SETTLED_WITHIN, &budget, context, |simulation| {

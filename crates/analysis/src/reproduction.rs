@@ -291,7 +291,7 @@ impl Agenda {
             }
         }
         let (_, _, nominal) = &self.runs[0];
-        let all = resolution(nominal, nominal.solver.tolerance);
+        let all = resolution(&nominal.machine, nominal.machine.solver.tolerance);
         let resolution = Coordinate::ALL.map(|c| all[c.index()]);
         self.sweeps.iter_mut().for_each(SweepData::read_points);
         let ideal = runs.pop().expect("the last run is the ideal one");
@@ -330,7 +330,7 @@ fn curve(
     settle: usize,
     mut go_on: impl FnMut(f64) -> bool,
 ) -> Result<SettledCurve, ResponseError> {
-    let mut simulation = Simulation::new(scene)?;
+    let mut simulation = Simulation::new(&scene.machine)?;
     let mut frame = Frame::default();
     let mut found =
         SettledCurve { case, coordinates: [Vec::new(), Vec::new()], rates: [Vec::new(), Vec::new()], width: [0.0; 2] };

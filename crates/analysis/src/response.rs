@@ -50,7 +50,8 @@ impl Extremes {
 
 /// Coordinates, rates and second derivatives of a pose.
 pub(super) fn derivatives(pose: &Pose) -> [[f64; COORDINATES]; 3] {
-    let join = |a: &jointplay_physics::scene::Vec3, b: &jointplay_physics::scene::Vec3| [a.x, a.y, a.z, b.x, b.y, b.z];
+    let join =
+        |a: &jointplay_physics::machine::Vec3, b: &jointplay_physics::machine::Vec3| [a.x, a.y, a.z, b.x, b.y, b.z];
     [
         join(&pose.position, &pose.angles),
         join(&pose.velocity, &pose.angle_rates),
@@ -104,11 +105,11 @@ pub enum ResponseError {
 fn ideal_of(scene: &Scene) -> Option<Simulation> {
     let mut ideal = scene.clone();
     ideal.set("contact.clearance", "0").ok()?;
-    let names: Vec<String> = ideal.ball_joints.iter().map(|j| j.name.clone()).collect();
+    let names: Vec<String> = ideal.machine.ball_joints.iter().map(|j| j.name.clone()).collect();
     for name in names {
         ideal.set(&format!("joint.{name}.clearance"), "0").ok()?;
     }
-    Simulation::new(&ideal).ok()
+    Simulation::new(&ideal.machine).ok()
 }
 
 /// Pose of the ideal motion at successive instants.
@@ -169,9 +170,9 @@ pub fn respond(
     mut observe: impl FnMut(&Observation),
     mut go_on: impl FnMut(f64) -> bool,
 ) -> Result<Response, ResponseError> {
-    let mut simulation = Simulation::new(scene)?;
+    let mut simulation = Simulation::new(&scene.machine)?;
     let mut ideal = Ideal { simulation: ideal_of(scene), frame: Frame::default() };
-    let joints = scene.ball_joints.len();
+    let joints = scene.machine.ball_joints.len();
     let mut full = Extremes::new(joints, ideal.simulation.is_some());
     let mut sampled = full.clone();
     let mut frame = Frame::default();
@@ -220,7 +221,7 @@ pub fn respond(
         *most = most.max(*peak);
     }
     Ok(Response {
-        joints: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
+        joints: scene.machine.ball_joints.iter().map(|j| j.name.clone()).collect(),
         full,
         sampled,
         last_separation: statistics.last_separation.clone(),

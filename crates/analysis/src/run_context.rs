@@ -55,7 +55,10 @@ pub enum AnalysisError {
     /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// A setting that the scene, or the simulation of it, does not accept.
+    /// A parameter that the scene does not accept.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A setting that the simulation does not accept.
     #[error(transparent)]
     Setting(#[from] ChangeError),
     /// The divergence guard stopped the reference run.
@@ -69,10 +72,4 @@ pub enum AnalysisError {
         /// The cap.
         evaluations: u64,
     },
-}
-
-impl From<SceneError> for AnalysisError {
-    fn from(error: SceneError) -> Self {
-        Self::Setting(error.into())
-    }
 }

@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use super::AnalysisError;
 use jointplay_physics::integrate::Method;
-use jointplay_physics::scene::{Preset, Scene, Value};
+use jointplay_physics::machine::{Machine, Preset};
+use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Simulation, Snapshot};
 
 /// A method with its step size or tolerance.
@@ -64,27 +65,23 @@ impl Setting {
 
     /// Starts `scene` with this setting.
     pub(super) fn start(&self, scene: &Scene) -> Result<Simulation, AnalysisError> {
-        let mut scene = scene.clone();
-        for (key, value) in self.changes() {
-            scene.set_value(key, &value)?;
-        }
-        Ok(Simulation::new(&scene)?)
+        Ok(Simulation::new(&self.of(&scene.machine))?)
     }
 
     /// Continues from `snapshot` with this setting, whichever setting that has.
     pub(super) fn resume(&self, snapshot: &Snapshot) -> Result<Simulation, AnalysisError> {
         let mut simulation = Simulation::of(snapshot);
-        for (key, value) in self.changes() {
-            simulation.set_value(key, &value)?;
-        }
+        let machine = self.of(simulation.machine());
+        simulation.adopt(&machine)?;
         Ok(simulation)
     }
 
-    fn changes(&self) -> [(&'static str, Value); 3] {
-        [
-            ("solver.method", Value::Choice(self.method.word())),
-            ("solver.step", Value::Number(self.step_s)),
-            ("solver.tolerance", Value::Number(self.tolerance)),
-        ]
+    /// `machine` with this setting.
+    fn of(&self, machine: &Machine) -> Machine {
+        let mut machine = machine.clone();
+        machine.solver.method = self.method;
+        machine.solver.step = self.step_s;
+        machine.solver.tolerance = self.tolerance;
+        machine
     }
 }

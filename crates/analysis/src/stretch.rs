@@ -5,7 +5,8 @@ use std::fmt::Display;
 use serde::{Serialize, Serializer};
 
 use super::{AnalysisError, RunContext};
-use jointplay_physics::scene::{BallJoint, Scene};
+use jointplay_physics::machine::BallJoint;
+use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Simulation, StartError, Stopped};
 
 /// Steps between two checks of the clock, the cap and cancellation.
@@ -54,7 +55,7 @@ impl WorkBudget {
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
         let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
-        if scene.ball_joints.iter().filter(loose).count() <= Self::MANY {
+        if scene.machine.ball_joints.iter().filter(loose).count() <= Self::MANY {
             return self;
         }
         Self {
@@ -196,7 +197,7 @@ mod tests {
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let small = WorkBudget { evaluations: 500, ..WorkBudget::QUICK };
         let mut clock = || 0.0;
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut go_on = |_: f64| ControlFlow::Continue(());
         let mut context = RunContext::new(&mut clock, &mut go_on);
         let end = advance_capped(&mut simulation, 1.0, &small, &mut context, |_| false);
@@ -229,10 +230,10 @@ mod tests {
         let budget = WorkBudget { measured: 1e6, seconds: 1e9, ..WorkBudget::QUICK };
         let mut steps = 0;
         let seconds = time_to(5e-3, &budget, &mut context, |_| {
-            let mut simulation = Simulation::new(&scene)?;
+            let mut simulation = Simulation::new(&scene.machine)?;
             while simulation.step_until(5e-3).is_ok() && simulation.time() < 5e-3 {}
             steps = simulation.statistics().steps;
-            Ok(Simulation::new(&scene)?)
+            Ok(Simulation::new(&scene.machine)?)
         })
         .expect("runs");
         assert_eq!(seconds, (steps as f64 / f64::from(STEPS_IN_A_PIECE)).ceil());

@@ -1,7 +1,7 @@
 //! A whole sweep: its scene, its points, and the computation of one block of them. The caller decides who runs which
 //! block and when: a block's records depend only on the sweep and the block's number.
 
-use super::drive::{Machine, NoPeriod, drive_period};
+use super::drive::{NoPeriod, ObservedRun, drive_period};
 use super::grid::{Grid, ParameterRange, Start};
 use super::layout::Layout;
 use super::point::{Plan, PointResult, PointRun};
@@ -93,7 +93,7 @@ impl Sweep {
         for point in sweep.tried() {
             let scene = sweep.grid.scene(&sweep.scene, point);
             let started = scene.and_then(|scene| {
-                Simulation::new(&scene).map_err(|error| error.located(&scene))?;
+                Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
                 Ok(scene)
             });
             match started {
@@ -172,8 +172,8 @@ pub struct BlockRun<'a> {
     order: Vec<usize>,
     at: usize,
     run: Option<PointRun>,
-    /// Machine at the end of the previous point, if the next one follows it.
-    machine: Option<Machine>,
+    /// ObservedRun at the end of the previous point, if the next one follows it.
+    machine: Option<ObservedRun>,
     done: Vec<(usize, Option<PointResult>)>,
 }
 
@@ -222,15 +222,13 @@ impl BlockRun<'_> {
         let point = self.order[self.at];
         let scene = sweep.grid.scene(&sweep.scene, point).ok()?;
         let period = drive_period(&scene).ok()?;
-        let followed = self.machine.take().and_then(|machine| {
-            let changes = sweep.grid.settings(point);
-            PointRun::follow(machine, &changes, sweep.plan, period)
-        });
+        let run = self.machine.take();
+        let followed = run.and_then(|run| PointRun::follow(run, &scene.machine, sweep.plan, period));
         followed.or_else(|| PointRun::cold(&scene, sweep.plan, period).ok())
     }
 
     /// Finishes the current point; the next one follows `machine`, or starts cold without one.
-    fn close(&mut self, result: Option<PointResult>, machine: Option<Machine>) {
+    fn close(&mut self, result: Option<PointResult>, machine: Option<ObservedRun>) {
         self.done.push((self.order[self.at], result));
         self.at += 1;
         self.machine = machine.filter(|_| self.sweep.grid.start() != Start::Cold);

@@ -338,7 +338,7 @@ mod tests {
             let mut source = task.scene.clone();
             source.changes.extend(point.settings.iter().cloned());
             let scene = source.scene().expect("its own settings");
-            let mut machine = crate::drive::Machine::new(&scene).expect("starts");
+            let mut machine = crate::drive::ObservedRun::new(&scene).expect("starts");
             for k in 0..task.periods {
                 let end = point.first + k as f64 * point.interval;
                 while machine.simulation().time() < end {

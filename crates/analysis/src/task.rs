@@ -10,7 +10,7 @@ use super::RunContext;
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
-use jointplay_physics::scene::Preset;
+use jointplay_physics::machine::Preset;
 
 /// What to compute.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -201,7 +201,7 @@ impl Case {
     /// A scene that does not load, start or run to the end.
     pub fn compare(&self) -> Result<Vec<Comparison>, ValidationError> {
         let scene = Scene::load(&self.scene, &self.changes)?;
-        let mut run = Run { simulation: Simulation::new(&scene)?, frame: Frame::default() };
+        let mut run = Run { simulation: Simulation::new(&scene.machine)?, frame: Frame::default() };
         let mut watches = Vec::with_capacity(self.checks.len());
         for check in &self.checks {
             watches.push(Watch::new(&check.measure, self.duration, &mut run)?);
@@ -238,7 +238,7 @@ impl Run {
 
     fn reading(&mut self, channel: &str) -> Result<Reading, NoChannel> {
         self.simulation.sample(self.simulation.time(), &mut self.frame);
-        let (_, readings) = chosen_columns(self.simulation.scene(), &self.frame, &[channel.to_owned()])?;
+        let (_, readings) = chosen_columns(self.simulation.machine(), &self.frame, &[channel.to_owned()])?;
         // The first is the time.
         let [_, reading] = readings[..] else { panic!("{channel} is more than one channel") };
         Ok(reading)

@@ -6,7 +6,8 @@ use super::reference_solution::PhaseCost;
 use super::stretch::time_to;
 use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
 use jointplay_physics::integrate::Method;
-use jointplay_physics::scene::{Preset, Scene};
+use jointplay_physics::machine::Preset;
+use jointplay_physics::scene::Scene;
 
 /// A run over the first impacts, or in settled motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -4,10 +4,14 @@
 //! [`integrate`], [`scene`], [`mechanism`], [`simulate`].
 
 pub mod contact;
+pub mod expression;
 pub mod integrate;
 pub mod jet;
+pub mod machine;
 pub mod mechanism;
 pub mod mesh;
 pub mod scene;
 pub mod simulate;
+pub mod suggest;
+pub mod units;
 pub mod words;

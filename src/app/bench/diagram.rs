@@ -10,8 +10,8 @@ use super::swept::Swept;
 use crate::analysis::regime::Regime;
 use crate::analysis::sweep_task::SweptPoint;
 use crate::app::{theme, value};
-use crate::scene::to_display;
 use crate::simulate::Doubt;
+use crate::units::to_display;
 
 const HEIGHT: f32 = 230.0;
 /// How near a click must come to a point, points.

@@ -31,7 +31,7 @@ impl Portrait {
         reserved(ui, "portrait of", 2, |ui| {
             let words = format!(
                 "Running: {}; sections at phase {}°",
-                value::scene_line(player.scene(), &[]),
+                value::scene_line(player.running(), &[]),
                 value::number(360.0 * player.watch().phase(), 4)
             );
             ui.label(RichText::new(words).small())

@@ -249,7 +249,7 @@ impl SweepPanel {
     }
 
     fn settings_ui(&mut self, ui: &mut Ui, player: &Player) {
-        let scene = player.wanted();
+        let scene = player.pending();
         let mut parameters = scene.parameters();
         parameters.retain(|parameter| varies(player, parameter));
         let known = |settings: &&mut Settings| settings.scene == scene.name;
@@ -325,7 +325,7 @@ impl SweepPanel {
                 "Measures the largest Lyapunov exponent of each value with a twin run: about twice the time",
             );
         });
-        let solver = player.wanted().solver;
+        let solver = player.pending().machine.solver;
         if settings.exponent && solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9) {
             let words = format!(
                 "At a tolerance of {} integration error hides the exponents; use {} or less",
@@ -371,13 +371,13 @@ impl SweepPanel {
             (self.running, self.asked) = (None, None);
         } else if clicked
             && let Some(settings) = &self.settings
-            && let Ok(parameter) = player.wanted().parameter(settings.key)
+            && let Ok(parameter) = player.pending().parameter(settings.key)
         {
             self.reveal = true;
             let end = |text: &str| value::completed(text, &parameter.kind);
             let Settings { key, from, to, values, .. } = settings;
             self.asked = Some(SweepTask {
-                scene: SceneSource::of(player.wanted()),
+                scene: SceneSource::of(player.pending()),
                 vary: vec![format!("{key}={}..{}:{values}", end(from), end(to))],
                 periods: settings.periods,
                 discard: settings.discard,
@@ -489,7 +489,7 @@ fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
 
 /// Whether the scene has `parameter` as a number that affects its motion.
 fn varies(player: &Player, parameter: &Parameter) -> bool {
-    let value = player.wanted().get(parameter.key);
+    let value = player.pending().get(parameter.key);
     matches!(value, Ok(Value::Number(_) | Value::Count(_)))
         && !parameter.key.starts_with("view.")
         && !parameter.key.starts_with("solver.")

@@ -52,7 +52,7 @@ impl Swept {
     pub(super) fn differences(&self, player: &Player) -> Vec<String> {
         let varied = [self.range.key.clone()];
         let scene = self.scene.as_ref();
-        scene.map_or_else(Vec::new, |scene| value::differences(scene, player.wanted(), &varied))
+        scene.map_or_else(Vec::new, |scene| value::differences(scene, player.pending(), &varied))
     }
 }
 

@@ -125,7 +125,7 @@ impl App {
 
     /// Shows the link to the present state, and asks for an address where other devices do not find the page.
     pub(in crate::app) fn show_link_dialog(&mut self) {
-        match self.link().format_short(self.player.wanted()) {
+        match self.link().format_short(self.player.pending()) {
             Ok((fragment, note)) => {
                 self.dialog = Some(Dialog::Link(SharedLink::new(fragment, self.page_address())));
                 note.into_iter().for_each(|note| self.say(note));

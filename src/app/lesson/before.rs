@@ -78,7 +78,7 @@ impl App {
         self.plots.choose(before.plots);
         self.bench = before.bench;
         self.microscope.set_open(before.microscope.0);
-        let text = &self.player.wanted().source.text;
+        let text = &self.player.pending().source.text;
         if !lesson.runs.iter().any(|run| run.scene.source.text == *text) {
             return;
         }

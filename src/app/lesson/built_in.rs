@@ -5,7 +5,8 @@ use std::sync::{Arc, LazyLock};
 use serde::Deserialize;
 
 use super::format::Lesson;
-use crate::scene::{SceneError, suggest, visible_line};
+use crate::scene::{SceneError, visible_line};
+use crate::suggest::nearest;
 
 /// Name and text, in the order of a lecture.
 macro_rules! lessons {
@@ -52,7 +53,7 @@ impl Lesson {
     pub fn built_in(name: &str) -> Result<Arc<Self>, SceneError> {
         let names = BUILT_IN_LESSONS.map(|(name, _)| name);
         let Some((name, text)) = BUILT_IN_LESSONS.iter().find(|(own, _)| *own == name) else {
-            let near = suggest(name, names);
+            let near = nearest(name, names);
             let message = format!(
                 "no lesson `{}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
                 visible_line(&name.chars().take(60).collect::<String>()),

@@ -10,7 +10,9 @@ use toml::Spanned;
 use super::names::{Names, comparisons, parameter};
 use super::text;
 use crate::app::share::{Link, SceneText};
-use crate::scene::{Dimension, LARGEST_FILE, Quantity, Scene, SceneError, suggest};
+use crate::scene::{LARGEST_FILE, Quantity, Scene, SceneError};
+use crate::suggest::nearest;
+use crate::units::Dimension;
 use crate::view::Preset;
 
 /// Most steps of a lesson, measures, and choices of a question.
@@ -528,7 +530,7 @@ impl Lesson {
             None => 0,
             Some(name) => self.runs.iter().position(|run| run.name == name).ok_or_else(|| {
                 let names = self.runs.iter().map(|run| &*run.name).filter(|name| !name.is_empty());
-                let near = suggest(&name, names.clone());
+                let near = nearest(&name, names.clone());
                 let known: Vec<&str> = names.collect();
                 format!("no step that begins a run is called `{name}`{near}; allowed: {}", known.join(", "))
             })?,
@@ -538,7 +540,7 @@ impl Lesson {
             parameter(scene, key)?;
         }
         if let Some(joint) = kind.joint().filter(|name| *name != "any") {
-            let mut names = scene.ball_joints.iter().map(|joint| &*joint.name);
+            let mut names = scene.machine.ball_joints.iter().map(|joint| &*joint.name);
             if !names.clone().any(|name| name == joint) {
                 let known: Vec<&str> = names.by_ref().take(12).collect();
                 return Err(format!("no ball joint `{joint}`; allowed: any, {}", known.join(", ")));
@@ -616,7 +618,7 @@ fn beside(scene: &str, file: Option<&str>) -> String {
 
 /// What the camera looks at.
 fn look(word: &str, scene: &Scene) -> Result<Look, String> {
-    let joints = || scene.ball_joints.iter().map(|joint| &*joint.name);
+    let joints = || scene.machine.ball_joints.iter().map(|joint| &*joint.name);
     if let Some(joint) = joints().position(|name| name == word) {
         return Ok(Look::At(joint));
     }

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use super::format::{Its, Kind, Lesson, Measure, Run};
 use super::names::{Names, parameter};
 use crate::app::twin::Twin;
-use crate::scene::{Dimension, Quantity, Scene};
-use crate::simulate::{Frame, Impact, Peak, Reading, Simulation, channels_of, chosen_columns};
+use crate::scene::LiveScene;
+use crate::scene::{Quantity, Scene};
+use crate::simulate::{Frame, Impact, Peak, Reading, channels_of, chosen_columns};
+use crate::units::Dimension;
 
 /// Latest instant that is measured, s.
 const FARTHEST: f64 = 120.0;
@@ -108,7 +110,7 @@ impl Measured {
 
 /// A run being taken.
 struct Pass {
-    simulation: Simulation,
+    simulation: LiveScene,
     changes: Vec<(f64, String, String)>,
     scene: Scene,
     gauges: Vec<(usize, Gauge)>,
@@ -140,7 +142,7 @@ impl Gauge {
 
 impl Pass {
     fn new(run: &Run) -> Result<Self, String> {
-        let simulation = Simulation::new(&run.scene).map_err(|error| error.located(&run.scene).to_string())?;
+        let simulation = LiveScene::new(&run.scene).map_err(|error| run.scene.locate(&error).to_string())?;
         Ok(Self {
             simulation,
             changes: run.changes.iter().rev().cloned().collect(),
@@ -181,10 +183,10 @@ impl Pass {
             self.simulation.sample(0.0, &mut first);
             let pattern = [channel.to_owned()];
             let (columns, readings) =
-                chosen_columns(&self.scene, &first, &pattern).map_err(|error| error.to_string())?;
+                chosen_columns(&self.scene.machine, &first, &pattern).map_err(|error| error.to_string())?;
             // The first is the time.
             let (columns, readings) = (&columns[1..], &readings[1..]);
-            let listed = channels_of(&self.scene, &first);
+            let listed = channels_of(&self.scene.machine, &first);
             let listed: Vec<_> = listed.iter().filter(|c| columns.contains(&c.column)).collect();
             if !matches!(readings.len(), 1 | 3) || listed.iter().any(|c| c.unit != listed[0].unit) {
                 let names: Vec<&str> = listed.iter().map(|channel| &*channel.name).collect();
@@ -214,7 +216,7 @@ impl Pass {
     }
 
     fn joint(&self, name: &str) -> Result<usize, String> {
-        let joints = &self.scene.ball_joints;
+        let joints = &self.scene.machine.ball_joints;
         joints.iter().position(|j| j.name == name).ok_or_else(|| {
             let known: Vec<&str> = joints.iter().map(|joint| &*joint.name).collect();
             format!("no ball joint `{name}`; allowed: {}", known.join(", "))
@@ -264,7 +266,7 @@ impl Gauge {
     /// Takes what the latest step adds.
     fn step(
         &mut self,
-        simulation: &mut Simulation,
+        simulation: &mut LiveScene,
         frame: &mut Frame,
         impacts: &[Impact],
         peaks: &[Peak],
@@ -333,7 +335,7 @@ impl Gauge {
     }
 
     /// The channel at `time`, s, of the latest step; of a vector its size.
-    fn sample(&self, simulation: &mut Simulation, frame: &mut Frame, time: f64) -> f64 {
+    fn sample(&self, simulation: &mut LiveScene, frame: &mut Frame, time: f64) -> f64 {
         simulation.sample(time, frame);
         let value = |reading: &Reading| reading.read(frame).unwrap_or(f64::NAN);
         match &self.readings[..] {

@@ -1,6 +1,9 @@
 //! Expressions and conditions over the measures of a lesson.
 
-use crate::scene::{Dimension, Fault, Kind, Quantity, Scene, Value, evaluate, suggest};
+use crate::expression::Fault;
+use crate::scene::{Kind, Quantity, Scene, Value, evaluate};
+use crate::suggest::nearest;
+use crate::units::Dimension;
 
 /// The measures of a lesson by name, as far as they are known.
 pub struct Names<'l> {
@@ -30,7 +33,7 @@ impl<'l> Names<'l> {
         };
         let all = || self.all.iter().map(|(name, _)| *name);
         let known: Vec<&str> = all().collect();
-        let near = suggest(name, all());
+        let near = nearest(name, all());
         Err(format!("no measure `{name}`{near}; allowed: {}", known.join(", ")))
     }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::unit_names;
+use crate::units::unit_names;
 
 /// All texts of a step.
 fn texts(step: &Step) -> Vec<&str> {
@@ -14,15 +14,15 @@ fn texts(step: &Step) -> Vec<&str> {
 /// A number with a unit that is written in `text`, outside its placeholders.
 fn written_number(text: &str) -> Option<&str> {
     let units: Vec<&str> = [
-        crate::scene::Dimension::Length,
-        crate::scene::Dimension::Time,
-        crate::scene::Dimension::Mass,
-        crate::scene::Dimension::Angle,
-        crate::scene::Dimension::Speed,
-        crate::scene::Dimension::Acceleration,
-        crate::scene::Dimension::Frequency,
-        crate::scene::Dimension::Force,
-        crate::scene::Dimension::AngularSpeed,
+        crate::units::Dimension::Length,
+        crate::units::Dimension::Time,
+        crate::units::Dimension::Mass,
+        crate::units::Dimension::Angle,
+        crate::units::Dimension::Speed,
+        crate::units::Dimension::Acceleration,
+        crate::units::Dimension::Frequency,
+        crate::units::Dimension::Force,
+        crate::units::Dimension::AngularSpeed,
     ]
     .into_iter()
     .flat_map(unit_names)

@@ -186,7 +186,7 @@ pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Dimension;
+    use crate::units::Dimension;
 
     #[test]
     fn markdown_has_paragraphs_lists_and_three_faces() {

@@ -4,7 +4,7 @@
 use crate::app::paths::axes_of;
 use crate::app::player::Player;
 use crate::contact::Coefficients;
-use crate::scene::{Attachment, Mat3, Vec3};
+use crate::machine::{Attachment, Mat3, Vec3};
 use crate::simulate::{ContactState, Frame, Impact, JointReport};
 
 /// Number of impacts that the path reaches back.
@@ -62,7 +62,7 @@ impl Sight {
     /// Of ball joint `joint`; `None` if the scene has no such joint.
     pub fn of(player: &Player, joint: usize) -> Option<Self> {
         let (frame, shown) = (player.frame(), player.pacer.shown());
-        let spec = player.scene().ball_joints.get(joint)?;
+        let spec = player.running().machine.ball_joints.get(joint)?;
         let report = *frame.joints.get(joint)?;
         let distance = report.eccentricity.norm();
         let ideal = report.state == ContactState::Ideal;
@@ -172,7 +172,7 @@ mod tests {
     fn the_patch_carries_the_force_of_its_penetration() {
         // Hertz: F = 4/3 E* a³ / R, E* = E / (2 (1 - nu²)); the scene's law without damping is the same number.
         let player = player("spcmm", &[]);
-        let contact = player.scene().ball_joints[0].contact;
+        let contact = player.running().machine.ball_joints[0].contact;
         let sight = Sight::of(&player, 0).expect("has a joint");
         let patch = Patch { penetration: 3e-6, ..sight.patch.expect("has clearance") };
         let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));

@@ -1,8 +1,9 @@
 //! The settings of plots, view and instruments that a link carries, as words.
 
 use crate::app::plots::{Plots, Window};
-use crate::scene::{Dimension, Scene, parse_quantity};
+use crate::scene::Scene;
 use crate::simulate::{MOST_PICKED, Quantity};
+use crate::units::{Dimension, parse_quantity};
 use crate::view::{Picked, WearMap};
 
 /// Longest window of the plots that a link asks for, s.
@@ -151,8 +152,8 @@ pub fn write_window(window: Window) -> String {
 /// # Errors
 /// There is no such part; lists those there are.
 pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
-    let joints = || scene.ball_joints.iter().map(|joint| joint.name.as_str());
-    let bodies = || scene.bodies.iter().map(|body| body.name.as_str());
+    let joints = || scene.machine.ball_joints.iter().map(|joint| joint.name.as_str());
+    let bodies = || scene.machine.bodies.iter().map(|body| body.name.as_str());
     let found = match text.split_once('.') {
         Some(("joint", name)) => joints().position(|joint| joint == name).map(Picked::Joint),
         Some(("body", name)) => bodies().position(|body| body == name).map(Picked::Body),
@@ -169,10 +170,10 @@ pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
 pub fn name_followed(scene: &Scene, picked: Picked) -> Option<String> {
     match picked {
         Picked::Joint(index) => {
-            let joint = scene.ball_joints.get(index)?;
+            let joint = scene.machine.ball_joints.get(index)?;
             Some(format!("joint.{}", joint.name))
         }
-        Picked::Body(index) => Some(format!("body.{}", scene.bodies.get(index)?.name)),
+        Picked::Body(index) => Some(format!("body.{}", scene.machine.bodies.get(index)?.name)),
         Picked::Fixed(_) => None,
     }
 }

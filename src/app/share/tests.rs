@@ -155,8 +155,8 @@ fn a_link_by_hand_takes_short_names_and_full_keys() {
     let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50").expect("a link");
     let scene = link.load().expect("the scene has these");
     assert_eq!(scene.name, "pendulum");
-    assert_eq!(scene.contact.clearance, 0.5e-3);
-    assert_eq!((scene.contact.friction, scene.contact.restitution), (0.2, 0.8));
+    assert_eq!(scene.machine.contact.clearance, 0.5e-3);
+    assert_eq!((scene.machine.contact.friction, scene.machine.contact.restitution), (0.2, 0.8));
     assert_eq!(link.time, Some(0.02));
     assert_eq!(link.time_scale, Some(0.02));
     assert!(link.has_instant());
@@ -164,7 +164,7 @@ fn a_link_by_hand_takes_short_names_and_full_keys() {
     let link = Link::parse("joint.S1.clearance=0.5+mm&view.down=%2Bx").expect("a link");
     assert_eq!(link.scene, SceneText::BuiltIn(DEFAULT_SCENE.to_owned()));
     let scene = link.load().expect("the scene has these");
-    assert_eq!(scene.ball_joints[0].contact.clearance, 0.5e-3);
+    assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.5e-3);
     assert!(!link.has_instant());
 
     // The fragment wins, and alone counts where it names a scene.

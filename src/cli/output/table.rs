@@ -39,7 +39,7 @@ pub enum NoRow {
 impl Table {
     /// An empty table with the columns of `scene`; `first` shows whether it has a tip error and a ledger.
     pub fn new(scene: &Scene, first: &Frame) -> Self {
-        Self::of_columns(run_columns(scene, first))
+        Self::of_columns(run_columns(&scene.machine, first))
     }
 
     /// An empty table with the time and the channels that match `patterns`.
@@ -47,7 +47,7 @@ impl Table {
     /// # Errors
     /// A pattern without a match.
     pub fn of_channels(scene: &Scene, first: &Frame, patterns: &[String]) -> Result<Self, NoChannel> {
-        chosen_columns(scene, first, patterns).map(Self::of_columns)
+        chosen_columns(&scene.machine, first, patterns).map(Self::of_columns)
     }
 
     fn of_columns((names, readings): (Vec<String>, Vec<Reading>)) -> Self {

@@ -78,7 +78,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     interrupt::listen();
     let destination = Destination::claim(arguments)?;
     if !arguments.quiet {
-        for warning in scene.warnings() {
+        for warning in scene.machine.warnings() {
             warn(&warning.to_string());
         }
     }

@@ -6,9 +6,11 @@ use super::options;
 use crate::app::{App, AppOptions, Headless, Overlay, force_notes};
 use crate::cli::args::{RenderArguments, ThemeChoice};
 use crate::cli::{Failure, interrupt, start};
+use crate::machine::Vec3;
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
-use crate::scene::{Scene, Vec3};
-use crate::simulate::{Frame, Peak, Simulation};
+use crate::scene::LiveScene;
+use crate::scene::Scene;
+use crate::simulate::{Frame, Peak};
 use crate::view::{Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, WearMap, to_f32};
 
 /// A simulation and what draws it.
@@ -30,7 +32,7 @@ pub trait Studio {
     fn fix_arrow_scale(&mut self, reference: f32);
 
     /// The simulation.
-    fn simulation(&self) -> &Simulation;
+    fn simulation(&self) -> &LiveScene;
 
     /// Name of the graphics adapter.
     fn adapter(&self) -> String;
@@ -46,7 +48,7 @@ enum Screen {
 
 /// The scene alone, with text over it if requested.
 pub struct SceneStudio {
-    simulation: Simulation,
+    simulation: LiveScene,
     frame: Frame,
     peaks: Vec<Peak>,
     /// Body and point of the probe tip.
@@ -90,7 +92,7 @@ impl SceneStudio {
             simulation,
             frame,
             peaks: Vec::new(),
-            probe: scene.output.probe.map(|tip| (scene.output.body, tip)),
+            probe: scene.machine.output.probe.map(|tip| (scene.machine.output.body, tip)),
             trail: Vec::new(),
             screen,
             overlay: arguments.overlay,
@@ -134,7 +136,7 @@ impl Studio for SceneStudio {
             }
         }
         let shot = Shot {
-            scene: self.simulation.scene(),
+            scene: self.simulation.pending(),
             frame: &self.frame,
             marks: &self.marks,
             options: &self.options,
@@ -153,7 +155,7 @@ impl Studio for SceneStudio {
             Screen::Written(headless) => {
                 let mut overlay = Overlay { time: Some(instant), ..Overlay::default() };
                 if self.overlay {
-                    overlay.notes = force_notes(self.simulation.scene(), &self.frame);
+                    overlay.notes = force_notes(self.simulation.pending(), &self.frame);
                     overlay.legend = true;
                     overlay.labels = true;
                 }
@@ -167,7 +169,7 @@ impl Studio for SceneStudio {
         self.options.arrows.reference = Some(reference);
     }
 
-    fn simulation(&self) -> &Simulation {
+    fn simulation(&self) -> &LiveScene {
         &self.simulation
     }
 
@@ -204,7 +206,7 @@ impl ApplicationStudio {
             ThemeChoice::Light => eframe::egui::ThemePreference::Light,
             ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
         };
-        let app = headless.app(begin).map_err(|error| error.located(scene))?;
+        let app = headless.app(begin).map_err(|error| scene.locate(&error))?;
         Ok(Self { headless, app, size: [arguments.size.0, arguments.size.1] })
     }
 }
@@ -241,7 +243,7 @@ impl Studio for ApplicationStudio {
     // The window scales its arrows by its own forces.
     fn fix_arrow_scale(&mut self, _reference: f32) {}
 
-    fn simulation(&self) -> &Simulation {
+    fn simulation(&self) -> &LiveScene {
         self.app.player().simulation()
     }
 

@@ -30,7 +30,7 @@ use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
 use crate::files::OutputFile;
-use crate::scene::WarningKind;
+use crate::machine::WarningKind;
 use crate::simulate::Doubt;
 
 /// Steps between two checks for Ctrl-C.
@@ -176,7 +176,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         let Ok(scene) = sweep.grid().scene(sweep.scene(), point) else {
             continue;
         };
-        let of_scene = scene.warnings().into_iter();
+        let of_scene = scene.machine.warnings().into_iter();
         let of_scene = of_scene.map(|warning| (Kind::Scene(warning.kind()), warning.to_string()));
         let singular = near_singular(&scene).map(|near| {
             let kind = Kind::Singular(std::mem::discriminant(&near));
@@ -197,7 +197,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
             count(kept as u64, "section")
         ));
     }
-    let solver = &sweep.scene().solver;
+    let solver = &sweep.scene().machine.solver;
     let loose = solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
     if loose && sweep.plan().exponent {
         all.push(format!(

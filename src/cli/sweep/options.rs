@@ -1,7 +1,7 @@
 //! What the options of a sweep mean: `--shard 3/16`, `--phase 90deg`.
 
 use crate::cli::Failure;
-use crate::scene::{Dimension, parse_quantity};
+use crate::units::{Dimension, parse_quantity};
 
 /// Part `number` of `of`, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

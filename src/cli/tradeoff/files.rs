@@ -46,7 +46,7 @@ pub(super) fn fill(folder: &Folder, found: &WorkPrecision, scene: &Scene) -> Res
 /// The reference.
 fn reference(found: &WorkPrecision) -> Result<Json, Failure> {
     let reference = &found.reference;
-    let names: Vec<&str> = reference.scene().ball_joints.iter().map(|j| j.name.as_str()).collect();
+    let names: Vec<&str> = reference.scene().machine.ball_joints.iter().map(|j| j.name.as_str()).collect();
     let slots: Vec<Json> = reference
         .slots
         .iter()

@@ -41,7 +41,7 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Resu
     };
     if !arguments.quiet {
         // Warnings about the solver do not matter here: all methods are run.
-        for warning in scene.warnings().iter().filter(|w| !w.is_about_solver()) {
+        for warning in scene.machine.warnings().iter().filter(|w| !w.is_about_solver()) {
             warn(&warning.to_string());
         }
     }

@@ -11,7 +11,7 @@ use crate::analysis::{CaseCost, Phase, Point, Setting, WorkPrecision};
 use crate::cli::tables::{fill, markdown};
 use crate::cli::{Failure, machine};
 use crate::files::{OutputFile, publish};
-use crate::scene::Preset;
+use crate::machine::Preset;
 
 /// Paths under the source folder.
 const PAGE: &str = "docs/tradeoff.md";

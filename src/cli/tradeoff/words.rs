@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::analysis::{CaseCost, End, Phase, Point, ReferenceSolution, Setting, WorkPrecision};
 use crate::cli::machine;
 use crate::cli::output::significant;
-use crate::scene::format_quantity;
+use crate::units::format_quantity;
 
 /// A factor with three digits, `-` if there is none.
 pub fn times(value: Option<f64>) -> String {
@@ -99,7 +99,7 @@ pub(super) fn reference(reference: &ReferenceSolution) -> Vec<(&'static str, Str
 }
 
 fn joint(reference: &ReferenceSolution, index: usize) -> &str {
-    let joint = reference.scene().ball_joints.get(index);
+    let joint = reference.scene().machine.ball_joints.get(index);
     joint.map_or("-", |joint| joint.name.as_str())
 }
 

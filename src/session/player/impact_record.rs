@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 use crate::simulate::{Impact, Peak, Simulation};
 
 /// Most impacts kept; beyond that the oldest are dropped.

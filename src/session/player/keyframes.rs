@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use crate::scene::SceneSnapshot;
 use crate::session::twin::TwinMark;
-use crate::simulate::{Mark, Snapshot};
+use crate::simulate::Mark;
 
 /// Steps from one kept state to the next.
 const STRIDE: u64 = 256;
@@ -16,7 +17,7 @@ const FINE_BUDGET: usize = 4 << 20;
 /// A state, and what else a player restores with it.
 pub(super) struct Keyframe {
     /// A copy of the run shares it.
-    pub state: Arc<Snapshot>,
+    pub state: Arc<SceneSnapshot>,
     /// Number of log entries before it.
     pub events: usize,
     /// Position in the record; only the kept states have it.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::scene::LiveScene;
 use crate::simulate::Quantity;
 
 fn player(scene: &str) -> Player {
@@ -215,7 +216,7 @@ fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
     player.set("contact.clearance", "0.6 mm").expect("in range");
     one_clock(&player);
     // The run goes on as if it had been changed there by itself.
-    let mut straight = Simulation::new(other.scene()).expect("starts");
+    let mut straight = LiveScene::new(other.running()).expect("starts");
     straight.restore(&other.simulation().snapshot());
     straight.set("contact.clearance", "0.6 mm").expect("in range");
     assert_eq!(player.simulation().state_hash(), straight.state_hash());
@@ -391,9 +392,9 @@ fn single_steps_are_taken_back_bit_by_bit() {
     player.set("contact.friction", "0.3").expect("in range");
     player.step_back();
     assert_eq!(player.simulation().state_hash(), before);
-    assert_eq!(player.wanted().contact.friction, FRICTION);
+    assert_eq!(player.pending().machine.contact.friction, FRICTION);
     player.go_to(player.reached());
-    assert_eq!(player.wanted().contact.friction, 0.3);
+    assert_eq!(player.pending().machine.contact.friction, 0.3);
 }
 
 /// Of the paper's mechanism as its file gives it.
@@ -617,7 +618,7 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
     let _ = run_with(&mut player, &CHANGES[..2], 0.15);
     assert_eq!(player.flags().count(), 2);
     player.go_to(0.08);
-    assert_eq!(player.wanted().contact.friction, FRICTION);
+    assert_eq!(player.pending().machine.contact.friction, FRICTION);
     assert_eq!(player.log().entries.len(), 1, "the link knows what was done until here");
     player.set_playing(true);
     let left = player.abandoned_future().expect("left");
@@ -634,7 +635,7 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
 /// Ball joint, beginning and instant of the largest force of every impact of a run by itself up to `to`, s, in the order of these
 /// instants.
 fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
-    let mut alone = Simulation::new(player.scene()).expect("starts");
+    let mut alone = Simulation::new(&player.running().machine).expect("starts");
     let (mut peaks, mut steps, mut impacts) = (Vec::new(), Vec::new(), Vec::new());
     while alone.time() < to {
         alone.step().expect("runs");
@@ -808,24 +809,24 @@ fn a_preset_chosen_here_replaces_what_was_set_by_name() {
     let mut player = player("spcmm");
     player.set("solver.tolerance", "1e-9").expect("in range");
     player.set("solver.preset", "accurate").expect("a preset");
-    let (_, _, tolerance) = crate::scene::Preset::Accurate.point();
-    assert_eq!(player.wanted().solver.tolerance, tolerance);
-    assert_eq!(player.scene().solver.tolerance, tolerance);
+    let (_, _, tolerance) = crate::machine::Preset::Accurate.point();
+    assert_eq!(player.pending().machine.solver.tolerance, tolerance);
+    assert_eq!(player.running().machine.solver.tolerance, tolerance);
     player.set("solver.tolerance", "1e-9").expect("in range");
-    assert_eq!(player.scene().solver.tolerance, 1e-9);
+    assert_eq!(player.running().machine.solver.tolerance, 1e-9);
     assert!(player.keys_overriding_preset().is_empty());
 }
 
 #[test]
 fn a_refused_value_changes_nothing() {
     let mut player = player("spcmm");
-    let before = player.wanted().contact;
+    let before = player.pending().machine.contact;
     assert!(player.set("contact.clearance", "-1 mm").is_err());
     assert!(player.set("contact.clearence", "1 mm").is_err());
-    assert_eq!(player.wanted().contact, before);
+    assert_eq!(player.pending().machine.contact, before);
     player.set("contact.clearance", "0.7 mm").expect("in range");
     player.set_original("contact.clearance").expect("the scene's own");
-    assert_eq!(player.wanted().contact, before);
+    assert_eq!(player.pending().machine.contact, before);
 }
 
 #[test]
@@ -846,7 +847,7 @@ fn how_long_frames_take_changes_how_many_steps_they_take_and_no_bit() {
         for dt in frames.iter().cycle().take(12) {
             player.advance(*dt);
         }
-        let mut straight = Simulation::new(player.scene()).expect("starts");
+        let mut straight = Simulation::new(&player.running().machine).expect("starts");
         while straight.statistics().steps < player.steps() {
             straight.step().expect("runs");
         }

@@ -270,16 +270,16 @@ impl Player {
         self.unchanged = None;
         if now > self.recorded_to {
             // The way there was not recorded.
-            self.paths = Paths::new(self.simulation.running_scene());
+            self.paths = Paths::new(self.simulation.running());
         }
         self.recorded_to = now;
         let entries = self.log.entries[..self.applied].iter().rev();
         let mut schedules = entries.filter_map(|entry| entry.event.schedule());
         self.sections = schedules.next();
         self.watch.go_to(now);
-        self.settling = Settling::new(self.simulation.running_scene());
+        self.settling = Settling::new(self.simulation.running());
         self.forget_peaks();
-        self.warnings = Known::of(self.wanted());
+        self.warnings = Known::of(self.pending());
         if anew {
             self.keyframes.forget_fine();
             let channels = self.history.channels();

@@ -85,12 +85,12 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         Ok(scene) => scene,
         Err(reason) => return Outcome::Refused(reason),
     };
-    let mut simulation = match Simulation::new(&scene) {
+    let mut simulation = match Simulation::new(&scene.machine) {
         Ok(simulation) => simulation,
         Err(error) => return Outcome::Refused(error.to_string()),
     };
     let mut frame = frame_now(&mut simulation);
-    if let Some(what) = fault(&frame, &scene, form) {
+    if let Some(what) = fault(&frame, &scene.machine, form) {
         return Outcome::Wrong(format!("{what}, at the start"));
     }
     let mut balance = Balance::new(&frame);
@@ -108,7 +108,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
             if let Err(stopped) = simulation.step_until(row.duration) {
                 let hash = simulation.state_hash();
                 frame = frame_now(&mut simulation);
-                if let Some(what) = fault(&frame, &scene, form) {
+                if let Some(what) = fault(&frame, &scene.machine, form) {
                     return Outcome::Wrong(format!("stopped ({}) too late: {what}", stopped.fault));
                 }
                 if stopped.time != simulation.time() || simulation.state_hash() != hash {
@@ -130,7 +130,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
                     return Outcome::Wrong(format!("not finite inside a step, t = {middle:e} s"));
                 }
                 frame = frame_now(&mut simulation);
-                if let Some(what) = fault(&frame, &scene, form) {
+                if let Some(what) = fault(&frame, &scene.machine, form) {
                     return Outcome::Wrong(what);
                 }
                 balance.watch(&frame);
@@ -144,7 +144,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
     }
     let doubts = simulation.doubts();
     let mut doubts: Vec<String> = doubts.iter().map(ToString::to_string).collect();
-    let euler = scene.solver.method == jointplay::integrate::Method::SemiImplicitEuler;
+    let euler = scene.machine.solver.method == jointplay::integrate::Method::SemiImplicitEuler;
     if row.passive && balance.gain() > CREATED[usize::from(!euler)] {
         let what = format!("{:.3} of the energy created", balance.gain());
         if doubts.is_empty() {

@@ -1,6 +1,7 @@
 //! The extremes: which scenes, changed how, and what each is run with.
 
-use jointplay::scene::{JointStart, Scene, Vec3};
+use jointplay::machine::{JointStart, Vec3};
+use jointplay::scene::Scene;
 use jointplay::simulate::Simulation;
 
 /// Simulated time that a run is asked for, s: the first impacts of every scene lie within; and until contacts settle.
@@ -75,7 +76,7 @@ impl Row {
 }
 
 fn scale_masses(scene: &mut Scene, factor: f64) {
-    for body in &mut scene.bodies {
+    for body in &mut scene.machine.bodies {
         body.mass *= factor;
         body.inertia *= factor;
     }
@@ -83,7 +84,7 @@ fn scale_masses(scene: &mut Scene, factor: f64) {
 
 /// The rods' inertia about their own axis, nearly zero.
 fn thin_rods(scene: &mut Scene) {
-    for body in &mut scene.bodies {
+    for body in &mut scene.machine.bodies {
         let i = &mut body.inertia;
         let least = (0..3).min_by(|&a, &b| i[(a, a)].total_cmp(&i[(b, b)]));
         if body.name.starts_with("rod") || body.name.starts_with("link") {
@@ -95,7 +96,7 @@ fn thin_rods(scene: &mut Scene) {
 
 /// Where the pendulum's ball starts, from the centre of its socket.
 fn start_at(scene: &mut Scene, offset: Vec3) {
-    let JointStart::Pose { position, .. } = &mut scene.joints[0].start else { panic!("the pendulum is free") };
+    let JointStart::Pose { position, .. } = &mut scene.machine.joints[0].start else { panic!("the pendulum is free") };
     *position += offset;
 }
 
@@ -103,7 +104,7 @@ fn start_at(scene: &mut Scene, offset: Vec3) {
 fn reach_limit(mut good: f64, mut bad: f64) -> (f64, f64) {
     let reached = |plane: f64| {
         let changes = [("spcmm.slider_plane".to_owned(), format!("{plane} m"))];
-        Simulation::new(&Scene::load("spcmm", &changes).unwrap()).is_ok()
+        Simulation::new(&Scene::load("spcmm", &changes).unwrap().machine).is_ok()
     };
     assert!(reached(good) && !reached(bad));
     while (good - bad).abs() > 1e-6 {

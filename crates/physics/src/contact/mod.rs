@@ -21,7 +21,7 @@ type Vec3 = nalgebra::Vector3<f64>;
 type Mat3 = nalgebra::Matrix3<f64>;
 
 /// Normal-force law of a contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum NormalLaw {
     /// Lankarani & Nikravesh (1990), paper eq. (19). Valid only for restitution near 1.
     LankaraniNikravesh,
@@ -44,7 +44,7 @@ words!(NormalLaw {
 });
 
 /// Friction law of a contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum FrictionLaw {
     /// Modified Coulomb of Ambrósio, paper eqs. (20)-(21).
     ModifiedCoulomb,
@@ -58,7 +58,7 @@ words!(FrictionLaw {
 });
 
 /// Which sliding velocity the friction law uses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum FrictionVelocity {
     /// Relative velocity of the two centres, paper eqs. (15)-(16).
     Centres,
@@ -76,7 +76,7 @@ words!(FrictionVelocity {
 });
 
 /// Which speed the damping term of the normal force divides by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum ApproachSpeed {
     /// The penetration rate at which the contact began, paper eq. (19).
     Start,
@@ -90,7 +90,7 @@ words!(ApproachSpeed {
 });
 
 /// Contact parameters of a ball joint. SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Parameters {
     /// Radial clearance c = R - r, m; 0 makes the joint ideal.
     pub clearance: f64,

@@ -1,6 +1,6 @@
 //! Banded matrices of 3 x 3 blocks, eliminated in place without exchanging rows. Allocates nothing.
 
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 use std::ops::Range;
 
 /// Which blocks of a banded matrix may differ from zero, before its elimination or after, and where they stand, row by row.

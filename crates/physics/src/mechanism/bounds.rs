@@ -10,7 +10,7 @@ use super::lagrange::Layout;
 use super::model::{BodyIndex, Model, Motion};
 use super::pairs::Rows;
 use crate::integrate::Method;
-use crate::scene::{Formulation, Scene, StartRule};
+use crate::machine::{Formulation, Machine, StartRule};
 
 /// Maximum number of matrix entries of one scene: 32 MiB.
 pub const MOST_ENTRIES: u64 = 1 << 22;
@@ -94,10 +94,10 @@ impl Cost {
     }
 
     /// Cost of the equations in one `form`; as a tree, with the joints `closed` as constraints.
-    pub fn of(form: Formulation, scene: &Scene, model: &Model, closed: &[usize]) -> Self {
+    pub fn of(form: Formulation, machine: &Machine, model: &Model, closed: &[usize]) -> Self {
         match form {
             Formulation::Tree => Self::of_tree(model, closed),
-            Formulation::Lagrange => Self::of_lagrange(&Layout::new(scene, model), model),
+            Formulation::Lagrange => Self::of_lagrange(&Layout::new(machine, model), model),
         }
     }
 
@@ -228,8 +228,8 @@ impl Cost {
 /// Approximate time of one evaluation, ns on one core of a server, as measured on chains, the paper's mechanism and machines
 /// with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass matrices and constraint
 /// rows. Only its ratio to the times of algebra counts.
-pub fn evaluation_time(scene: &Scene, model: &Model) -> f64 {
-    let cost = Cost::of(scene.formulation, scene, model, &model.ideal_joints);
+pub fn evaluation_time(machine: &Machine, model: &Model) -> f64 {
+    let cost = Cost::of(machine.formulation, machine, model, &model.ideal_joints);
     let loose = model.joints.len() - model.ideal_joints.len();
     600.0 + 6.0 * model.nv as f64 + 60.0 * loose as f64 + 0.8 * cost.products as f64
 }
@@ -253,13 +253,13 @@ pub const LARGEST_COUPLED: usize = 96;
 ///
 /// # Errors
 /// As [`Cost::check`]; the advice is the other formulation if that one is within the limits.
-pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
+pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
     let closed = match model.start {
         StartRule::AsGiven | StartRule::Settled => model.ideal_joints.clone(),
         StartRule::Ideal => (0..model.joints.len()).collect(),
     };
-    let cost = |form| Cost::of(form, scene, model, &closed);
-    let own = cost(scene.formulation);
+    let cost = |form| Cost::of(form, machine, model, &closed);
+    let own = cost(machine.formulation);
     // Joints are closed in the coordinates of the tree, whatever the formulation.
     let assembly = match closed.is_empty() && model.closures.is_empty() {
         true => Cost::default(),
@@ -268,10 +268,10 @@ pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
     if own.fits() && assembly.fits() {
         return Ok(());
     }
-    let helps = |form: &Formulation| *form != scene.formulation && cost(*form).fits();
+    let helps = |form: &Formulation| *form != machine.formulation && cost(*form).fits();
     let other = Formulation::ALL.into_iter().find(helps);
     let advice = other.filter(|_| assembly.fits()).map_or(Advice::Smaller, Advice::Formulation);
-    own.check(CostOf::Formulation(scene.formulation), advice)?;
+    own.check(CostOf::Formulation(machine.formulation), advice)?;
     assembly.check(CostOf::Assembly, advice)
 }
 
@@ -284,11 +284,12 @@ mod tests {
     use super::large::scene_text;
     use super::*;
     use crate::mechanism::{Mechanism, MechanismError};
+    use crate::scene::Scene;
 
     fn costs(kind: &str, n: usize) -> [Cost; 2] {
         let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &[]).expect("a scene");
-        let model = Model::new(&scene);
-        Formulation::ALL.map(|form| Cost::of(form, &scene, &model, &model.ideal_joints))
+        let model = Model::new(&scene.machine);
+        Formulation::ALL.map(|form| Cost::of(form, &scene.machine, &model, &model.ideal_joints))
     }
 
     #[test]
@@ -317,7 +318,7 @@ mod tests {
     fn taken(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &changes).expect("a scene");
-        match Mechanism::new(&scene) {
+        match Mechanism::new(&scene.machine) {
             Ok(_) => Ok(()),
             Err(error @ MechanismError::TooCostly { .. }) => Err(error.to_string()),
             Err(other) => panic!("{other}"),

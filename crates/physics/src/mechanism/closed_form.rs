@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use super::MechanismError;
 use crate::jet::Jet;
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 
 /// Most coordinates that one closed form drives.
 pub const MOST_DRIVEN: usize = 3;

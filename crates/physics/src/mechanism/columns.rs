@@ -3,7 +3,7 @@
 use super::equations::Equations;
 use super::model::{Anchor, BallJoint, Model};
 use crate::contact::Coefficients;
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 
 /// Jacobian columns of one contact for one coordinate: relative velocities per unit rate.
 #[derive(Clone, Copy)]

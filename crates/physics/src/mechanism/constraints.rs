@@ -6,7 +6,7 @@ use super::model::{Anchor, BodyIndex, Model};
 use super::pairs::Rows;
 use super::rows::RowSystem;
 use super::tree::{Tree, visit_columns};
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 use std::ops::Range;
 
 /// The rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n row-major from `offset`.

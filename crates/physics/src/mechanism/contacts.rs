@@ -7,7 +7,7 @@ use super::elements::{At, Contact, ForceElement, Gap, Loads, Touching};
 use super::kinematics::Kinematics;
 use super::model::Model;
 use crate::contact::{Coefficients, Parameters};
-use crate::scene::{Scene, Vec3};
+use crate::machine::{Machine, Vec3};
 
 /// A clearance that ramps to a new value.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,8 +43,8 @@ pub struct Contacts {
 
 impl Contacts {
     /// Contacts of `scene`.
-    pub fn new(scene: &Scene, model: &Model) -> Self {
-        let parameters: Vec<Parameters> = scene.ball_joints.iter().map(|j| j.contact).collect();
+    pub fn new(machine: &Machine, model: &Model) -> Self {
+        let parameters: Vec<Parameters> = machine.ball_joints.iter().map(|j| j.contact).collect();
         let joints: Vec<Contact> = model
             .joints
             .iter()

@@ -3,7 +3,7 @@
 use super::kinematics::{Driven, Kinematics, Wrench};
 use super::model::{BallJoint, BodyIndex, Model};
 use super::path::Path;
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 
 /// Smallest pivot ratio of the constraints: below it they determine the motion to fewer than four digits.
 pub(super) const LEAST_PIVOT: f64 = 1e-12;

@@ -8,7 +8,7 @@ use super::model::{Body, BodyIndex, Motion};
 use super::{Mechanism, Touching};
 use std::ops::Range;
 
-use crate::scene::{Formulation, Scene, Vec3};
+use crate::machine::{Formulation, Machine, Vec3};
 
 /// Order of the series in time.
 const ORDER: usize = 10;
@@ -30,14 +30,14 @@ pub struct Flyer {
 
 impl Flyer {
     /// Those of `scene`, none where bodies couple through ideal joints or drives must hold what others do.
-    pub(super) fn all(mechanism: &Mechanism, scene: &Scene) -> Vec<Self> {
+    pub(super) fn all(mechanism: &Mechanism, machine: &Machine) -> Vec<Self> {
         let model = &*mechanism.model;
         let separate = mechanism.equations.is_block_diagonal() && mechanism.sources.forces_suffice;
-        if !separate || scene.formulation != Formulation::Tree {
+        if !separate || machine.formulation != Formulation::Tree {
             return Vec::new();
         }
         let mut loaded = vec![false; model.bodies.len()];
-        let points = scene.elements.iter().flat_map(|element| &element.points);
+        let points = machine.elements.iter().flat_map(|element| &element.points);
         for body in points.filter_map(|point| point.body) {
             loaded[body] = true;
         }
@@ -250,6 +250,7 @@ impl Mechanism {
 mod tests {
     use super::*;
     use crate::integrate::{DormandPrince, Stepper, System};
+    use crate::scene::Scene;
 
     /// A slender body that tumbles about all its axes.
     fn tumbling() -> (Mechanism, Vec<f64>) {
@@ -278,7 +279,7 @@ mod tests {
             drive = { law = "constant", position = 0, velocity = 0 }
         "#;
         let scene = Scene::parse(text, None, &[]).expect("a scene");
-        let mut mechanism = Mechanism::new(&scene).expect("equations");
+        let mut mechanism = Mechanism::new(&scene.machine).expect("equations");
         let y = mechanism.start().expect("a start");
         (mechanism, y)
     }
@@ -318,7 +319,7 @@ mod tests {
     fn what_flies_is_left_out_of_what_moves() {
         let links = [("chain.links".to_owned(), "4".to_owned())];
         let scene = Scene::load("chain", &links).expect("a scene");
-        let mut mechanism = Mechanism::new(&scene).expect("equations");
+        let mut mechanism = Mechanism::new(&scene.machine).expect("equations");
         let dimension = mechanism.dimension();
         for flying in [&[][..], &[1], &[0, 1, 3], &[0, 1, 2, 3]] {
             mechanism.put_to_sleep(|flyer| flying.contains(&flyer));

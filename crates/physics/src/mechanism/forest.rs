@@ -7,7 +7,7 @@ use super::model::{BallJoint, BodyIndex, Model, Motion};
 use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 
 /// Spanning forest with constraint rows for what closes loops in it.
 pub(super) struct Forest {
@@ -284,15 +284,17 @@ impl Equations for Forest {
 
 #[cfg(test)]
 mod tests {
+    use crate::machine::{Formulation, Vec3};
     use crate::mechanism::{Mechanism, Touching};
-    use crate::scene::{BUILT_IN, Formulation, Scene, Vec3};
+    use crate::scene::{BUILT_IN, Scene};
 
     #[test]
     fn asking_for_the_forces_of_drives_again_changes_no_load() {
         let mut driven = 0;
         for (name, formulation) in BUILT_IN.iter().flat_map(|name| Formulation::ALL.map(|form| (name, form))) {
             let change = ("formulation".to_owned(), formulation.to_string());
-            let Ok(mut mechanism) = Scene::load(name, &[change]).map(|scene| Mechanism::new(&scene).unwrap()) else {
+            let Ok(mut mechanism) = Scene::load(name, &[change]).map(|scene| Mechanism::new(&scene.machine).unwrap())
+            else {
                 continue;
             };
             let start = mechanism.start().unwrap();

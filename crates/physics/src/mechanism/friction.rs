@@ -20,7 +20,7 @@ use super::flight::Moving;
 use super::model::{BallJoint, Model};
 use crate::contact::{Coefficients, Memory, Slope};
 use crate::integrate::{Method, add_scaled, copy, divide};
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 
 /// What a ball and one of the trees that it acts on do to each other.
 struct TreePart {
@@ -414,7 +414,7 @@ mod tests {
     fn resting() -> Vec<(Scene, Vec<f64>)> {
         let deep = 0.3e-3 + 2e-7;
         let chain = scene("chain", &[("chain.links", "3")]);
-        let mut hanging = Mechanism::new(&chain).unwrap().start().unwrap();
+        let mut hanging = Mechanism::new(&chain.machine).unwrap().start().unwrap();
         let positions = hanging.len() - 18;
         for link in 0..3 {
             let times = f64::from(link as u8 + 1);
@@ -426,7 +426,7 @@ mod tests {
         let still = [("spcmm.amplitude_x", "0"), ("spcmm.amplitude_beta", "0")];
         for closed in [&[][..], &[("joint.S2.clearance", "0")]] {
             let spcmm = scene("spcmm", &[&still, closed].concat());
-            let mechanism = &mut Mechanism::new(&spcmm).unwrap();
+            let mechanism = &mut Mechanism::new(&spcmm.machine).unwrap();
             let mut y = mechanism.start().unwrap();
             y[0] += deep;
             mechanism.project(0.0, &mut y);
@@ -438,7 +438,7 @@ mod tests {
 
     /// dv/dt along `x` by central differences of the velocities.
     fn along(scene: &Scene, memory: &[Memory], y: &[f64], x: &[f64]) -> Vec<f64> {
-        let mut mechanism = Mechanism::new(scene).unwrap();
+        let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         let positions = mechanism.positions();
         let width = 1e-9 / x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let mut at = |sign: f64| {
@@ -458,8 +458,8 @@ mod tests {
     fn a_hanging_chain_rings_as_its_links_are_pushed_back() {
         let (scene, y) = resting().swap_remove(0);
         let memory = Memory { active: true, approach_speed: 1e-3, floored: true, ..Memory::default() };
-        let memory = vec![memory; scene.ball_joints.len()];
-        let mut mechanism = Mechanism::new(&scene).unwrap();
+        let memory = vec![memory; scene.machine.ball_joints.len()];
+        let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         mechanism.prepare_friction().unwrap();
         let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
         evaluator.friction_alone().linearise(0.0, &y);
@@ -483,8 +483,8 @@ mod tests {
         for (scene, y) in resting() {
             let name = &scene.name;
             let memory = Memory { active: true, approach_speed: 1e-3, floored: true, ..Memory::default() };
-            let memory = vec![memory; scene.ball_joints.len()];
-            let mut mechanism = Mechanism::new(&scene).unwrap();
+            let memory = vec![memory; scene.machine.ball_joints.len()];
+            let mut mechanism = Mechanism::new(&scene.machine).unwrap();
             let positions = mechanism.positions();
             mechanism.prepare_friction().unwrap();
             let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
@@ -498,7 +498,7 @@ mod tests {
             assert!(mechanism.friction_rate() > shift, "{name}: not stiff");
             let x_v = &x[positions..];
             let mut smooth = scene.clone();
-            for joint in &mut smooth.ball_joints {
+            for joint in &mut smooth.machine.ball_joints {
                 joint.contact.friction = 0.0;
             }
             let with = along(&scene, &memory, &y, x_v);

@@ -16,7 +16,7 @@ use super::equations::Equations;
 use super::model::Model;
 use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
 use crate::integrate::Method;
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 
 /// Maximum number of Newton iterations, and the change of a force relative to the largest at which they stop.
 const ITERATIONS: usize = 24;

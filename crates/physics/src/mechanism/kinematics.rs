@@ -4,7 +4,7 @@ use super::closed_form::ClosedMotion;
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
-use crate::scene::{Mat3, Quat, Vec3};
+use crate::machine::{Mat3, Quat, Vec3};
 
 /// Motion of a body's centroid frame. The world is one with everything zero.
 #[derive(Clone, Copy, Debug)]

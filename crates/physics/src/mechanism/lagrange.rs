@@ -10,7 +10,7 @@ use super::pairs::{JacobianRow, Rows};
 use super::path::Path;
 use super::rows::RowSystem;
 use super::tree::visit_free;
-use crate::scene::{Mat3, Scene, Vec3};
+use crate::machine::{Machine, Mat3, Vec3};
 use std::ops::Range;
 
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
@@ -92,7 +92,7 @@ pub struct Layout {
 
 impl Layout {
     /// For `scene` compiled as `model`.
-    pub fn new(scene: &Scene, model: &Model) -> Self {
+    pub fn new(machine: &Machine, model: &Model) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         let mut rows = 0;
         let mut driver_row = vec![0; model.drives.len()];
@@ -102,7 +102,7 @@ impl Layout {
             groups.push(Group { rows: rows_of, child, parent, first });
             first
         };
-        for (b, (body, joint)) in model.bodies.iter().zip(&scene.joints).enumerate() {
+        for (b, (body, joint)) in model.bodies.iter().zip(&machine.joints).enumerate() {
             let pair = match model.linked_at(b) {
                 Some((pair, _)) => *pair,
                 None => {
@@ -146,8 +146,8 @@ impl Layout {
 
 impl Lagrange {
     /// For `scene` compiled as `model`.
-    pub fn new(scene: &Scene, model: &Model) -> Self {
-        let Layout { groups, rows, driver_row, ideal_row, closure_rows } = Layout::new(scene, model);
+    pub fn new(machine: &Machine, model: &Model) -> Self {
+        let Layout { groups, rows, driver_row, ideal_row, closure_rows } = Layout::new(machine, model);
         let group_of: Vec<usize> =
             groups.iter().enumerate().flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count())).collect();
         let pairs = pairs_of(&groups, model.world());

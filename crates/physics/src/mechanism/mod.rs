@@ -53,7 +53,8 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::scene::{Formulation, Scene, StartRule, Vec3, format_quantity_digits};
+use crate::machine::{Formulation, Machine, StartRule, Vec3};
+use crate::units::format_quantity_digits;
 use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
@@ -296,40 +297,40 @@ impl Mechanism {
     /// # Errors
     /// A trajectory that the rods cannot reach; equations that would be too costly; for a settled start, a machine that does not
     /// start without play.
-    pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
-        let model = Arc::new(Model::new(scene));
+    pub fn new(machine: &Machine) -> Result<Self, MechanismError> {
+        let model = Arc::new(Model::new(machine));
         if let Some(form) = &model.closed_form {
             form.check()?;
         }
-        bounds::check(scene, &model)?;
-        let mut mechanism = Self::with_model(scene, model);
-        if scene.start == StartRule::Settled {
-            mechanism.settled = Some(settled::settle(scene)?);
+        bounds::check(machine, &model)?;
+        let mut mechanism = Self::with_model(machine, model);
+        if machine.start == StartRule::Settled {
+            mechanism.settled = Some(settled::settle(machine)?);
         }
         Ok(mechanism)
     }
 
-    fn with_model(scene: &Scene, model: Arc<Model>) -> Self {
-        let contacts = Contacts::new(scene, &model);
-        let equations: Box<dyn Equations> = match scene.formulation {
+    fn with_model(machine: &Machine, model: Arc<Model>) -> Self {
+        let contacts = Contacts::new(machine, &model);
+        let equations: Box<dyn Equations> = match machine.formulation {
             Formulation::Tree => Box::new(Forest::new(&model)),
-            Formulation::Lagrange => Box::new(Lagrange::new(scene, &model)),
+            Formulation::Lagrange => Box::new(Lagrange::new(machine, &model)),
         };
         let path = |joint| equations.path(&model, joint);
         let mut mechanism = Self {
             paths: model.joints.iter().map(path).collect(),
-            evaluation_time: bounds::evaluation_time(scene, &model),
-            sources: power::Sources::new(&model, &*equations, scene.elements.len()),
-            elements: elements_of(scene, &model),
-            of_scene: scene.elements.len(),
+            evaluation_time: bounds::evaluation_time(machine, &model),
+            sources: power::Sources::new(&model, &*equations, machine.elements.len()),
+            elements: elements_of(machine, &model),
+            of_scene: machine.elements.len(),
             pull: None,
             evaluated: None,
             model,
             rank: None,
             equations,
             contacts,
-            gravity: scene.gravity,
-            joint_names: scene.cut_joints().map(str::to_owned).collect(),
+            gravity: machine.gravity,
+            joint_names: machine.cut_joints().map(str::to_owned).collect(),
             stiff: None,
             friction: None,
             implicit: None,
@@ -338,7 +339,7 @@ impl Mechanism {
             flyers: Vec::new(),
             moving: Moving::default(),
         };
-        mechanism.flyers = Flyer::all(&mechanism, scene);
+        mechanism.flyers = Flyer::all(&mechanism, machine);
         mechanism.moving = Moving::with_room(mechanism.flyers.len());
         mechanism.put_to_sleep(|_| false);
         mechanism
@@ -346,8 +347,8 @@ impl Mechanism {
 
     /// For resuming from a state that belongs to `structure`, without computing a start state. What live changes do not
     /// reach is shared: the scales of the tolerance are those of the start.
-    pub fn resumed(scene: &Scene, structure: &Structure) -> Self {
-        let mut mechanism = Self::with_model(scene, structure.model.clone());
+    pub fn resumed(machine: &Machine, structure: &Structure) -> Self {
+        let mut mechanism = Self::with_model(machine, structure.model.clone());
         mechanism.rank = structure.rank;
         if let Some(rank) = structure.rank {
             mechanism.equations.treat_as_dependent(rank);
@@ -648,11 +649,11 @@ impl Mechanism {
     }
 
     /// Sets or removes the hand's pull on a body of `scene`, whose equations these are.
-    pub fn set_pull(&mut self, scene: &Scene, pull: Option<Pull>) {
+    pub fn set_pull(&mut self, machine: &Machine, pull: Option<Pull>) {
         self.elements.truncate(self.of_scene);
         self.pull = pull;
         if let Some(pull) = pull {
-            let hand = elements::hand(scene, &self.model, pull);
+            let hand = elements::hand(machine, &self.model, pull);
             self.elements.push(hand);
         }
         let elements = self.elements.len();

@@ -7,7 +7,7 @@ use super::drives::{Course, Law, course_of};
 use super::factor::{NONE, Pattern};
 use super::spcmm::Trajectory;
 use crate::jet::Jet;
-use crate::scene::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
+use crate::machine::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Quat, StartRule, Vec3};
 
 /// Index of a body: those of the scene, then massless links; one past the last stands for the world.
 pub type BodyIndex = usize;
@@ -182,19 +182,19 @@ pub struct Model {
 
 impl Model {
     /// Compiles `scene`.
-    pub fn new(scene: &Scene) -> Self {
-        let massive = scene.bodies.len();
+    pub fn new(machine: &Machine) -> Self {
+        let massive = machine.bodies.len();
         let of_two = |joint: &&Joint| joint.kind.freedoms().len() == 2;
-        let world = massive + scene.joints.iter().filter(of_two).count();
+        let world = massive + machine.joints.iter().filter(of_two).count();
         let mut drives = Vec::new();
         let mut bodies: Vec<Body> = Vec::new();
         let mut links: Vec<Body> = Vec::new();
         let mut linked = Vec::new();
         let mut order = Vec::with_capacity(world);
         let mut root = vec![usize::MAX; world];
-        for (index, (body, joint)) in scene.bodies.iter().zip(&scene.joints).enumerate() {
+        for (index, (body, joint)) in machine.bodies.iter().zip(&machine.joints).enumerate() {
             let parent = joint.parent.unwrap_or(world);
-            let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
+            let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| machine.bodies[p].centre);
             let mut moves = |freedom: Freedom, drive: &Option<Drive>, body| {
                 let revolute = freedom.turns();
                 match drive {
@@ -284,7 +284,7 @@ impl Model {
             place[body] = at;
         }
 
-        let swings = drives.iter().map(|driven| driven.course.swing(scene));
+        let swings = drives.iter().map(|driven| driven.course.swing(machine));
         let shortest_period = swings.fold(f64::INFINITY, f64::min);
         let laws = drives.iter().filter_map(|driven| driven.course.law());
         let bounding = laws.filter(|law| law.bounds_steps()).cloned().collect();
@@ -302,30 +302,30 @@ impl Model {
             joints: Vec::new(),
             ideal_joints: Vec::new(),
             drives,
-            closed_form: closed_form_of(scene),
-            start: scene.start,
+            closed_form: closed_form_of(machine),
+            start: machine.start,
             start_state: Vec::new(),
             scale: Vec::new(),
-            length_scale: Scales::of(scene).length,
-            output_body: scene.output.body,
-            probe: scene.output.probe.map(|p| p - scene.bodies[scene.output.body].centre),
+            length_scale: Scales::of(machine).length,
+            output_body: machine.output.body,
+            probe: machine.output.probe.map(|p| p - machine.bodies[machine.output.body].centre),
             shortest_period,
             bounding,
         };
-        model.number_coordinates(scene, &root);
-        for (index, joint) in scene.ball_joints.iter().enumerate() {
+        model.number_coordinates(machine, &root);
+        for (index, joint) in machine.ball_joints.iter().enumerate() {
             let ideal = (joint.contact.clearance == 0.0).then(|| {
                 model.ideal_joints.push(index);
                 model.ideal_joints.len() - 1
             });
             model.joints.push(BallJoint {
-                socket: model.anchor(scene, &joint.socket),
-                ball: model.anchor(scene, &joint.ball),
+                socket: model.anchor(machine, &joint.socket),
+                ball: model.anchor(machine, &joint.ball),
                 ideal,
             });
         }
-        for joint in &scene.closing_joints {
-            let [parent, child] = joint.points().map(|point| model.anchor(scene, &point));
+        for joint in &machine.closing_joints {
+            let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
             model.closures.push(Pair::new(joint, child, parent));
         }
         model
@@ -339,12 +339,12 @@ impl Model {
     }
 
     /// Coordinate and rate at t = 0 of the joint of one degree above body `b`, as the scene gives them.
-    fn start_of(&self, scene: &Scene, b: BodyIndex) -> [f64; 2] {
+    fn start_of(&self, machine: &Machine, b: BodyIndex) -> [f64; 2] {
         let (joint, part) = match self.linked_at(b) {
             Some((pair, part)) => (pair.child.body, part),
             None => (b, 0),
         };
-        match scene.joints[joint].start {
+        match machine.joints[joint].start {
             JointStart::Scalar { position, velocity } => [position, velocity],
             JointStart::Pair { position, velocity } => [position[part], velocity[part]],
             JointStart::Pose { .. } => [0.0, 0.0],
@@ -352,16 +352,16 @@ impl Model {
     }
 
     /// A point of `scene`.
-    pub fn anchor(&self, scene: &Scene, point: &Attachment) -> Anchor {
+    pub fn anchor(&self, machine: &Machine, point: &Attachment) -> Anchor {
         Anchor {
             body: point.body.unwrap_or(self.bodies.len()),
-            offset: point.body.map_or(point.point, |b| point.point - scene.bodies[b].centre),
+            offset: point.body.map_or(point.point, |b| point.point - machine.bodies[b].centre),
         }
     }
 
     /// Numbers the coordinates tree by tree, so that each tree's are contiguous, and fills in start state and scales.
-    fn number_coordinates(&mut self, scene: &Scene, root: &[usize]) {
-        let scales = Scales::of(scene);
+    fn number_coordinates(&mut self, machine: &Machine, root: &[usize]) {
+        let scales = Scales::of(machine);
         let mut start_q: Vec<f64> = Vec::new();
         let mut start_v: Vec<f64> = Vec::new();
         let mut scale_q: Vec<f64> = Vec::new();
@@ -387,7 +387,7 @@ impl Model {
                 let above = if b == tree { NONE } else { last[self.bodies[b].parent] };
                 last[b] = above;
                 let (q, v) = (start_q.len(), start_v.len());
-                let [position, velocity] = self.start_of(scene, b);
+                let [position, velocity] = self.start_of(machine, b);
                 let mut one = |length: f64, speed: f64| {
                     start_q.push(position);
                     start_v.push(velocity);
@@ -408,8 +408,8 @@ impl Model {
                     }
                     Motion::Free { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        let (position, rotation, velocity, spin) = free_start(scene.joints[b].start);
-                        let centre = rotation * scene.bodies[b].centre;
+                        let (position, rotation, velocity, spin) = free_start(machine.joints[b].start);
+                        let centre = rotation * machine.bodies[b].centre;
                         start_q.extend((position + centre).iter());
                         start_q.extend([rotation.w, rotation.i, rotation.j, rotation.k]);
                         start_v.extend((velocity + spin.cross(&centre)).iter());
@@ -503,8 +503,8 @@ fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) 
 }
 
 /// The closed form that `scene` follows, if any.
-fn closed_form_of(scene: &Scene) -> Option<Arc<dyn ClosedForm>> {
-    let spcmm = scene.spcmm.as_ref()?;
+fn closed_form_of(machine: &Machine) -> Option<Arc<dyn ClosedForm>> {
+    let spcmm = machine.spcmm.as_ref()?;
     Some(Arc::new(Trajectory::new(spcmm)))
 }
 
@@ -528,9 +528,9 @@ struct Scales {
 }
 
 impl Scales {
-    /// Length: [`Scene::length_scale`]. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
-    fn of(scene: &Scene) -> Self {
-        let length = scene.length_scale();
+    /// Length: [`Machine::length_scale`]. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
+    fn of(machine: &Machine) -> Self {
+        let length = machine.length_scale();
         Self { length, speed: length / 0.1, angle: 0.1, angular_speed: 1.0 }
     }
 }

@@ -4,7 +4,7 @@
 use super::kinematics::Kinematics;
 use super::model::Pair;
 use crate::jet::Jet;
-use crate::scene::{JointKind, Vec3};
+use crate::machine::{JointKind, Vec3};
 
 /// Kinds of constraint rows between a child and a parent.
 #[derive(Clone, Copy, Debug)]

@@ -91,8 +91,8 @@ mod tests {
                 let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
                 let changes: Vec<_> = changes.iter().map(own).collect();
                 let scene = Scene::load(name, &changes).unwrap();
-                let mut whole = Mechanism::new(&scene).unwrap();
-                let mut along = Mechanism::new(&scene).unwrap();
+                let mut whole = Mechanism::new(&scene.machine).unwrap();
+                let mut along = Mechanism::new(&scene.machine).unwrap();
                 let start = along.start().unwrap();
                 let mut y = whole.start().unwrap();
                 along.measure(0.0, &start);
@@ -102,7 +102,7 @@ mod tests {
                 for step in 1..4 {
                     let t = 0.013 * f64::from(step);
                     whole.measure(t, &y);
-                    for j in 0..scene.ball_joints.len() {
+                    for j in 0..scene.machine.ball_joints.len() {
                         // What is not on the path does not matter.
                         let mut known = vec![f64::NAN; y.len()];
                         for part in along.measured(j).unwrap() {

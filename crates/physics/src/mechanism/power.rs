@@ -6,7 +6,7 @@ use super::elements::{ForceElement, Powers, Touch};
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 
 /// Which parts of a scene can have power.
 pub(super) struct Sources {

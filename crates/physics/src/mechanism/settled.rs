@@ -4,7 +4,7 @@
 use super::start::Assembly;
 use super::{Mechanism, MechanismError, Touching};
 use crate::contact::{Coefficients, Parameters, settled_penetration};
-use crate::scene::{Formulation, Scene, StartRule, Vec3};
+use crate::machine::{Formulation, Machine, StartRule, Vec3};
 
 /// Times that reactions and places of the balls are found from each other. The places move reactions by the clearance over the
 /// size of the machine, a thousandth or so, and each time leaves that share of what was wrong before.
@@ -22,8 +22,8 @@ pub(super) struct Settled {
 ///
 /// # Errors
 /// That machine does not start.
-pub(super) fn settle(scene: &Scene) -> Result<Settled, MechanismError> {
-    let mut twin = scene.clone();
+pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
+    let mut twin = machine.clone();
     for joint in &mut twin.ball_joints {
         joint.contact.clearance = 0.0;
     }
@@ -35,7 +35,7 @@ pub(super) fn settle(scene: &Scene) -> Result<Settled, MechanismError> {
     for _ in 0..ROUNDS {
         let mut rate = vec![0.0; state.len()];
         mechanism.evaluator(Touching::Nothing).evaluate_fully(0.0, &state, &mut rate);
-        for (j, joint) in scene.ball_joints.iter().enumerate() {
+        for (j, joint) in machine.ball_joints.iter().enumerate() {
             if joint.contact.clearance == 0.0 {
                 continue;
             }

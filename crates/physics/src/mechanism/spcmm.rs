@@ -5,7 +5,7 @@
 use super::MechanismError;
 use super::closed_form::{ClosedForm, ClosedMotion};
 use crate::jet::Jet;
-use crate::scene::{Spcmm, Vec3};
+use crate::machine::{Spcmm, Vec3};
 use nalgebra::Matrix3;
 
 /// A trajectory that a rod cannot follow.

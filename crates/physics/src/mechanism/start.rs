@@ -7,7 +7,7 @@ use super::model::{self, Model, Motion};
 use super::pairs::Opening;
 use super::tree::Tree;
 use super::{Mechanism, MechanismError, OPEN_AS_GIVEN, OpenJoint, TURNED_AS_GIVEN};
-use crate::scene::{StartRule, Vec3};
+use crate::machine::{StartRule, Vec3};
 
 /// Smallest pivot ratio at which the start velocities still have three correct digits.
 const DEPENDENT_ROWS: f64 = 1e-13;

@@ -15,7 +15,7 @@ use super::kinematics::Kinematics;
 use super::lu::Lu;
 use super::model::{BallJoint, Model};
 use crate::integrate::{add_scaled, copy, divide};
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 use nalgebra::Complex;
 use std::ops::Range;
 
@@ -442,15 +442,16 @@ fn trees_of(model: &Model) -> Vec<Range<usize>> {
 mod tests {
     use crate::contact::Memory;
     use crate::integrate::{StiffSystem, System};
+    use crate::machine::Vec3;
     use crate::mechanism::{Mechanism, Touching};
-    use crate::scene::{Scene, Vec3};
+    use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
     /// The memory of each contact holds `remembered`, m/s.
     fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [Memory; 3]) {
         let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load("spcmm", &changes).unwrap();
-        let mut mechanism = Mechanism::new(&scene).unwrap();
+        let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         let mut y = mechanism.start().unwrap();
         y[0] += 0.3e-3 + 2e-7;
         let v = mechanism.positions();
@@ -550,7 +551,7 @@ mod tests {
             + elements;
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let scene = Scene::parse(&text, None, &changes).unwrap();
-        let mut mechanism = Mechanism::new(&scene).unwrap();
+        let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         let y = mechanism.start().unwrap();
         (mechanism, y)
     }

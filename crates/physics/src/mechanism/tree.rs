@@ -7,7 +7,7 @@ use super::kinematics::{self, Driven, Kinematics, Wrench, part, spin_of};
 use super::model::{BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 
 /// Mass, first moment and inertia of a body with all its descendants, about that body's centroid.
 #[derive(Clone, Copy)]

@@ -1,19 +1,12 @@
 //! Reading and changing the parameters of a scene by key.
 
-use super::error::{brief, nearest, nearest_parameter};
+use super::error::nearest_parameter;
 use super::field::Access;
 use super::numbers::{row_of_number, row_of_own};
 use super::read::{REBUILDS, file_only};
 use super::table::{contact_part, contact_rows, find};
 use super::*;
-
-impl BallJoint {
-    /// A contact parameter of this joint by the last part of its key; `None` if there is no such part.
-    pub fn value(&self, part: &str) -> Option<Value> {
-        let (_, field) = contact_rows().find(|(of, _)| *of == part)?;
-        Some((field.get)(&self.contact))
-    }
-}
+use crate::suggest::{brief, nearest};
 
 /// A key resolved against a scene: its row, and the joint it is for.
 struct Resolved {
@@ -21,12 +14,23 @@ struct Resolved {
     joint: Option<usize>,
 }
 
+/// A contact parameter of a ball joint by the last part of its key; `None` if there is no such part.
+pub fn contact_value(joint: &BallJoint, part: &str) -> Option<Value> {
+    let (_, field) = contact_rows().find(|(of, _)| *of == part)?;
+    Some((field.get)(&joint.contact))
+}
+
 impl Scene {
+    /// Keys (without prefix) in which ball joint `joint` differs from the scene's `contact.*`.
+    pub fn overrides(&self, joint: usize) -> &[&'static str] {
+        &self.overrides[joint]
+    }
+
     /// Whether this scene has a row's keys.
     fn has(&self, parameter: &Parameter) -> bool {
         match parameter.scope {
             Scope::Every | Scope::Contact => true,
-            Scope::Spcmm => self.spcmm.is_some(),
+            Scope::Spcmm => self.machine.spcmm.is_some(),
             Scope::Chain => self.chain.is_some(),
             Scope::Own => self.source.numbers.contains_key(parameter.key),
         }
@@ -75,11 +79,11 @@ impl Scene {
                 }
             };
         };
-        let Some(joint) = self.ball_joints.iter().position(|joint| joint.name == name) else {
-            let names: Vec<&str> = self.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+        let Some(joint) = self.machine.ball_joints.iter().position(|joint| joint.name == name) else {
+            let names: Vec<&str> = self.machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
             let listed = if names.len() > 12 { format!("{}, …", names[..12].join(", ")) } else { names.join(", ") };
             let first = name.split('.').next().unwrap_or(name);
-            let mut others = self.joints.iter().chain(&self.closing_joints);
+            let mut others = self.machine.joints.iter().chain(&self.machine.closing_joints);
             let hinge = others.any(|joint| joint.name == first);
             let message = if hinge {
                 // Its numbers are keys where the file gives them.
@@ -117,8 +121,8 @@ impl Scene {
         let Resolved { parameter, joint } = self.resolve(key)?;
         Ok(match parameter.access {
             Access::Contact(field) => {
-                let own = joint.map(|joint| &self.ball_joints[joint].contact);
-                (field.get)(own.unwrap_or(&self.contact))
+                let own = joint.map(|joint| &self.machine.ball_joints[joint].contact);
+                (field.get)(own.unwrap_or(&self.machine.contact))
             }
             Access::Scene(field) => (field.get)(self),
             Access::Number => {
@@ -147,7 +151,7 @@ impl Scene {
         if REBUILDS.contains(&key) || matches!(parameter.access, Access::Number) {
             next = next.rebuilt()?;
         }
-        next.check_contacts().map_err(|fault| fault.blame_change(&next, key))?;
+        next.machine.check_contacts().map_err(|conflict| next.blame_change(&conflict, key))?;
         *self = next;
         Ok(parameter)
     }
@@ -204,11 +208,10 @@ impl Scene {
         let value = parameter.read(text).map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
         match (parameter.access, joint) {
             (Access::Contact(field), Some(joint)) => {
-                let joint = &mut self.ball_joints[joint];
-                (field.set)(&mut joint.contact, &value);
+                (field.set)(&mut self.machine.ball_joints[joint].contact, &value);
                 let part = contact_part(parameter).unwrap_or_default();
-                if !joint.overrides.contains(&part) {
-                    joint.overrides.push(part);
+                if !self.overrides[joint].contains(&part) {
+                    self.overrides[joint].push(part);
                 }
             }
             _ => self.write(parameter, &value),
@@ -230,10 +233,10 @@ impl Scene {
     pub(super) fn write(&mut self, parameter: &'static Parameter, value: &Value) {
         match parameter.access {
             Access::Contact(field) => {
-                (field.set)(&mut self.contact, value);
+                (field.set)(&mut self.machine.contact, value);
                 let part = contact_part(parameter).unwrap_or_default();
-                let joints = self.ball_joints.iter_mut();
-                for joint in joints.filter(|joint| !joint.overrides.contains(&part)) {
+                let joints = self.machine.ball_joints.iter_mut().zip(&self.overrides);
+                for (joint, _) in joints.filter(|(_, overrides)| !overrides.contains(&part)) {
                     (field.set)(&mut joint.contact, value);
                 }
             }
@@ -247,7 +250,7 @@ impl Scene {
     pub(super) fn apply_preset(&mut self, preset: Preset) {
         let (method, step, tolerance) = preset.point();
         let [method_free, step_free, tolerance_free] = SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));
-        let solver = &mut self.solver;
+        let solver = &mut self.machine.solver;
         solver.preset = Some(preset);
         if method_free {
             solver.method = method;

@@ -23,9 +23,10 @@ pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<
     let socket = link.vector("socket")?;
     let opening = link.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
     let links = scene.chain.map_or(0, |chain| chain.links);
-    for (so_far, most, what) in
-        [(scene.bodies.len(), MOST_BODIES, "bodies"), (scene.ball_joints.len(), MOST_BALL_JOINTS, "ball joints")]
-    {
+    for (so_far, most, what) in [
+        (scene.machine.bodies.len(), MOST_BODIES, "bodies"),
+        (scene.machine.ball_joints.len(), MOST_BALL_JOINTS, "ball joints"),
+    ] {
         if so_far + links > most {
             let message =
                 format!("too many {what} with those of the file: {so_far} and {links}; allowed at most {most}");
@@ -43,16 +44,16 @@ pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<
         number.is_some_and(|number| (1..=links).contains(&number))
     };
     let joint_used = |name: &str| used(name, "free") || used(name, "J");
-    if scene.bodies.iter().any(|body| used(&body.name, "link"))
-        || scene.joints.iter().any(|joint| joint_used(&joint.name))
-        || scene.ball_joints.iter().any(|joint| joint_used(&joint.name))
+    if scene.machine.bodies.iter().any(|body| used(&body.name, "link"))
+        || scene.machine.joints.iter().any(|joint| joint_used(&joint.name))
+        || scene.machine.ball_joints.iter().any(|joint| joint_used(&joint.name))
     {
         let message = "the file already uses a name that the chain needs: bodies link1, link2, …, joints free1, free2, … \
                        and J1, J2, …";
         return Err(link.error("", message));
     }
 
-    let first = scene.bodies.len();
+    let first = scene.machine.bodies.len();
     let step = rotation * (socket - ball);
     for index in 0..links {
         let number = index + 1;
@@ -66,8 +67,7 @@ pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<
             ball: Attachment { body: Some(first + index), point: ball },
             // The world's socket has world axes; the links' sockets rotate with the links.
             opening: if index == 0 { rotation * opening } else { opening },
-            contact: scene.contact,
-            overrides: Vec::new(),
+            contact: scene.machine.contact,
         };
         let joint = Joint {
             name: format!("free{number}"),
@@ -89,9 +89,10 @@ pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<
             },
             drawn: true,
         };
-        scene.bodies.push(body);
-        scene.joints.push(joint);
-        scene.ball_joints.push(ball_joint);
+        scene.machine.bodies.push(body);
+        scene.machine.joints.push(joint);
+        scene.machine.ball_joints.push(ball_joint);
+        scene.overrides.push(Vec::new());
     }
     read_own(&section, scene, links)
 }
@@ -103,23 +104,25 @@ fn read_own<'d>(
     links: usize,
 ) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
     let mut places = BTreeMap::new();
-    let first = scene.ball_joints.len() - links;
+    let first = scene.machine.ball_joints.len() - links;
     let list = section.get("joint").map(|node| node.entries());
     for node in list.transpose()?.unwrap_or_default() {
         let own = node.section_as(node.title("chain.joint"))?;
         let name = own.require("name")?.name()?;
-        let joints = &mut scene.ball_joints[first..];
+        let joints = &mut scene.machine.ball_joints[first..];
         let number = name.strip_prefix('J').and_then(|n| n.parse::<usize>().ok());
-        let found = number.and_then(|n| joints.get_mut(n.checked_sub(1)?));
-        let Some(joint) = found.filter(|joint| joint.name == name) else {
+        let index = number.and_then(|n| n.checked_sub(1));
+        let Some(index) = index.filter(|n| joints.get(*n).is_some_and(|joint| joint.name == name)) else {
             let message = format!("the chain has no ball joint `{name}`; it has {links} links: J1 to J{links}");
             return Err(own.error("name", message));
         };
-        if !joint.overrides.is_empty() {
+        if !scene.overrides[first + index].is_empty() {
             let message = format!("the ball joint `{name}` is listed twice");
             return Err(own.error("name", message));
         }
-        places.extend(read_own_contact(&own, joint)?);
+        let given = read_own_contact(&own, &mut joints[index])?;
+        scene.overrides[first + index] = given.keys().copied().collect();
+        places.extend(given.into_iter().map(|(part, node)| (format!("joint.{name}.{part}"), node)));
     }
     Ok(places)
 }

@@ -1,207 +1,44 @@
-//! Consistency checks between the parameters of a scene, and warnings about choices that are allowed but doubtful.
+//! Which key of a scene is to blame for an inconsistency.
 
 use super::error::{line_text, place_of};
-use super::table::contact_rows;
 use super::*;
-use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
-use crate::integrate::Method;
-use std::cmp::Ordering;
-
-/// With fewer fixed steps than this much of an impact is lost; twice as many resolve it. Implicit Euler contacts need more:
-/// numerical damping takes about the same share of an impact as a step does of its duration.
-pub fn least_impact_steps(method: Method) -> u64 {
-    match method {
-        Method::ImexEuler => 40,
-        _ => 5,
-    }
-}
-
-/// Loosest tolerance at which impacts conserve energy to a few per cent.
-const LOOSEST: f64 = 1e-3;
-
-/// Most sentences about ball joints; a last one stands for the rest.
-const MOST_LISTED: usize = 40;
-
-/// Largest difference between the restitution that a law gives and the one asked for. The paper's 0.9, of which its law makes
-/// 0.913, is within it.
-const RESTITUTION_ERROR: f64 = 0.02;
-
-/// A slide's stop counts as a ball this many times as large as its depth.
-const OF_A_DEPTH: f64 = 50.0;
+use crate::machine::ContactConflict;
+use crate::mechanism::{CostOf, MechanismError};
+use crate::simulate::StartError;
 
 impl Scene {
-    /// Length that a relative tolerance multiplies, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
-    /// most 1 m. A joint that closes a loop counts as a ball joint of the scene's radius.
-    pub fn length_scale(&self) -> f64 {
-        let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
-        let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
-        let along = self.elements.iter().filter(|element| !element.on_hinge);
-        let depths = along.filter_map(|element| Some(OF_A_DEPTH * element.number(element.kind.depth?)));
-        radii.chain(closing).chain(depths).fold(1.0, f64::min)
-    }
-
-    /// Checks the contact parameters of each joint for consistency.
-    pub(super) fn check_contacts(&self) -> Result<(), Fault> {
-        let joints = self.ball_joints.iter().enumerate();
-        let own = joints.map(|(index, joint)| (Some(index), &joint.contact));
-        for (joint, contact) in std::iter::once((None, &self.contact)).chain(own) {
-            check_contact(contact).map_err(|fault| Fault { joint, fault })?;
-        }
-        Ok(())
-    }
-
-    /// Choices that are allowed but may not mean what the user expects: [`Self::doubts`], and whatever slows a run down.
-    pub fn warnings(&self) -> Vec<Warning> {
-        let doubts = self.doubts().into_iter();
-        let mut warnings: Vec<Warning> = doubts.map(Warning::Doubt).collect();
-        let doubts = warnings.len();
-        for (joints, contact) in self.contact_groups() {
-            if warnings.len() - doubts >= MOST_LISTED {
-                warnings.push(Warning::Doubt(Doubt::MoreJoints));
-                break;
+    /// Why its machine cannot start, with the line of the file and the change that it concerns.
+    pub fn locate(&self, error: &StartError) -> SceneError {
+        let one = |joint: &str, parts: &[&str]| {
+            let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
+            for part in parts {
+                keys.push(format!("contact.{part}"));
+                keys.push(format!("joint.{joint}.{part}"));
             }
-            if contact.clearance > 0.0
-                && contact.slip_speed_high < 1e-6
-                && contact.friction_law == FrictionLaw::ModifiedCoulomb
-            {
-                warnings.push(Warning::StiffFriction { joints, slip_speed_high: contact.slip_speed_high });
+            (format!("joint.{joint}"), keys)
+        };
+        let (title, keys) = match &error.0 {
+            MechanismError::Unreachable(_) | MechanismError::OtherBranch | MechanismError::Singular => {
+                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
             }
-        }
-        warnings.extend(self.mesh_unit_warning());
-        warnings
-    }
-
-    /// Reasons to doubt any result of this scene, whatever happens in the run.
-    pub fn doubts(&self) -> Vec<Doubt> {
-        let mut doubts = Vec::new();
-        for (joints, contact) in self.contact_groups() {
-            if doubts.len() >= MOST_LISTED {
-                doubts.push(Doubt::MoreJoints);
-                break;
+            MechanismError::Open { given: gap }
+            | MechanismError::NoClosure { given: gap, .. }
+            | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
+            MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
+            MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
+                let keys = ["solver.method", "chain.links", "formulation"];
+                let of_form = matches!(error.0, MechanismError::TooCostly { of: CostOf::Formulation(_), .. });
+                let title = if of_form { keys[2] } else { keys[0] };
+                (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
-            let (law, asked) = (contact.normal_law, contact.restitution);
-            let given = contact::undisturbed_restitution(contact::damping_factor(law, asked));
-            if contact.clearance > 0.0 && (given - asked).abs() > RESTITUTION_ERROR {
-                doubts.push(Doubt::Restitution { joints: joints.clone(), law, asked, given });
-            }
-            if contact.clearance > 0.0
-                && contact.friction_velocity == FrictionVelocity::Printed
-                && contact.friction_law != FrictionLaw::None
-                && contact.friction > 0.0
-            {
-                doubts.push(Doubt::PrintedFriction { joints: joints.clone() });
-            }
-            if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
-                doubts.push(Doubt::Clearance {
-                    joints,
-                    clearance: contact.clearance,
-                    ball_radius: contact.ball_radius,
-                });
-            }
-        }
-        doubts.extend(self.step_warning());
-        doubts.extend(self.tolerance_warning());
-        doubts
-    }
-
-    /// Warns of a tolerance too loose for impacts.
-    fn tolerance_warning(&self) -> Option<Doubt> {
-        let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
-        let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
-        (rattles && loose).then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST })
-    }
-
-    /// Warns of a fixed step too long for the shortest expected impact, and recommends one that is not.
-    fn step_warning(&self) -> Option<Doubt> {
-        if self.solver.method.is_adaptive() {
-            return None;
-        }
-        let clearances = self.ball_joints.iter().filter(|j| j.contact.clearance > 0.0);
-        let pushes = self.pushes();
-        let (joint, duration) = clearances
-            .map(|joint| (joint, self.impact_duration(joint, &pushes)))
-            .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
-        let (impact, friction) = duration;
-        let duration = impact / friction;
-        let steps = least_impact_steps(self.solver.method) as f64;
-        if self.solver.step <= duration / steps {
-            return None;
-        }
-        // Round to 1, 2 or 5 times a power of ten.
-        let most = duration / (2.0 * steps);
-        let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
-        let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
-        let recommended = digit.unwrap_or(1.0) * decade;
-        Some(Doubt::Step {
-            joint: joint.name.clone(),
-            step: self.solver.step,
-            duration,
-            sliding: friction > 1.0,
-            // It integrates force elements explicitly.
-            stable: self.solver.method == Method::ImexEuler && friction <= 1.0 && self.elements.is_empty(),
-            recommended,
-        })
-    }
-
-    /// Sum of the magnitudes of the forces of elements on each body, N. What the stretch of a spring adds is left out: it needs
-    /// the start poses.
-    fn pushes(&self) -> Vec<f64> {
-        let mut pushes = vec![0.0; self.bodies.len()];
-        for element in &self.elements {
-            for body in element.points.iter().filter_map(|point| point.body) {
-                pushes[body] += (element.kind.force)(element);
-            }
-        }
-        pushes
-    }
-
-    /// Bound on the acceleration between bodies that gravity and forces, each N on kg, can cause, m/s^2.
-    pub fn most_acceleration(&self, pushes: impl IntoIterator<Item = (f64, f64)>) -> f64 {
-        let pushes = pushes.into_iter().map(|(force, mass)| force / mass);
-        pushes.fold(self.gravity.norm(), |sum, push| sum + push)
-    }
-
-    /// Estimated duration of the first impact of a joint with clearance, s, whose bodies gravity and the forces `pushes` (N, by
-    /// body) drive through the gap, or of the oscillation under those forces, if shorter; and how many times within it friction
-    /// could reverse sliding at the approach speed, at least 1.
-    fn impact_duration(&self, joint: &BallJoint, pushes: &[f64]) -> (f64, f64) {
-        let c = &joint.contact;
-        let coefficients = contact::Coefficients::new(c, c.clearance);
-        // Inverse effective masses at the ball's centre, normal and in sliding: a force there also rotates the body.
-        let (mut normal, mut sliding) = (0.0, 0.0);
-        let mut pushed = Vec::new();
-        for attachment in [&joint.ball, &joint.socket] {
-            let Some(b) = attachment.body else { continue };
-            let (body, hung) = (&self.bodies[b], &self.joints[b]);
-            if hung.is_prescribed() {
-                continue;
-            }
-            let arm = (attachment.point - body.centre).norm_squared();
-            let moments = body.inertia.symmetric_eigenvalues();
-            let at_centre = 1.0 / body.mass + arm / moments.max();
-            normal += at_centre;
-            let turning = match c.friction_velocity {
-                contact::FrictionVelocity::Surface => c.ball_radius * c.ball_radius / moments.min(),
-                contact::FrictionVelocity::Centres | contact::FrictionVelocity::Printed => 0.0,
-            };
-            sliding += at_centre + turning;
-            pushed.push((pushes[b], body.mass));
-        }
-        if normal == 0.0 {
-            return (f64::INFINITY, 1.0);
-        }
-        let load = pushed.iter().map(|(force, _)| force).sum();
-        let fall = (2.0 * self.most_acceleration(pushed) * c.clearance).sqrt();
-        let speed = fall.max(c.impact_speed_floor);
-        let (stiffness, damping) = (coefficients.stiffness, coefficients.damping);
-        let duration = contact::impact_duration(stiffness, damping, 1.0 / normal, speed)
-            .min(contact::settled_half_period(stiffness, 1.0 / normal, load));
-        (duration, (coefficients.friction * sliding / normal).max(1.0))
+            MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
+        };
+        self.start_error(&title, &keys, error.to_string())
     }
 
     /// An error found when the scene starts, about `title` (see [`Source::places`]): it points to that line of the file,
     /// and names the latest change whose key is among `keys` or, for those ending in a dot, begins with one.
-    pub fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
+    fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
         let concerns =
             |changed: &str| keys.iter().any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)));
         let change = self.changes.iter().rfind(|(changed, _)| concerns(changed));
@@ -219,143 +56,95 @@ impl Scene {
         }
         error
     }
-
-    /// Groups of ball joints with equal contact parameters, with their names.
-    fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
-        let values = |joint: &BallJoint| -> Vec<Value> {
-            let rows = contact_rows();
-            rows.map(|(_, field)| (field.get)(&joint.contact)).collect()
-        };
-        let joints = self.ball_joints.iter().enumerate();
-        let mut joints: Vec<_> = joints.map(|(j, joint)| (values(joint), j)).collect();
-        // No value is NaN: ranges have no place for it.
-        joints.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
-        let mut groups: Vec<_> = joints.chunk_by(|a, b| a.0 == b.0).collect();
-        groups.sort_by_key(|group| group[0].1);
-        let name = |&(_, j): &(Vec<Value>, usize)| self.ball_joints[j].name.as_str();
-        let title = |group: &[_]| match group {
-            [first, .., last] if group.len() > 6 => format!("{} to {}", name(first), name(last)),
-            _ => group.iter().map(name).collect::<Vec<_>>().join(", "),
-        };
-        groups.into_iter().map(|group| (title(group), self.ball_joints[group[0].1].contact)).collect()
-    }
 }
 
-/// Two contact parameters that are inconsistent.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
-pub(super) enum ContactFault {
-    #[error(
-        "clearance {} must be below the ball radius, {}; allowed 0 mm to below {1}; units {}",
-        format_quantity(*.clearance, "mm"),
-        format_quantity(*.ball_radius, "mm"),
-        unit_names(Dimension::Length).join(", ")
-    )]
-    Clearance { clearance: f64, ball_radius: f64 },
-    #[error(
-        "slip_speed_low {} must be below slip_speed_high {}; units {}",
-        format_quantity(*.low, "mm/s"),
-        format_quantity(*.high, "mm/s"),
-        unit_names(Dimension::Speed).join(", ")
-    )]
-    SlipSpeeds { low: f64, high: f64 },
-    #[error("the law {0} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit")]
-    DividesByRestitution(NormalLaw),
-}
-
-impl ContactFault {
-    /// Last parts of the keys at fault, the likelier first.
-    fn parts(&self) -> [&'static str; 2] {
-        match self {
-            Self::Clearance { .. } => ["clearance", "ball_radius"],
-            Self::SlipSpeeds { .. } => ["slip_speed_low", "slip_speed_high"],
-            Self::DividesByRestitution(_) => ["restitution", "normal_law"],
-        }
-    }
-}
-
-/// An inconsistency of the scene's contact parameters, or of those of one of its joints.
-pub(super) struct Fault {
-    pub joint: Option<usize>,
-    pub fault: ContactFault,
-}
-
-impl Fault {
-    /// Keys that could be at fault in `scene`, the likelier first.
-    pub fn keys(&self, scene: &Scene) -> Vec<String> {
-        let joint = self.joint.map(|index| &scene.ball_joints[index]);
-        let key = |part| match joint {
-            Some(joint) if joint.overrides.contains(&part) => {
-                format!("joint.{}.{part}", joint.name)
+impl Scene {
+    /// Keys that could be at fault, the likelier first.
+    pub(super) fn keys_of(&self, conflict: &ContactConflict) -> Vec<String> {
+        let key = |part| match conflict.joint {
+            Some(joint) if self.overrides[joint].contains(&part) => {
+                format!("joint.{}.{part}", self.machine.ball_joints[joint].name)
             }
             _ => format!("contact.{part}"),
         };
-        let mut keys: Vec<String> = self.fault.parts().into_iter().map(key).collect();
+        let mut keys: Vec<String> = conflict.fault.parts().into_iter().map(key).collect();
         // A joint's own setting is likelier at fault than the general one.
         keys.sort_by_key(|key| !key.starts_with("joint."));
         keys
     }
 
-    fn text(&self, scene: &Scene, key: &str) -> String {
-        match self.joint.map(|index| &scene.ball_joints[index].name) {
+    fn conflict_text(&self, conflict: &ContactConflict, key: &str) -> String {
+        match conflict.joint.map(|index| &self.machine.ball_joints[index].name) {
             Some(name) if !key.starts_with("joint.") => {
-                format!("{} (in ball joint {name})", self.fault)
+                format!("{} (in ball joint {name})", conflict.fault)
             }
-            _ => self.fault.to_string(),
+            _ => conflict.fault.to_string(),
         }
     }
 
-    /// The error for the change of `key` that introduced the fault.
-    pub fn blame_change(&self, scene: &Scene, key: &str) -> SceneError {
-        let value = scene.changes.iter().rfind(|(changed, _)| changed == key).map(|(_, value)| value.as_str());
-        SceneError::about(key, value, self.text(scene, key))
+    /// The error for the change of `key` that introduced the conflict.
+    pub(super) fn blame_change(&self, conflict: &ContactConflict, key: &str) -> SceneError {
+        let value = self.changes.iter().rfind(|(changed, _)| changed == key).map(|(_, value)| value.as_str());
+        SceneError::about(key, value, self.conflict_text(conflict, key))
     }
 
-    /// The error for the latest change related to the fault; `None` if the fault was in the file.
-    pub fn blame_changes(&self, scene: &Scene) -> Option<SceneError> {
-        let keys = self.keys(scene);
-        let (key, _) = scene.changes.iter().rfind(|(changed, _)| keys.contains(changed))?;
-        Some(self.blame_change(scene, key))
+    /// The error for the latest change related to the conflict; `None` if it was in the file.
+    pub(super) fn blame_changes(&self, conflict: &ContactConflict) -> Option<SceneError> {
+        let keys = self.keys_of(conflict);
+        let (key, _) = self.changes.iter().rfind(|(changed, _)| keys.contains(changed))?;
+        Some(self.blame_change(conflict, key))
     }
-}
-
-fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
-    if contact.clearance >= contact.ball_radius {
-        return Err(ContactFault::Clearance { clearance: contact.clearance, ball_radius: contact.ball_radius });
-    }
-    if contact.slip_speed_low >= contact.slip_speed_high {
-        return Err(ContactFault::SlipSpeeds { low: contact.slip_speed_low, high: contact.slip_speed_high });
-    }
-    let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
-    if divides && contact.restitution == 0.0 {
-        return Err(ContactFault::DividesByRestitution(contact.normal_law));
-    }
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::built_in_text;
+    use crate::simulate::{Frame, Simulation};
 
-    /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
-    fn doubted(sections: &str) -> Option<f64> {
-        let text = format!("{}\n{sections}", built_in_text("pendulum").expect("built in"));
-        let method = ("solver.method".to_owned(), "rk4".to_owned());
-        let step = ("solver.step".to_owned(), "10 us".to_owned());
-        let scene = Scene::parse(&text, None, &[method, step]).expect("reads");
-        scene.doubts().into_iter().find_map(|doubt| match doubt {
-            Doubt::Step { duration, .. } => Some(duration),
-            _ => None,
-        })
+    fn start_error(text: &str, changes: &[(&str, &str)]) -> SceneError {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        let scene = Scene::parse(text, Some("mine.toml"), &changes).expect("reads");
+        let error = Simulation::new(&scene.machine).err().expect("cannot start");
+        scene.locate(&error)
     }
 
     #[test]
-    fn a_load_shortens_the_estimated_impact() {
-        let load = |force: &str| {
-            let on = "{ body = \"rod\", at = [0, 0, 0] }";
-            format!("[[load]]\nname = \"l\"\non = {on}\nforce = \"0 0 {force}\"\n")
+    fn a_start_error_points_to_its_line_and_names_the_change() {
+        let text = built_in_text("spcmm").expect("built in");
+        let line_of = |text: &str, what: &str| {
+            let at = text.lines().position(|line| line == what);
+            at.map(|at| at as u32 + 1)
         };
-        assert_eq!(doubted(&load("1 N")), None);
-        let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted(&load(force)).expect("short"));
-        assert!(less < 5e-5 && more < 0.5 * less, "{less:e} {more:e}");
+        let far = text.replace("amplitude_x = \"25 mm\"", "amplitude_x = \"200 mm\"");
+        let error = start_error(&far, &[]);
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[spcmm]"));
+        assert_eq!(error.line_text.as_deref(), Some("[spcmm]"));
+        let error = start_error(text, &[("spcmm.amplitude_x", "200 mm")]);
+        assert_eq!(error.key.as_deref(), Some("spcmm.amplitude_x"));
+        assert!(error.to_string().starts_with("mine.toml:"), "{error}");
+
+        let text = built_in_text("slider-crank").expect("built in");
+        let open = text.replace("at = \"0 0 80 mm\"", "at = \"0 0 380 mm\"");
+        let error = start_error(&open, &[]);
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[[ball_joint]]"));
+        assert!(error.to_string().contains("ball joint B"), "{error}");
+    }
+
+    #[test]
+    fn values_as_given_are_not_turned_to_the_closed_form() {
+        let text = built_in_text("spcmm").expect("built in");
+        let given = text
+            .replace("start = \"ideal\"", "start = \"as-given\"")
+            .replace("0.4106585548949 rad", "0.4111585548949 rad");
+        let scene = Scene::parse(&given, None, &[]).expect("reads");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        let eccentricities = frame.joints.iter().map(|joint| joint.eccentricity.norm());
+        let most = eccentricities.fold(0.0, f64::max);
+        // Half a milliradian at the end of a rod of 200 mm.
+        assert!((most / 0.1e-3 - 1.0).abs() < 0.01, "{most}");
     }
 }

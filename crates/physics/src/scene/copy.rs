@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::model::{Quat, Vec3};
+use crate::machine::{Quat, Vec3};
 
 /// One copy of a pattern: what its names become, and where what it leaves to the outside lies.
 #[derive(Clone, Debug)]

@@ -2,14 +2,15 @@
 
 use super::beside::Beside;
 use super::copy::Copy as PatternCopy;
-use super::error::{brief, nearest, place_of};
+use super::error::place_of;
 use super::given::{FileNumber, Place};
 use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
 use super::parameters::{Kind, ValueFault};
 use super::reading::Reading;
-use super::units::{all_units, same_unit, split_unit};
 use super::visible::visible_line;
 use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
+use crate::suggest::{brief, nearest};
+use crate::units::{all_units, same_unit, split_unit};
 use crate::words::Words;
 use std::borrow::Cow;
 use std::ops::Range;

@@ -33,9 +33,20 @@ const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it
 const DURATION: FileKey =
     key("duration", Takes::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
 
+/// A law of driven joints in a scene file.
+#[derive(Debug)]
+pub struct DriveLaw {
+    /// Word of the file: `law = "harmonic"`.
+    pub word: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Its keys.
+    pub keys: &'static [FileKey],
+}
+
 /// Every law of a drive. On a hinge lengths are angles, and speeds angular speeds.
-pub static DRIVE_KINDS: [DriveKind; 8] = [
-    DriveKind {
+pub static DRIVE_LAWS: [DriveLaw; 8] = [
+    DriveLaw {
         word: "spcmm",
         help: "slider of the paper's machine; places the joint itself",
         keys: &[key(
@@ -45,7 +56,7 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
             "which slider: 1, 2 or 3",
         )],
     },
-    DriveKind {
+    DriveLaw {
         word: "constant",
         help: "position + velocity t",
         keys: &[
@@ -59,12 +70,12 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
             .on_hinge(Dimension::AngularSpeed, "\"6 rad/s\""),
         ],
     },
-    DriveKind {
+    DriveLaw {
         word: "harmonic",
         help: "mean + amplitude sin(2π frequency t + phase)",
         keys: &[MEAN, TERM[0], TERM[1], TERM[2]],
     },
-    DriveKind {
+    DriveLaw {
         word: "harmonics",
         help: "mean + a sum of harmonics",
         keys: &[
@@ -81,7 +92,7 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
             ),
         ],
     },
-    DriveKind {
+    DriveLaw {
         word: "ramp",
         help: "from one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s³ - 15 s⁴ + 6 s⁵), \
                whose rate and acceleration are 0 at both ends",
@@ -92,7 +103,7 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
             DURATION,
         ],
     },
-    DriveKind {
+    DriveLaw {
         word: "pulse",
         help: "one bump: with s from 0 to 1 over the duration, base + height sin³(π s)",
         keys: &[
@@ -102,7 +113,7 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
             DURATION,
         ],
     },
-    DriveKind {
+    DriveLaw {
         word: "table",
         help: "cubic spline through points",
         keys: &[
@@ -136,7 +147,7 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
             .absent("false"),
         ],
     },
-    DriveKind {
+    DriveLaw {
         word: "formula",
         help: "an expression of the time t in s, see below",
         keys: &[
@@ -164,19 +175,28 @@ pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<
     node.document.on_hinge = turns;
     let section = node.section()?;
     let law = section.require("law")?;
-    let word = law.choice()?;
-    let row = DRIVE_KINDS.iter().find(|row| row.word == word);
-    let row = row.expect("its words are those of the rows");
-    let numbers = row.numbers().map(|number| section.number(number.name));
-    let numbers = numbers.collect::<Result<_, _>>()?;
-    let data = match row.word {
+    let number = |name: &str| section.number(name);
+    Ok(match law.choice()? {
         "spcmm" => read_slider(&section, &law, scene)?,
-        "harmonics" => read_terms(&section)?,
+        "constant" => Drive::Constant { position: number("position")?, velocity: number("velocity")? },
+        "harmonic" => Drive::Harmonic { mean: number("mean")?, terms: vec![read_term(&section)?] },
+        "harmonics" => Drive::Harmonic { mean: number("mean")?, terms: read_terms(&section)? },
+        "ramp" => Drive::Ramp {
+            from: number("from")?,
+            to: number("to")?,
+            start: number("start")?,
+            duration: number("duration")?,
+        },
+        "pulse" => Drive::Pulse {
+            base: number("base")?,
+            height: number("height")?,
+            start: number("start")?,
+            duration: number("duration")?,
+        },
         "table" => read_table(&section)?,
         "formula" => read_law_of_formula(&section)?,
-        _ => DriveData::Numbers,
-    };
-    Ok(Drive { kind: row, numbers, data })
+        word => unreachable!("`{word}` has a row and no reader"),
+    })
 }
 
 /// Dimension of the joint's coordinate.
@@ -187,40 +207,39 @@ fn coordinate(section: &Section<'_>) -> Dimension {
     }
 }
 
-fn read_slider(section: &Section<'_>, law: &Node<'_>, scene: &Scene) -> Result<DriveData, SceneError> {
+fn read_slider(section: &Section<'_>, law: &Node<'_>, scene: &Scene) -> Result<Drive, SceneError> {
     if section.document.on_hinge {
         return Err(law.error(SLIDERS_ONLY));
     }
-    if scene.spcmm.is_none() {
+    if scene.machine.spcmm.is_none() {
         return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
     }
     let slider = section.require("slider")?;
     match slider.scalar()?.parse::<u8>() {
-        Ok(number @ 1..=3) => Ok(DriveData::Slider(number as usize - 1)),
+        Ok(number @ 1..=3) => Ok(Drive::ClosedForm(number as usize - 1)),
         _ => Err(slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")),
     }
 }
 
-fn read_terms(section: &Section<'_>) -> Result<DriveData, SceneError> {
+fn read_term(section: &Section<'_>) -> Result<Harmonic, SceneError> {
+    Ok(Harmonic {
+        amplitude: section.number("amplitude")?,
+        frequency: section.number("frequency")?,
+        phase: section.number("phase")?,
+    })
+}
+
+fn read_terms(section: &Section<'_>) -> Result<Vec<Harmonic>, SceneError> {
     let node = section.require("terms")?;
     let nodes = node.entries()?;
     if nodes.is_empty() {
         let like = node.like();
         return Err(node.error(format!("needs a term; write for example `terms = {like}`")));
     }
-    let term = |node: Node<'_>| {
-        let section = node.section()?;
-        let mut term = [0.0; 3];
-        for (value, row) in term.iter_mut().zip(&TERM) {
-            *value = section.number(row.name)?;
-        }
-        Ok(term)
-    };
-    let terms = nodes.into_iter().map(term).collect::<Result<_, _>>()?;
-    Ok(DriveData::Terms(terms))
+    nodes.into_iter().map(|node| read_term(&node.section()?)).collect()
 }
 
-fn read_table(section: &Section<'_>) -> Result<DriveData, SceneError> {
+fn read_table(section: &Section<'_>) -> Result<Drive, SceneError> {
     let repeats = section.get("repeat").map_or(Ok(false), |node| node.flag())?;
     let graph = Graph::motion(coordinate(section), repeats);
     let points = match (section.get("points"), section.get("file")) {
@@ -230,12 +249,12 @@ fn read_table(section: &Section<'_>) -> Result<DriveData, SceneError> {
         (None, Some(file)) => read_file(&file, &graph)?,
         _ => read_points(&section.require("points")?, &graph)?,
     };
-    Ok(DriveData::Points { points, repeats })
+    Ok(Drive::Table { points, repeats })
 }
 
-fn read_law_of_formula(section: &Section<'_>) -> Result<DriveData, SceneError> {
+fn read_law_of_formula(section: &Section<'_>) -> Result<Drive, SceneError> {
     let node = section.require("formula")?;
     let unit = section.get("unit");
     let (program, scale) = read_formula(&node, unit.as_ref(), coordinate(section))?;
-    Ok(DriveData::Formula(program, scale))
+    Ok(Drive::Formula { program, scale, resolve: section.number("resolve")? })
 }

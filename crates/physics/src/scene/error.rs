@@ -1,6 +1,7 @@
 //! Errors in scenes and parameters: file, line, column, key, value, range, unit.
 
 use super::visible::{visible, visible_line};
+use crate::suggest::{brief, did_you_mean, nearest, nearest_name};
 use std::fmt;
 
 /// What is wrong with a scene or a parameter value, in a form the user can act on.
@@ -93,48 +94,12 @@ pub(super) fn place_of(text: &str, at: usize) -> (u32, u32) {
     line_and_column(&text[..text.floor_char_boundary(at)])
 }
 
-/// The first line of an input, truncated to what an error can quote.
-pub(super) fn brief(text: &str) -> String {
-    let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
-    if short.len() < text.len() {
-        short.push('…');
-    }
-    short
-}
-
 /// Line number `line`, from 1, of a text; `None` if it is too long for a terminal or contains control characters.
 pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     let line = text.lines().nth(line.saturating_sub(1) as usize).unwrap_or("");
     let line = line.replace('\t', " ");
     let fit = line.len() <= 160 && visible_line(&line) == line;
     fit.then(|| line.into())
-}
-
-/// A text longer than this, bytes, is no typing slip; comparing it takes quadratic time.
-const LONGEST_SLIP: usize = 100;
-
-/// The one of `names` nearest to `wrong`; `None` if none is near.
-pub(super) fn nearest_name<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    if wrong.len() > LONGEST_SLIP {
-        return None;
-    }
-    let wrong_lower = wrong.to_lowercase();
-    names
-        .into_iter()
-        .map(|name| (strsim::jaro_winkler(&wrong_lower, &name.to_lowercase()), name))
-        .filter(|(score, _)| *score > 0.7)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, name)| name)
-}
-
-/// A near name as errors quote it: in brackets, or empty.
-pub(super) fn did_you_mean(near: Option<&str>) -> String {
-    near.map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"))
-}
-
-/// The one of `names` nearest to `wrong`, as errors quote it.
-pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
-    did_you_mean(nearest_name(wrong, names))
 }
 
 /// The parameter whose key, or last part of it, is nearest to `wrong`, or one of the other `words`, as errors quote it.

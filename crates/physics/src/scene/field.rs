@@ -87,13 +87,13 @@ macro_rules! field {
     };
 }
 
-/// A field of an optional part of a scene: `optional_field!(spcmm.frequency)`.
+/// A field of an optional part of a scene's machine: `optional_field!(spcmm.frequency)`.
 macro_rules! optional_field {
     ($part:ident.$name:ident) => {
         Field {
-            get: |scene: &Scene| scene.$part.as_ref().map_or(Value::Unset, |it| it.$name.to_value()),
+            get: |scene: &Scene| scene.machine.$part.as_ref().map_or(Value::Unset, |it| it.$name.to_value()),
             set: |scene, value| {
-                if let Some(it) = &mut scene.$part {
+                if let Some(it) = &mut scene.machine.$part {
                     it.$name = Held::of_value(value);
                 }
             },

@@ -4,14 +4,14 @@
 
 use std::sync::LazyLock;
 
-use super::drives::DRIVE_KINDS;
-use super::elements::ELEMENT_KINDS;
-use super::key::{Absent, FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector};
-use super::points::MOST_POINTS;
+use super::drives::DRIVE_LAWS;
+use super::elements::ELEMENTS;
+use super::key::{FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector};
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
-use super::units::Dimension as D;
 use super::*;
+use crate::simulate::PLOT_WORDS;
+use crate::units::Dimension as D;
 use crate::words::Words;
 
 /// Most parameters that a file may define.
@@ -141,7 +141,7 @@ fn parts() -> Vec<FileKey> {
         ),
     ];
     let element = |table| list_of(table, many(MOST_ELEMENTS, "force elements"), "");
-    let elements = ELEMENTS.iter().map(element);
+    let elements = ELEMENTS.iter().map(|(table, _)| element(*table));
     parts.into_iter().chain(elements).collect()
 }
 
@@ -663,7 +663,7 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     .also(&CONTACT)
 });
 
-static ATTACHMENT: FileTable = FileTable::new(
+pub(super) static ATTACHMENT: FileTable = FileTable::new(
     "point",
     "a point on a body",
     "where something holds a body",
@@ -673,7 +673,7 @@ static ATTACHMENT: FileTable = FileTable::new(
     ],
 );
 
-static ROTATION: FileTable = FileTable::new(
+pub(super) static ROTATION: FileTable = FileTable::new(
     "rotation",
     "a rotation",
     "an orientation, in one of four forms",
@@ -737,109 +737,18 @@ static ABOUT: FileTable = FileTable::new(
 );
 
 /// Laws of drives: the rows of each, with its word.
-static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
-    let words: &[&str] = DRIVE_KINDS.each_ref().map(|kind| kind.word).to_vec().leak();
+pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
+    let words: &[&str] = DRIVE_LAWS.each_ref().map(|kind| kind.word).to_vec().leak();
     let law = key("law", Takes::Word(words), "\"constant\"", "which motion");
-    let of_kind = |(place, kind): (usize, &'static DriveKind)| {
+    let of_kind = |(place, kind): (usize, &'static DriveLaw)| {
         let keys = kind.keys.iter();
         keys.map(move |key| key.of(&words[place..=place]))
     };
-    let keys = DRIVE_KINDS.iter().enumerate().flat_map(of_kind);
+    let keys = DRIVE_LAWS.iter().enumerate().flat_map(of_kind);
     let keys: Vec<FileKey> = std::iter::once(law).chain(keys).collect();
     FileTable::new("drive", "a drive", "coordinate of a slide or a hinge as a function of time", keys.leak())
         .by(Variants::Word("law", ""))
 });
-
-/// Names of coordinates.
-const COORDINATES: [&str; 3] = ["position", "angle", "child_angle"];
-
-/// Force elements, in the order of their rows.
-static ELEMENTS: LazyLock<Vec<FileTable>> = LazyLock::new(|| ELEMENT_KINDS.iter().map(of_element).collect());
-
-fn of_element(kind: &'static ElementKind) -> FileTable {
-    let name = key("name", Takes::Name, "\"s1\"", "its name, that of no joint");
-    let joint = kind.joint.map(|which| {
-        let help = match which {
-            ElementJoint::Any => "the joint on which it acts",
-            ElementJoint::Undriven => "the joint on which it acts, where that has no drive",
-        };
-        let coordinate = "which coordinate of a joint that has two: `position` or `angle` of a cylindrical one, `angle` or \
-                          `child_angle` of a universal one";
-        [
-            key("joint", Takes::Joint, "\"crank\"", help),
-            key("coordinate", Takes::Word(&COORDINATES), "\"angle\"", coordinate).absent("the only one"),
-        ]
-    });
-    let point = |name: &&'static str| {
-        let like = "{ body = \"rod\", at = \"0 0 100 mm\" }";
-        key(name, Takes::Table(&ATTACHMENT), like, "where it holds")
-    };
-    let mut keys = vec![name];
-    keys.extend(joint.into_iter().flatten());
-    keys.extend(kind.points.iter().map(point));
-    for number in kind.numbers {
-        let row = |name, dimension, like| FileKey {
-            absent: number.default.map_or(Absent::Fault, Absent::Is),
-            ..key(name, Takes::Number(dimension, number.range), like, number.help)
-        };
-        let slide = row(number.key, number.dimension, number.like);
-        match number.on_hinge {
-            None => keys.push(slide),
-            Some(own) if own.key == number.key => {
-                keys.push(slide.on_hinge(own.dimension, own.like));
-            }
-            // On a hinge it has another key.
-            Some(own) => {
-                let hinge = row(own.key, own.dimension, own.like);
-                let on = |row: FileKey, what| FileKey { help: format!("{}, on a {what}", number.help).leak(), ..row };
-                let (slide, hinge) = (on(slide, "slide"), on(hinge, "hinge"));
-                keys.extend(match number.default {
-                    None => [slide.or(own.key), hinge.or(number.key)],
-                    Some(_) => [slide, hinge],
-                });
-            }
-        }
-    }
-    let vector = |row: &'static ElementVector| {
-        let frame = kind.frame;
-        if row.upward {
-            let up = key(row.key, Takes::Direction, "[0, 0, 1]", row.help);
-            return up.absent("against the file's gravity").frame(frame);
-        }
-        let takes = Takes::Vector(row.dimension, row.range);
-        key(row.key, takes, "", row.help).zero().frame(frame)
-    };
-    keys.extend(kind.vectors.iter().map(vector));
-    let rotation = |&(name, help): &(&'static str, &'static str)| {
-        let like = "{ axis = [0, 1, 0], angle = \"15 deg\" }";
-        key(name, Takes::Table(&ROTATION), like, help).zero()
-    };
-    keys.extend(kind.rotations.iter().map(rotation));
-    if let Some(curve) = kind.curve {
-        let [points, file] = curve.keys;
-        let pairs = |(axes, _): CurveAxes| {
-            let dimensions = axes.map(|(_, dimension)| dimension);
-            Takes::Pairs(dimensions, many(MOST_POINTS, "points"))
-        };
-        let absent = "`stiffness` and `preload` hold";
-        let row = key(points, pairs(curve.slide), curve.slide.1, curve.help).absent(absent);
-        let (hinge, like) = curve.hinge;
-        keys.push(if like == curve.slide.1 { row } else { row.on_hinge(hinge[1].1, like) });
-        let help = "instead of the points: a CSV file beside the scene, two columns under a header with units";
-        keys.push(key(file, Takes::File, "\"coil.csv\"", help).absent(absent));
-    }
-    let law = kind.law.map(|(name, help)| {
-        let like = "{ law = \"constant\", velocity = \"10 mm/s\" }";
-        key(name, Takes::Table(&DRIVE), like, help).absent("none")
-    });
-    keys.extend(law);
-    let choice = |&(name, words, help): &(&'static str, &'static [&'static str], &'static str)| {
-        key(name, Takes::Word(words), "", help).absent(words[0])
-    };
-    keys.extend(kind.choices.iter().map(choice));
-    let head = format!("[[{}]]", kind.section);
-    FileTable::new(kind.section, head.leak(), kind.help, keys.leak())
-}
 
 /// Every table of a scene file: the whole file, then the tables that its keys take, each after the one that names it first.
 pub fn file_tables() -> Vec<&'static FileTable> {

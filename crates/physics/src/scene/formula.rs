@@ -1,8 +1,8 @@
 //! Formulas of time that prescribe a motion: expressions over numbers that carry their derivatives.
 
 use super::document::Node;
-use super::expression::{Binary, Number, Program, Unary, smooth_step};
 use super::{Dimension, SceneError, parse_quantity};
+use crate::expression::{Binary, Number, Program, Unary, smooth_step};
 use crate::jet::Jet;
 
 impl Number for Jet {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::units::{Dimension, si_unit, unit_within};
+use crate::units::{Dimension, si_unit, unit_within};
 
 /// A number that the scene was built from.
 #[derive(Clone, Debug, PartialEq)]

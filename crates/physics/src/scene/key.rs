@@ -1,7 +1,7 @@
 //! What the sections of a scene file are made of: rows, each a key with the value that it takes. The reader, the JSON schema and
 //! the reference all go by the same rows. They are in `format.rs`, and those of force elements and laws of drives where these are.
 
-use super::units::Dimension;
+use crate::units::Dimension;
 
 /// Largest length, speed, angle, … in SI units that a file may give.
 pub(super) const MAX_SI: f64 = 1e6;

@@ -1,8 +1,9 @@
 //! Where scenes come from: the built-in ones, and files.
 
 use super::beside::{Beside, LARGEST_FILE};
-use super::error::{brief, line_and_column, nearest};
+use super::error::line_and_column;
 use super::{Scene, SceneError, visible_line};
+use crate::suggest::{brief, nearest};
 use std::ffi::OsStr;
 use std::io::Read;
 use std::path::Path;

@@ -6,8 +6,8 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 use super::field::Access;
 use super::given::{FileNumber, OwnParameter};
 use super::parameters::{Kind, Parameter, Scope};
-use super::units::Dimension;
 use super::value::Value;
+use crate::units::Dimension;
 
 /// Row of a number of the file. What the reader allows is checked when the scene is read again.
 pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {

@@ -3,8 +3,8 @@
 use super::document::{Node, Section, lists};
 use super::given::OwnParameter;
 use super::numbers::row_of_own;
-use super::units::{all_units, same_unit, split_unit};
 use super::*;
+use crate::units::{all_units, same_unit, split_unit};
 
 /// Reads `[[parameter]]`: the scene's own parameters, in the order of the files, in which one may be made of those before it.
 ///

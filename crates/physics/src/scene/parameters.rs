@@ -1,9 +1,9 @@
 //! What a row of the parameter table says, and the values it takes.
 
-use super::error::{did_you_mean, nearest_name};
 use super::field::Access;
-use super::units::{Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
 use super::value::Value;
+use crate::suggest::{did_you_mean, nearest_name};
+use crate::units::{Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
 
 /// What kind of value a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq)]

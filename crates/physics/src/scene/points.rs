@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use super::SceneError;
 use super::document::{Document, Node};
 use super::key::MAX_SI;
-use super::{Dimension, QuantityError, SceneError, format_quantity, parse_quantity, si_unit, unit_names};
+use crate::units::{Dimension, QuantityError, format_quantity, parse_quantity, si_unit, unit_names};
 
 /// Shortest interval of a table, ramp or pulse, s.
 pub(super) const SHORTEST_PART: f64 = 1e-6;

@@ -1,8 +1,8 @@
 //! Numbers with a dimension, as expressions of a scene file compute with them.
 
-use super::expression::{Binary, ExpressionError, Number, Program, Unary};
-use super::units::{all_units, powers, unit_at_start};
 use super::{Dimension, format_quantity, si_unit, unit_names};
+use crate::expression::{Binary, ExpressionError, Number, Program, Unary};
+use crate::units::{all_units, powers, unit_at_start};
 
 /// A number with its dimension, or the reason why it has none.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use super::beside::Beside;
 use super::document::{Document, Node, Section, lists};
-use super::elements::read_element;
+use super::elements::{ELEMENTS, read_element};
 use super::error::no_body;
 use super::format::FILE;
 use super::include::{self, included_texts};
@@ -124,17 +124,13 @@ impl Scene {
         for (key, value) in changes {
             scene.change(key, value)?;
         }
-        scene.check_contacts().map_err(|fault| {
-            let place = || {
-                fault
-                    .keys(&scene)
-                    .iter()
-                    .find_map(|key| places.get(key))
-                    .map(|node| node.error(fault.fault.to_string()))
-            };
-            let message =
-                || SceneError { file: file.map(str::to_owned), message: fault.fault.to_string(), ..Default::default() };
-            fault.blame_changes(&scene).or_else(place).unwrap_or_else(message)
+        scene.machine.check_contacts().map_err(|conflict| {
+            let message = conflict.fault.to_string();
+            let keys = scene.keys_of(&conflict);
+            let place = || keys.iter().find_map(|key| places.get(key)).map(|node| node.error(&message));
+            let unplaced =
+                || SceneError { file: file.map(str::to_owned), message: message.clone(), ..Default::default() };
+            scene.blame_changes(&conflict).or_else(place).unwrap_or_else(unplaced)
         })?;
         Ok(scene)
     }
@@ -210,27 +206,10 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         title: visible_line(text("title")?.unwrap_or(&name)).into_owned(),
         description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
-        gravity: Vec3::zeros(),
-        contact: crate::contact::Parameters::default(),
-        formulation: Formulation::Tree,
-        solver: Solver {
-            preset: None,
-            method: crate::integrate::Method::Automatic,
-            step: 0.0,
-            tolerance: 0.0,
-            energy_ledger: true,
-        },
-        spcmm,
+        machine: Machine { spcmm, ..Machine::default() },
         chain: top.get("chain").map(|_| Chain { links: 0 }),
         view,
-        output: Output { body: 0, probe: None },
-        start: StartRule::default(),
-        bodies: Vec::new(),
-        joints: Vec::new(),
-        ball_joints: Vec::new(),
-        closing_joints: Vec::new(),
-        elements: Vec::new(),
-        fixed_shapes: Vec::new(),
+        overrides: Vec::new(),
         source: Source { file: document.file.map(str::to_owned), text: document.text.to_owned(), ..Source::default() },
         changes: Vec::new(),
     })
@@ -307,7 +286,7 @@ fn read_mechanism<'d>(
     for node in list("joint")? {
         let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
-        let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.slider();
+        let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.closed_form();
         if let Some(coordinate) = slider(&joint)
             && let Some(other) = joints.iter().find(|other| slider(other) == Some(coordinate))
         {
@@ -318,15 +297,19 @@ fn read_mechanism<'d>(
         joints.push(joint);
     }
     let (closing, joints): (Vec<_>, Vec<_>) = joints.into_iter().partition(|text| text.closes_loop);
-    (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
-    let by_name = indices_by_name(&scene.bodies);
+    (scene.machine.bodies, scene.machine.joints) = sort_forest(bodies, joints, &body_sections)?;
+    let by_name = indices_by_name(&scene.machine.bodies);
     for JointText { section, joint, .. } in closing {
         if !section.document.included {
             let title = format!("joint.{}", joint.name);
             scene.source.places.insert(title, section.place());
         }
         let sorted = |body: usize| by_name[&file_order[body]];
-        scene.closing_joints.push(Joint { parent: joint.parent.map(sorted), child: sorted(joint.child), ..joint });
+        scene.machine.closing_joints.push(Joint {
+            parent: joint.parent.map(sorted),
+            child: sorted(joint.child),
+            ..joint
+        });
     }
     for node in list("ball_joint")? {
         let BallJointText { joint, section, places: own } = read_ball_joint(&node, scene, &by_name)?;
@@ -335,44 +318,45 @@ fn read_mechanism<'d>(
         if !section.document.included {
             scene.source.places.insert(title, section.place());
         }
-        scene.ball_joints.push(joint);
-        places.extend(own);
+        scene.overrides.push(own.keys().copied().collect());
+        places.extend(own.into_iter().map(|(part, node)| (format!("joint.{}.{part}", joint.name), node)));
+        scene.machine.ball_joints.push(joint);
     }
     for node in list("fixed_shape")? {
-        let shape = read_shape(&node, true, scene.spcmm.as_ref())?;
-        scene.fixed_shapes.push(shape);
+        let shape = read_shape(&node, true, scene.machine.spcmm.as_ref())?;
+        scene.machine.fixed_shapes.push(shape);
     }
     if let Some(node) = top.get("chain") {
         places.extend(super::chain::expand(&node, scene)?);
-        for joint in &scene.ball_joints {
+        for joint in &scene.machine.ball_joints {
             let title = format!("joint.{}", joint.name);
             scene.source.places.entry(title).or_insert(node.place());
         }
-        let joints = scene.joints.iter().map(|joint| &joint.name);
-        for name in joints.chain(scene.ball_joints.iter().map(|joint| &joint.name)) {
+        let joints = scene.machine.joints.iter().map(|joint| &joint.name);
+        for name in joints.chain(scene.machine.ball_joints.iter().map(|joint| &joint.name)) {
             joint_names.taken(name, &node);
         }
     }
     // After the chain: they may be attached to its links.
-    let by_name = indices_by_name(&scene.bodies);
-    let joints = scene.kinematic_joints().zip(0..);
+    let by_name = indices_by_name(&scene.machine.bodies);
+    let joints = scene.machine.kinematic_joints().zip(0..);
     let joints = joints.map(|(joint, index)| (joint.name.clone(), index));
     let joints: BTreeMap<String, usize> = joints.collect();
-    for kind in &ELEMENT_KINDS {
-        for node in list(kind.section)? {
+    for kind in ELEMENTS.iter().copied() {
+        for node in list(kind.0.name)? {
             let (element, section) = read_element(&node, kind, scene, &by_name, &joints)?;
             // Joints and elements share one table of column names.
             joint_names.add(&section, "joint or force element", &element.name)?;
-            scene.elements.push(element);
+            scene.machine.elements.push(element);
         }
     }
-    let of_bodies = scene.bodies.iter().map(|body| body.shapes.len());
-    let shapes = scene.fixed_shapes.len() + of_bodies.sum::<usize>();
+    let of_bodies = scene.machine.bodies.iter().map(|body| body.shapes.len());
+    let shapes = scene.machine.fixed_shapes.len() + of_bodies.sum::<usize>();
     if shapes > MOST_SHAPES {
         let message = format!("too many shapes: {shapes}; allowed at most {MOST_SHAPES}");
         return Err(top.document.error(0..0, "shapes", None, message));
     }
-    if scene.bodies.is_empty() {
+    if scene.machine.bodies.is_empty() {
         return Err(top.document.error(0..0, "body", None, "a scene needs at least one [[body]], or a [chain]"));
     }
     read_output(top, scene, &file_order)
@@ -386,20 +370,20 @@ fn indices_by_name(bodies: &[Body]) -> BTreeMap<String, usize> {
 
 fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> Result<(), SceneError> {
     // Default: the last body (the end of a chain, the platform of most files).
-    let last = scene.bodies.last().map_or("", |body| body.name.as_str());
+    let last = scene.machine.bodies.last().map_or("", |body| body.name.as_str());
     let last = if scene.chain.is_some() { last } else { file_order.last().map_or(last, String::as_str) }.to_owned();
     let section = top.get("output").map(|node| node.section()).transpose()?;
     let node = section.as_ref().and_then(|section| section.get("body"));
     let wanted = node.as_ref().map_or(Ok(last.as_str()), |node| node.text())?;
-    let found = scene.bodies.iter().position(|body| body.name == wanted);
-    let names = || scene.bodies.iter().map(|body| body.name.as_str());
+    let found = scene.machine.bodies.iter().position(|body| body.name == wanted);
+    let names = || scene.machine.bodies.iter().map(|body| body.name.as_str());
     let body = match (found, node) {
         (Some(body), _) => body,
         (None, Some(node)) => return Err(node.error(no_body(wanted, names()))),
         (None, None) => 0,
     };
     let probe = section.and_then(|section| section.get("probe")).map(|node| node.vector()).transpose()?;
-    scene.output = Output { body, probe };
+    scene.machine.output = Output { body, probe };
     Ok(())
 }
 

@@ -4,9 +4,10 @@ use super::beside::NoMesh;
 use super::copy::Copy;
 use super::document::{Document, Node, Section};
 use super::read_joints::read_rotation;
-use super::solid::Solid;
 use super::*;
+use crate::machine::Solid;
 use crate::mesh::{Fault, Format};
+use crate::units::format_quantity_digits;
 use crate::words::words;
 
 /// Forms of a shape.

@@ -3,9 +3,10 @@
 use super::copy::Copy;
 use super::document::{Node, Section};
 use super::drives::{SLIDERS_ONLY, read_drive};
-use super::error::{nearest, no_body};
+use super::error::no_body;
 use super::table::contact_rows;
 use super::*;
+use crate::suggest::nearest;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest cosine of the angle between the axes of a universal joint that passes for a right one: what is written with few
@@ -26,7 +27,7 @@ pub(super) struct JointText<'d> {
 pub(super) struct BallJointText<'d> {
     pub joint: BallJoint,
     pub section: Section<'d>,
-    pub places: BTreeMap<String, Node<'d>>,
+    pub places: BTreeMap<&'static str, Node<'d>>,
 }
 
 /// One `[[joint]]`; `bodies` are the names in file order, `places` the index of each.
@@ -159,9 +160,9 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
         let drive = read_drive(&node, joint.kind == JointKind::Revolute, scene)?;
-        let slider = drive.slider();
+        let slider = drive.closed_form();
         joint.drive = Some(drive);
-        if let (Some(coordinate), Some(spcmm)) = (slider, scene.spcmm.as_ref()) {
+        if let (Some(coordinate), Some(spcmm)) = (slider, scene.machine.spcmm.as_ref()) {
             for key in ["axis", "parent_point", "parent", "rotation"] {
                 section.refuse(key, "the law spcmm places this joint: in the slider plane, along its own axis")?;
             }
@@ -206,7 +207,7 @@ fn read_two_degrees(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> 
         let word = freedom.word();
         if let Some(node) = drive.as_ref().and_then(|drive| drive.get(word)) {
             let own = read_drive(&node, freedom.turns(), scene)?;
-            if own.slider().is_some() {
+            if own.closed_form().is_some() {
                 return Err(node.error(SLIDERS_ONLY));
             }
             *driven = Some(own);
@@ -364,7 +365,7 @@ pub(super) fn read_attachment(
         ("world", _) => None,
         (_, Some(&index)) => Some(index),
         (_, None) => {
-            let names = scene.bodies.iter().map(|body| body.name.as_str());
+            let names = scene.machine.bodies.iter().map(|body| body.name.as_str());
             return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
         }
     };
@@ -386,14 +387,14 @@ pub(super) fn read_coordinate(
     let node = section.require("joint")?;
     let wanted = &*node.joint()?;
     let found = joints.get(wanted).copied();
-    let joint = found.and_then(|index| scene.kinematic_joints().nth(index));
+    let joint = found.and_then(|index| scene.machine.kinematic_joints().nth(index));
     let freedoms = joint.map_or(&[][..], |joint| joint.kind.freedoms());
     let (Some(index), Some(joint), Some(first)) = (found, joint, freedoms.first()) else {
         let wrong = match joint {
             Some(joint) => format!("a {} joint is neither a slide nor a hinge", joint.kind),
             None => "no such joint that slides or turns".to_owned(),
         };
-        let moving = scene.kinematic_joints().filter(|joint| !joint.kind.freedoms().is_empty());
+        let moving = scene.machine.kinematic_joints().filter(|joint| !joint.kind.freedoms().is_empty());
         let names = moving.map(|joint| joint.name.as_str());
         let near = nearest(wanted, names.clone());
         let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
@@ -437,11 +438,11 @@ pub(super) fn read_ball_joint<'d>(
         return Err(section.error("ball", "socket and ball are on the same body: a ball joint needs two"));
     }
     let mut opening = section.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
-    let own = |copy: &Copy| socket.body.is_some_and(|body| copy.made(&scene.bodies[body].name));
+    let own = |copy: &Copy| socket.body.is_some_and(|body| copy.made(&scene.machine.bodies[body].name));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
         opening = copy.direction(opening);
     }
-    let mut joint = BallJoint { name, socket, ball, opening, contact: scene.contact, overrides: Vec::new() };
+    let mut joint = BallJoint { name, socket, ball, opening, contact: scene.machine.contact };
     let places = read_own_contact(&section, &mut joint)?;
     Ok(BallJointText { joint, section, places })
 }
@@ -453,14 +454,13 @@ pub(super) fn read_ball_joint<'d>(
 pub(super) fn read_own_contact<'d>(
     section: &Section<'d>,
     joint: &mut BallJoint,
-) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
+) -> Result<BTreeMap<&'static str, Node<'d>>, SceneError> {
     let mut places = BTreeMap::new();
     for (part, field) in contact_rows() {
         if let Some(node) = section.get(part) {
             let value = node.parameter()?;
             (field.set)(&mut joint.contact, &value);
-            joint.overrides.push(part);
-            places.insert(format!("joint.{}.{part}", joint.name), node);
+            places.insert(part, node);
         }
     }
     Ok(places)

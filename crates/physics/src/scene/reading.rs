@@ -7,10 +7,10 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::copy::Copy;
-use super::expression::{ExpressionError, Number as _, Program};
 use super::given::FileNumber;
 use super::quantity::{DimensionError, Quantity};
-use super::units::{Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start};
+use crate::expression::{ExpressionError, Number as _, Program};
+use crate::units::{Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start};
 
 /// Why a text is neither a quantity nor an expression that gives one.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,11 +1,11 @@
 //! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, Held, SWITCH, field, optional_field};
-use super::{Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value};
+use super::{Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value};
 use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
+use crate::units::Dimension as D;
 use crate::words::Words;
-use Dimension as D;
 
 const DEFAULT: contact::Parameters = contact::Parameters::DEFAULT;
 
@@ -228,21 +228,21 @@ static TABLE: [Parameter; 29] = [
     ),
     gravity(
         "gravity.x",
-        field!(gravity.x),
+        field!(machine.gravity.x),
         "Gravity along X",
         0.0,
         "World X component of gravity. In the paper's machine X points down: +9.81 m/s^2. A file that gives any component has 0 for the others.",
     ),
     gravity(
         "gravity.y",
-        field!(gravity.y),
+        field!(machine.gravity.y),
         "Gravity along Y",
         0.0,
         "World Y component of gravity. A file that gives any component has 0 for the others.",
     ),
     gravity(
         "gravity.z",
-        field!(gravity.z),
+        field!(machine.gravity.z),
         "Gravity along Z",
         -9.81,
         "World Z component of gravity: -9.81 m/s^2 where Z points up. A file that gives any component has 0 for the others.",
@@ -310,7 +310,7 @@ static TABLE: [Parameter; 29] = [
     )),
     at_reset(row(
         "formulation",
-        Access::Scene(field!(formulation)),
+        Access::Scene(field!(machine.formulation)),
         "Formulation",
         "Solver",
         Kind::Choice(Formulation::WORDS),
@@ -323,7 +323,7 @@ static TABLE: [Parameter; 29] = [
     )),
     at_reset(row(
         "start",
-        Access::Scene(field!(start)),
+        Access::Scene(field!(machine.start)),
         "Start",
         "Solver",
         Kind::Choice(StartRule::WORDS),
@@ -336,7 +336,7 @@ static TABLE: [Parameter; 29] = [
     )),
     row(
         "solver.method",
-        Access::Scene(field!(solver.method)),
+        Access::Scene(field!(machine.solver.method)),
         "Method",
         "Solver",
         Kind::Choice(Method::WORDS),
@@ -352,7 +352,7 @@ static TABLE: [Parameter; 29] = [
     ),
     row(
         "solver.step",
-        Access::Scene(field!(solver.step)),
+        Access::Scene(field!(machine.solver.step)),
         "Step",
         "Solver",
         logarithmic(D::Time, 1e-7, 1e-2, "us", (1e-6, 1e-3)),
@@ -364,7 +364,7 @@ static TABLE: [Parameter; 29] = [
     ),
     row(
         "solver.tolerance",
-        Access::Scene(field!(solver.tolerance)),
+        Access::Scene(field!(machine.solver.tolerance)),
         "Tolerance",
         "Solver",
         logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
@@ -378,7 +378,7 @@ static TABLE: [Parameter; 29] = [
     row(
         "solver.preset",
         Access::Scene(Field {
-            get: |scene| scene.solver.preset.map_or(Value::Unset, Held::to_value),
+            get: |scene| scene.machine.solver.preset.map_or(Value::Unset, Held::to_value),
             set: |scene, value| scene.apply_preset(Held::of_value(value)),
         }),
         "Preset",
@@ -392,7 +392,7 @@ static TABLE: [Parameter; 29] = [
     ),
     at_reset(row(
         "solver.energy_ledger",
-        Access::Scene(field!(solver.energy_ledger)),
+        Access::Scene(field!(machine.solver.energy_ledger)),
         "Energy ledger",
         "Solver",
         Kind::Choice(&SWITCH),

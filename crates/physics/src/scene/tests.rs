@@ -3,15 +3,16 @@
 use std::sync::Arc;
 
 use super::*;
+use crate::machine::ElementKind;
 
 /// World poses of all bodies at the file's start; slider coordinates of the spcmm law as derived by `physics`.
 fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
     // Roots of the paper's eq. (39) at t = 0 for a1 = 32 mm.
     let sliders = [0.136_493_548_0, 0.240_922_773_5, 0.186_472_405_6];
     let mut poses: Vec<(Vec3, Quat)> = Vec::new();
-    for joint in &scene.joints {
+    for joint in &scene.machine.joints {
         let (origin, frame) = joint.parent.map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
-        let slider = joint.drive.as_ref().and_then(Drive::slider);
+        let slider = joint.drive.as_ref().and_then(Drive::closed_form);
         let q = match (slider, joint.start) {
             (Some(coordinate), _) => sliders[coordinate],
             (_, JointStart::Scalar { position, .. }) => position,
@@ -38,14 +39,14 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
     for name in BUILT_IN {
         let scene = Scene::load(name, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(scene.name, name);
-        assert!(!scene.ball_joints.is_empty(), "{name}");
-        if scene.start == StartRule::Ideal {
+        assert!(!scene.machine.ball_joints.is_empty(), "{name}");
+        if scene.machine.start == StartRule::Ideal {
             // Put together when it starts: `tests/physics/machines.rs`.
             continue;
         }
         let poses = start_poses(&scene);
         let point = |end: Attachment| end.body.map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point);
-        for joint in &scene.ball_joints {
+        for joint in &scene.machine.ball_joints {
             let e = point(joint.ball) - point(joint.socket);
             // The slider coordinates are given to ten digits.
             assert!(e.norm() < 1e-9, "{name}: {} starts {:e} m off its socket's centre", joint.name, e.norm());
@@ -57,7 +58,7 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
 fn joints_follow_their_bodies_and_parents_come_first() {
     for name in BUILT_IN {
         let scene = Scene::load(name, &[]).unwrap();
-        for (index, joint) in scene.joints.iter().enumerate() {
+        for (index, joint) in scene.machine.joints.iter().enumerate() {
             assert_eq!(joint.child, index, "{name}");
             assert!(joint.parent.is_none_or(|parent| parent < index), "{name}");
         }
@@ -101,8 +102,8 @@ fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
             scene.set_value(parameter.key, &value).unwrap();
             assert_eq!(scene.get(parameter.key).unwrap(), value, "{name}: {}", parameter.key);
             assert_eq!(scene.changes.len(), 1);
-            assert_eq!(scene.bodies, original.bodies);
-            assert_eq!(scene.solver.method, original.solver.method);
+            assert_eq!(scene.machine.bodies, original.machine.bodies);
+            assert_eq!(scene.machine.solver.method, original.machine.solver.method);
         }
     }
 }
@@ -115,26 +116,26 @@ fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
             if key.starts_with("joint") { "0.7 mm" } else { "0.1 mm" }
         };
         let scene = changed("spcmm", &[(first, value(first)), (second, value(second))]);
-        let clearances: Vec<f64> = scene.ball_joints.iter().map(|joint| joint.contact.clearance).collect();
+        let clearances: Vec<f64> = scene.machine.ball_joints.iter().map(|joint| joint.contact.clearance).collect();
         assert_eq!(clearances, [0.7e-3, 0.1e-3, 0.1e-3]);
         assert_eq!(scene.get("contact.clearance"), Ok(Value::Number(0.1e-3)));
         assert_eq!(scene.get("joint.S2.clearance"), Ok(Value::Number(0.1e-3)));
-        assert_eq!(scene.ball_joints[0].overrides, ["clearance"]);
+        assert_eq!(scene.overrides[0], ["clearance"]);
     }
     // The file's own override at B stays.
     let scene = changed("slider-crank", &[("contact.clearance", "0.5 mm")]);
-    assert_eq!(scene.ball_joints[0].contact.clearance, 0.0);
-    assert_eq!(scene.ball_joints[1].contact.clearance, 0.5e-3);
+    assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.0);
+    assert_eq!(scene.machine.ball_joints[1].contact.clearance, 0.5e-3);
 }
 
 #[test]
 fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
     let scene = changed("spcmm", &[("contact.friction", "0.2"), ("contact.friction", "0.3")]);
-    assert_eq!(scene.contact.friction, 0.3);
+    assert_eq!(scene.machine.contact.friction, 0.3);
     assert_eq!(scene.changes, [("contact.friction".to_owned(), "0.3".to_owned())]);
     // A gap wider than the file's ball is fine with the larger ball that comes with it.
     let scene = changed("spcmm", &[("contact.clearance", "12 mm"), ("contact.ball_radius", "20 mm")]);
-    assert_eq!(scene.ball_joints[2].contact.clearance, 0.012);
+    assert_eq!(scene.machine.ball_joints[2].contact.clearance, 0.012);
 }
 
 #[test]
@@ -142,17 +143,17 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
     let preset = ("solver.preset", "reference");
     let method = ("solver.method", "rk4");
     for changes in [[preset, method], [method, preset]] {
-        let solver = changed("spcmm", &changes).solver;
+        let solver = changed("spcmm", &changes).machine.solver;
         assert_eq!(solver.method, crate::integrate::Method::RungeKutta4);
         assert_eq!(solver.tolerance, 1e-11);
         assert_eq!(solver.preset, Some(Preset::Reference));
     }
     let text = |solver: &str| format!("{}\n{solver}", built_in_text("pendulum").unwrap());
     let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
-    assert_eq!(Scene::parse(&file, None, &[]).unwrap().solver.tolerance, 1e-5);
+    assert_eq!(Scene::parse(&file, None, &[]).unwrap().machine.solver.tolerance, 1e-5);
     // Nor does a preset requested later replace what the file gives by name.
     let ask = [("solver.preset".to_owned(), "reference".to_owned())];
-    let solver = Scene::parse(&file, None, &ask).unwrap().solver;
+    let solver = Scene::parse(&file, None, &ask).unwrap().machine.solver;
     assert_eq!(solver.tolerance, 1e-5);
     assert_eq!(solver.method, crate::integrate::Method::DormandPrince5);
 }
@@ -199,32 +200,32 @@ fn a_change_can_be_taken_back() {
 #[test]
 fn a_chain_is_rebuilt_with_its_links() {
     let mut scene = changed("chain", &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")]);
-    assert_eq!((scene.bodies.len(), scene.ball_joints.len()), (8, 8));
+    assert_eq!((scene.machine.bodies.len(), scene.machine.ball_joints.len()), (8, 8));
     scene.set("chain.links", "3").unwrap();
-    assert_eq!((scene.bodies.len(), scene.joints.len(), scene.ball_joints.len()), (3, 3, 3));
-    assert_eq!(scene.ball_joints[1].contact.friction, 0.4);
-    assert_eq!(scene.output.body, 2);
+    assert_eq!((scene.machine.bodies.len(), scene.machine.joints.len(), scene.machine.ball_joints.len()), (3, 3, 3));
+    assert_eq!(scene.machine.ball_joints[1].contact.friction, 0.4);
+    assert_eq!(scene.machine.output.body, 2);
     assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
     // A change of a joint that no longer exists is dropped with it.
     assert!(scene.get("joint.J7.friction").is_err());
     assert_eq!(scene.changes.len(), 2);
-    assert_eq!(changed("chain", &[("chain.links", "256")]).bodies.len(), 256);
+    assert_eq!(changed("chain", &[("chain.links", "256")]).machine.bodies.len(), 256);
 }
 
 #[test]
 fn the_slider_plane_moves_sliders_and_rails() {
     let mut scene = changed("spcmm", &[]);
     scene.set("spcmm.slider_plane", "40mm").unwrap();
-    assert_eq!(scene.joints[0].parent_point, Vec3::new(0.040, 0.0, 0.0));
-    let Geometry::Box { centre, .. } = scene.fixed_shapes[0].geometry else { panic!("a rail is a box") };
+    assert_eq!(scene.machine.joints[0].parent_point, Vec3::new(0.040, 0.0, 0.0));
+    let Geometry::Box { centre, .. } = scene.machine.fixed_shapes[0].geometry else { panic!("a rail is a box") };
     assert!((centre.x - 0.018).abs() < 1e-15);
-    assert_eq!(scene.spcmm.map(|spcmm| spcmm.slider_plane), Some(0.040));
+    assert_eq!(scene.machine.spcmm.map(|spcmm| spcmm.slider_plane), Some(0.040));
 }
 
 #[test]
 fn doubtful_choices_are_warned_of() {
-    assert!(changed("spcmm", &[]).warnings().is_empty());
-    let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).warnings();
+    assert!(changed("spcmm", &[]).machine.warnings().is_empty());
+    let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).machine.warnings();
     assert!(warnings.len() == 1 && warnings[0].to_string().contains("S1, S2, S3: restitution 0.3"), "{warnings:?}");
     for (law, asked, given) in [
         ("lankarani-nikravesh", "0.9", None),
@@ -236,7 +237,8 @@ fn doubtful_choices_are_warned_of() {
         ("flores", "0.1", Some("0.069")),
         ("gonthier", "0.1", None),
     ] {
-        let warnings = changed("spcmm", &[("contact.restitution", asked), ("contact.normal_law", law)]).warnings();
+        let warnings =
+            changed("spcmm", &[("contact.restitution", asked), ("contact.normal_law", law)]).machine.warnings();
         let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         match given {
             None => assert_eq!(said, [""; 0], "{law} {asked}"),
@@ -246,38 +248,38 @@ fn doubtful_choices_are_warned_of() {
             ),
         }
     }
-    let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).warnings();
+    let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).machine.warnings();
     assert!(warnings.len() == 1 && warnings[0].to_string().starts_with("S2: clearance 0.01 mm"), "{warnings:?}");
-    assert!(changed("spcmm", &[("contact.clearance", "0")]).warnings().is_empty());
+    assert!(changed("spcmm", &[("contact.clearance", "0")]).machine.warnings().is_empty());
     let coarse = [("solver.method", "rk4"), ("solver.step", "50 us")];
-    assert!(changed("spcmm", &coarse).warnings()[0].to_string().contains("50 us"));
+    assert!(changed("spcmm", &coarse).machine.warnings()[0].to_string().contains("50 us"));
 }
 
 #[test]
 fn the_built_in_scenes_carry_the_published_numbers() {
     let scene = changed("spcmm", &[]);
-    let find = |name: &str| scene.bodies.iter().find(|body| body.name == name).unwrap();
+    let find = |name: &str| scene.machine.bodies.iter().find(|body| body.name == name).unwrap();
     assert_eq!(find("platform").inertia.diagonal(), Vec3::new(4.44e-4, 3.31e-4, 1.35e-4));
     // 1.92e-3 about the hinge axis: y for rods 1 and 2, z for rod 3.
     for (rod, hinge) in [("rod1", Vec3::y()), ("rod2", Vec3::y()), ("rod3", Vec3::z())] {
         let body = find(rod);
         assert_eq!(hinge.dot(&(body.inertia * hinge)), 1.92e-3);
-        let child = scene.bodies.iter().position(|other| other.name == rod).unwrap();
-        assert_eq!(scene.joints[child].axis, hinge);
+        let child = scene.machine.bodies.iter().position(|other| other.name == rod).unwrap();
+        assert_eq!(scene.machine.joints[child].axis, hinge);
     }
-    let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
+    let mass: f64 = scene.machine.bodies.iter().map(|body| body.mass).sum();
     assert!((mass - (3.0 * 0.168 + 3.0 * 0.384 + 0.490)).abs() < 1e-15);
-    assert_eq!(scene.gravity, Vec3::new(9.81, 0.0, 0.0));
-    assert_eq!(scene.start, StartRule::Ideal);
-    assert_eq!(scene.bodies[scene.output.body].name, "platform");
-    assert_eq!(scene.contact.friction_velocity, crate::contact::FrictionVelocity::Centres);
+    assert_eq!(scene.machine.gravity, Vec3::new(9.81, 0.0, 0.0));
+    assert_eq!(scene.machine.start, StartRule::Ideal);
+    assert_eq!(scene.machine.bodies[scene.machine.output.body].name, "platform");
+    assert_eq!(scene.machine.contact.friction_velocity, crate::contact::FrictionVelocity::Centres);
 }
 
 #[test]
 fn the_slider_crank_starts_with_velocities_that_fit_together() {
     let scene = changed("slider-crank", &[]);
-    let rod = scene.bodies.iter().position(|body| body.name == "rod").unwrap();
-    let JointStart::Pose { rotation, velocity, angular_velocity, .. } = scene.joints[rod].start else {
+    let rod = scene.machine.bodies.iter().position(|body| body.name == "rod").unwrap();
+    let JointStart::Pose { rotation, velocity, angular_velocity, .. } = scene.machine.joints[rod].start else {
         panic!("the rod is free")
     };
     let end = |x: f64| velocity + angular_velocity.cross(&(rotation * Vec3::new(x, 0.0, 0.0)));
@@ -286,13 +288,12 @@ fn the_slider_crank_starts_with_velocities_that_fit_together() {
     assert!((end(0.15) - Vec3::new(0.24, 0.0, 0.0)).norm() < 1e-15);
     assert!(angular_velocity.dot(&(rotation * Vec3::x())).abs() < 1e-15);
     let driven = changed("slider-crank-driven", &[]);
-    let crank = driven.joints.iter().find(|joint| joint.name == "crank");
+    let crank = driven.machine.joints.iter().find(|joint| joint.name == "crank");
     let law = crank.and_then(|joint| joint.drive.as_ref()).expect("driven");
-    assert_eq!(law.kind.word, "constant");
-    assert_eq!(["position", "velocity"].map(|key| law.number(key)), [0.0, 6.0]);
+    assert_eq!(*law, Drive::Constant { position: 0.0, velocity: 6.0 });
     // Otherwise they are the same mechanism.
-    assert_eq!(driven.bodies, scene.bodies);
-    assert_eq!(driven.ball_joints, scene.ball_joints);
+    assert_eq!(driven.machine.bodies, scene.machine.bodies);
+    assert_eq!(driven.machine.ball_joints, scene.machine.ball_joints);
 }
 
 #[test]
@@ -304,7 +305,7 @@ fn all_forms_of_a_rotation_agree() {
              angular_velocity = \"0 0 2 rad/s\" }}"
         );
         let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
-        let JointStart::Pose { position, rotation, velocity, .. } = scene.joints[0].start else { panic!() };
+        let JointStart::Pose { position, rotation, velocity, .. } = scene.machine.joints[0].start else { panic!() };
         // The joint point, 1 m out on the body's x axis, is at the origin and at rest.
         assert!((position + rotation * Vec3::x()).norm() < 1e-15);
         assert!((velocity - Vec3::new(0.0, 0.0, 2.0).cross(&position)).norm() < 1e-15);
@@ -356,7 +357,7 @@ start = { position = \"0.5 * stroke\", velocity = \"speed\" }
 #[test]
 fn every_number_of_a_file_is_a_key() {
     let scene = Scene::parse(OWN, None, &[]).expect("reads");
-    let joint = |scene: &Scene| (scene.joints[0].parent_point, scene.joints[0].start);
+    let joint = |scene: &Scene| (scene.machine.joints[0].parent_point, scene.machine.joints[0].start);
     let start = |position, velocity| JointStart::Scalar { position, velocity };
     assert_eq!(joint(&scene), (Vec3::new(0.01, 0.0, -0.03), start(0.01, 0.04)));
     let mut changed = scene.clone();
@@ -374,7 +375,7 @@ fn every_number_of_a_file_is_a_key() {
         );
     }
     assert_eq!(joint(&changed), (Vec3::new(0.001, 0.0, -0.05), start(0.02, 0.005)));
-    assert_eq!((changed.bodies[0].mass, changed.bodies[0].centre.y), (3.0, 0.007));
+    assert_eq!((changed.machine.bodies[0].mass, changed.machine.bodies[0].centre.y), (3.0, 0.007));
     assert_eq!(changed.get("parameter.speed"), Ok(Value::Number(0.08)));
     // Written to the places where the text has them, and nowhere else.
     let text = changed.to_toml().expect("has its places");
@@ -390,7 +391,7 @@ fn every_number_of_a_file_is_a_key() {
     let read = Scene::parse(&text, None, &[]).expect("reads");
     assert_eq!(joint(&read), joint(&changed));
     changed.undo_change("parameter.stroke").expect("was changed");
-    assert_eq!(changed.joints[0].parent_point.z, -0.03);
+    assert_eq!(changed.machine.joints[0].parent_point.z, -0.03);
 }
 
 #[test]
@@ -500,29 +501,32 @@ radius = \"1 mm\"
 role = \"frame\"
 ";
     let scene = Scene::parse(text, None, &[]).expect("reads");
-    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.as_str()).collect();
+    let names: Vec<&str> = scene.machine.bodies.iter().map(|body| body.name.as_str()).collect();
     assert_eq!(names, ["table", "rod1", "rod2", "rod3"]);
     let near = |a: Vec3, b: Vec3| assert!((a - b).norm() < 1e-15, "{a} {b}");
     for copy in 0..3 {
         let angle = std::f64::consts::TAU / 3.0 * copy as f64;
         let radial = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
         let place = Vec3::new(0.01, 0.0, 0.005 * copy as f64) + 0.01 * radial;
-        let joint = &scene.ball_joints[copy];
+        let joint = &scene.machine.ball_joints[copy];
         assert_eq!(joint.name, format!("S{}", copy + 1));
         near(joint.socket.point, place);
         // In the rod's own frame nothing moves.
         near(joint.ball.point, Vec3::new(0.0, 0.0, 0.001));
         near(joint.opening, radial);
         assert_eq!(joint.ball.body, Some(copy + 1));
-        let JointStart::Pose { position, velocity, rotation, .. } = scene.joints[copy + 1].start else {
+        let JointStart::Pose { position, velocity, rotation, .. } = scene.machine.joints[copy + 1].start else {
             panic!("free");
         };
         near(position, place);
         near(velocity, radial);
         near(rotation * Vec3::x(), radial);
-        near(scene.elements[copy].vector("force"), radial);
-        assert_eq!(scene.bodies[copy + 1].mass, 2.0 * (copy + 1) as f64);
-        let Geometry::Sphere { centre, .. } = scene.fixed_shapes[copy].geometry else {
+        let ElementKind::Load(load) = &scene.machine.elements[copy].kind else {
+            panic!("a load");
+        };
+        near(load.force, radial);
+        assert_eq!(scene.machine.bodies[copy + 1].mass, 2.0 * (copy + 1) as f64);
+        let Geometry::Sphere { centre, .. } = scene.machine.fixed_shapes[copy].geometry else {
             panic!("sphere");
         };
         near(centre, place);
@@ -530,7 +534,7 @@ role = \"frame\"
     // One copy alone can be changed, but not written back.
     let mut changed = scene.clone();
     changed.set("body.rod2.mass", "9 kg").expect("a key");
-    assert_eq!(changed.bodies[2].mass, 9.0);
+    assert_eq!(changed.machine.bodies[2].mass, 9.0);
     let error = changed.to_toml().expect_err("has no place of its own");
     assert!(error.message.contains("every copy of a pattern has it"), "{error}");
     for (from, to, wanted) in [
@@ -586,12 +590,12 @@ ball = { body = \"leg\" }
         Scene::parse_with(text, Some("scene.toml"), &beside, &changes)
     };
     let mut scene = with(leg, text, &[("body.leg.mass", "3 kg")]).expect("reads");
-    assert_eq!(scene.bodies[0].mass, 3.0);
-    assert_eq!(scene.ball_joints[0].socket.point.x, 0.03);
+    assert_eq!(scene.machine.bodies[0].mass, 3.0);
+    assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.03);
     // Read again from what was read before.
     scene.set("parameter.reach", "40 mm").expect("a key");
-    assert_eq!(scene.ball_joints[0].socket.point.x, 0.04);
-    assert_eq!(scene.bodies[0].mass, 3.0);
+    assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.04);
+    assert_eq!(scene.machine.bodies[0].mass, 3.0);
     let error = scene.to_toml().expect_err("two files").to_string();
     assert!(error.contains("another file, which this one includes"), "{error}");
     for (leg, text, place, wanted) in [
@@ -651,7 +655,7 @@ fn a_body_of_a_density_weighs_what_its_shapes_do() {
     let bar = "shapes = [{ form = \"box\", centre = \"50 0 0 mm\", size = \"100 20 10 mm\", role = \"frame\" }]";
     let read = |body: String| Scene::parse(&text(&body), Some("bar.toml"), &[]);
     let scene = read(format!("density = \"7.85 g/cm^3\"\n{bar}")).expect("reads");
-    let body = &scene.bodies[0];
+    let body = &scene.machine.bodies[0];
     assert!((body.mass - 0.157).abs() < 1e-15 && (body.centre - Vec3::new(0.05, 0.0, 0.0)).norm() < 1e-17);
     let moments = Vec3::new(0.01 * 0.01 + 0.02 * 0.02, 0.1 * 0.1 + 0.01 * 0.01, 0.1 * 0.1 + 0.02 * 0.02);
     let expected = Mat3::from_diagonal(&(moments * (0.157 / 12.0)));
@@ -684,7 +688,8 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     let read = |value: &str, more: &str| Scene::parse(&text(value, more), Some("own.toml"), &[]);
     let start = |value: &str| {
         let scene = read(&format!("start = {{ position = \"{value}\" }}"), "");
-        let JointStart::Scalar { position, .. } = scene.unwrap_or_else(|error| panic!("{error}")).joints[0].start
+        let JointStart::Scalar { position, .. } =
+            scene.unwrap_or_else(|error| panic!("{error}")).machine.joints[0].start
         else {
             panic!("a hinge");
         };
@@ -694,16 +699,16 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     assert_eq!(start("atan2(1, 2) + 0 deg"), libm::atan2(1.0, 2.0));
     assert!((start("2 * 15°") - 0.5235987755982988).abs() < 1e-15);
     let scene = read("", "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"").expect("reads");
-    assert!((scene.contact.clearance - 0.21e-3).abs() < 1e-18);
-    assert_eq!(scene.contact.friction, 1.0 / 3.0);
+    assert!((scene.machine.contact.clearance - 0.21e-3).abs() < 1e-18);
+    assert_eq!(scene.machine.contact.friction, 1.0 / 3.0);
     // A power at a unit is one of the unit.
     let scene = read("", "clearance = \"3 mm^2 / (2 mm)^2 * 0.4 mm\"").expect("reads");
-    assert!((scene.contact.clearance - 0.3e-3).abs() < 1e-18);
+    assert!((scene.machine.contact.clearance - 0.3e-3).abs() < 1e-18);
     for inertia in ["0.3 kg * 1.0001 m^2 / 12", "0.3 kg * 1.0001 m² / 12", "0.3 kg * (1 m)^2 * 1.0001 / 12"] {
         let components = format!("[\"1e-3 kg m^2\", \"{inertia}\", \"{inertia}\"]");
         let text = text("", "").replace("\"1 1 1 kg m^2\"", &components);
         let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
-        assert!((scene.bodies[0].inertia[(1, 1)] - 0.0250025).abs() < 1e-15);
+        assert!((scene.machine.bodies[0].inertia[(1, 1)] - 0.0250025).abs() < 1e-15);
     }
     let drive = |law: &str| format!("drive = {{ law = {law} }}");
     let spin = "\"constant\", velocity = \"rate\"";
@@ -773,11 +778,11 @@ joint = \"hub\"
 stiffness = \"1 N m/rad\"
 ";
     let scene = Scene::parse(text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(scene.joints[2].name, "hub2");
-    assert_eq!(scene.joints[2].parent, Some(0));
+    assert_eq!(scene.machine.joints[2].name, "hub2");
+    assert_eq!(scene.machine.joints[2].parent, Some(0));
     let angle = std::f64::consts::TAU / 3.0;
     let turned = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
-    assert!((scene.joints[2].parent_point - turned).norm() < 1e-15);
+    assert!((scene.machine.joints[2].parent_point - turned).norm() < 1e-15);
     let shapes = format!("shapes = [{}]\n\n[[pattern.joint]]", "0, ".repeat(9999));
     let many = text.replace("count = 3", "count = 10000");
     let many = many.replacen("[[pattern.joint]]", &shapes, 1);

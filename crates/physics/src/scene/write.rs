@@ -5,8 +5,8 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Val
 use std::collections::BTreeMap;
 
 use super::given::{FileNumber, Place};
-use super::units::exact_quantity;
 use super::{Kind, Scene, SceneError, Value};
+use crate::units::exact_quantity;
 
 /// Most numbers in one vector.
 const MOST_PARTS: usize = 4;
@@ -231,8 +231,8 @@ mod tests {
         let mut plain = scene.clone();
         plain.changes.clear();
         plain.source = Default::default();
-        for joint in &mut plain.ball_joints {
-            joint.overrides.sort_unstable();
+        for overrides in &mut plain.overrides {
+            overrides.sort_unstable();
         }
         format!("{plain:?}")
     }
@@ -260,7 +260,7 @@ mod tests {
                 };
                 let mut keys = vec![parameter.key.to_owned()];
                 if let Some(part) = contact_part(parameter) {
-                    keys.push(format!("joint.{}.{part}", plain.ball_joints[0].name));
+                    keys.push(format!("joint.{}.{part}", plain.machine.ball_joints[0].name));
                 }
                 for key in keys {
                     let mut changed = plain.clone();
@@ -313,10 +313,10 @@ mod tests {
     fn gravity_that_the_file_leaves_out_is_written_whole() {
         let text = scene("pendulum", &[]).source.text.replace("[gravity]\nz = \"-9.81 m/s^2\"\n", "");
         let mut bare = Scene::parse(&text, None, &[]).expect("reads");
-        assert_eq!(bare.gravity.z, -9.81);
+        assert_eq!(bare.machine.gravity.z, -9.81);
         bare.set("gravity.x", "1 m/s^2").expect("in range");
         let read = Scene::parse(&bare.to_toml().expect("written"), None, &[]).expect("reads");
-        assert_eq!(read.gravity, bare.gravity);
+        assert_eq!(read.machine.gravity, bare.machine.gravity);
     }
 
     #[test]
@@ -350,7 +350,7 @@ mod tests {
             let written = changed.to_toml().expect("has its places");
             let read = Scene::parse(&written, None, &[]).expect("reads");
             assert_eq!(bits(&read), bits(&changed), "{written}");
-            assert_eq!(read.ball_joints[1].contact.clearance, 0.5e-3);
+            assert_eq!(read.machine.ball_joints[1].contact.clearance, 0.5e-3);
             assert_eq!(written.contains("# the second"), text.contains("# the second"));
             // A second time: the entries exist now.
             let mut again = read;

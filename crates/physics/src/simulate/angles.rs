@@ -2,7 +2,7 @@
 
 use super::Pose;
 use super::frame::BodyMotion;
-use crate::scene::{Mat3, Vec3};
+use crate::machine::{Mat3, Vec3};
 
 /// Closer to beta = +-pi/2 than this (in cos beta), alpha is set to 0 and gamma takes the rest.
 const NEAR_SINGULAR: f64 = 1e-9;

@@ -5,10 +5,10 @@ mod table;
 
 pub use choice::{Listed, NoChannel, channels_of, chosen_columns};
 use table::TIME;
-pub use table::{PlotKind, Quantity};
+pub use table::{PLOT_WORDS, PlotKind, Quantity};
 
 use super::Frame;
-use crate::scene::{Freedom, Joint, JointKind, Scene};
+use crate::machine::{Freedom, Joint, JointKind, Machine};
 use table::{Each, Signal, TABLE, Take};
 
 /// Ball joints and drives that are recorded; in a longer chain the rest would cost more memory than it is worth.
@@ -74,10 +74,10 @@ pub struct Channels {
 
 impl Channels {
     /// The channels that `scene` has.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(machine: &Machine) -> Self {
         let mut list = Vec::new();
         let in_plots = |signal: &Signal| signal.plot.map(|_| 0);
-        lay_out(scene, None, RECORDED_JOINTS, in_plots, |found| {
+        lay_out(machine, None, RECORDED_JOINTS, in_plots, |found| {
             list.extend(found.signal.plot.map(|quantity| Channel {
                 quantity,
                 member: found.member.to_owned(),
@@ -89,12 +89,12 @@ impl Channels {
     }
 
     /// Picks the channels of `scene` that match `patterns`, in place of those picked before; `first` as in [`run_columns`].
-    pub fn pick(&mut self, scene: &Scene, first: &Frame, patterns: &[String]) {
+    pub fn pick(&mut self, machine: &Machine, first: &Frame, patterns: &[String]) {
         self.picked.clear();
         if patterns.is_empty() {
             return;
         }
-        self.picked = channels_of(scene, first);
+        self.picked = channels_of(machine, first);
         let matches = |channel: &Listed| patterns.iter().any(|p| channel.is_chosen_by(p));
         self.picked.retain(|channel| channel.name != TIME && matches(channel));
         self.picked.truncate(MOST_PICKED);
@@ -154,10 +154,10 @@ impl Channels {
 
 /// Columns of the rows of `run` in order, each with its name and where it is read; `first` shows whether the scene has a
 /// tip error and a ledger, and what its elements report.
-pub fn run_columns(scene: &Scene, first: &Frame) -> (Vec<String>, Vec<Reading>) {
+pub fn run_columns(machine: &Machine, first: &Frame) -> (Vec<String>, Vec<Reading>) {
     let (mut names, mut readings) = (Vec::new(), Vec::new());
     let in_run = |signal: &Signal| signal.run;
-    lay_out(scene, Some(first), usize::MAX, in_run, |found| {
+    lay_out(machine, Some(first), usize::MAX, in_run, |found| {
         names.push(found.column);
         readings.push(found.reading);
     });
@@ -176,7 +176,7 @@ struct Found<'a> {
 /// Calls `add` with the values of all signals that have a place, in order of place; signals that share a place and are
 /// repeated for the same parts go part by part. Only the first `most` parts are used.
 fn lay_out(
-    scene: &Scene,
+    machine: &Machine,
     first: Option<&Frame>,
     most: usize,
     place: impl Fn(&Signal) -> Option<u8>,
@@ -186,9 +186,9 @@ fn lay_out(
     signals.sort_by_key(|signal| place(signal));
     let key = |signal: &Signal| (place(signal), signal.take.each());
     for group in signals.chunk_by(|a, b| key(a) == key(b)) {
-        let parts = parts_of(scene, group[0].take.each());
+        let parts = parts_of(machine, group[0].take.each());
         for (part, (name, freedom)) in parts.into_iter().take(most).enumerate() {
-            let here = |signal: &&&Signal| has(scene, first, signal, part, freedom);
+            let here = |signal: &&&Signal| has(machine, first, signal, part, freedom);
             for signal in group.iter().filter(here) {
                 let take = signal.take;
                 for (component, &(symbol, word)) in take.components().iter().enumerate() {
@@ -208,32 +208,32 @@ fn lay_out(
 }
 
 /// Names of the parts a signal is repeated for; for a coordinate of a joint also what it measures.
-fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
-    let joints = scene.ball_joints.iter().map(|joint| joint.name.as_str());
-    let elements = scene.elements.iter().map(|element| element.name.as_str());
+fn parts_of(machine: &Machine, each: Each) -> Vec<(&str, Option<Freedom>)> {
+    let joints = machine.ball_joints.iter().map(|joint| joint.name.as_str());
+    let elements = machine.elements.iter().map(|element| element.name.as_str());
     let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
-    let holding = scene.joints.iter().filter(|j| j.kind != JointKind::Free);
-    let bodies = scene.bodies.iter().map(|body| body.name.as_str());
+    let holding = machine.joints.iter().filter(|j| j.kind != JointKind::Free);
+    let bodies = machine.bodies.iter().map(|body| body.name.as_str());
     match each {
         Each::Once => vec![("", None)],
-        Each::Output => vec![(scene.bodies[scene.output.body].name.as_str(), None)],
+        Each::Output => vec![(machine.bodies[machine.output.body].name.as_str(), None)],
         Each::Body => bodies.map(|name| (name, None)).collect(),
         Each::Coordinate => {
-            scene.kinematic_joints().flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom))).collect()
+            machine.kinematic_joints().flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom))).collect()
         }
         Each::Holding => holding.map(|j| (j.name.as_str(), None)).collect(),
         Each::Closing => {
-            let closing = scene.closing_joints.iter();
+            let closing = machine.closing_joints.iter();
             closing.map(|joint| (joint.name.as_str(), None)).collect()
         }
         Each::Joint => joints.map(|name| (name, None)).collect(),
-        Each::Drive => scene.driven().map(|(j, freedom)| (j.name.as_str(), Some(freedom))).collect(),
+        Each::Drive => machine.driven().map(|(j, freedom)| (j.name.as_str(), Some(freedom))).collect(),
         Each::Element => elements.map(|name| (name, None)).collect(),
     }
 }
 
 /// Whether `scene` has `signal` for part `part`; without a `first` frame, whether it may have it.
-fn has(scene: &Scene, first: Option<&Frame>, signal: &Signal, part: usize, freedom: Option<Freedom>) -> bool {
+fn has(machine: &Machine, first: Option<&Frame>, signal: &Signal, part: usize, freedom: Option<Freedom>) -> bool {
     let take = signal.take;
     let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());
     match take {
@@ -245,13 +245,16 @@ fn has(scene: &Scene, first: Option<&Frame>, signal: &Signal, part: usize, freed
         Take::ChildTurn => freedom == Some(Freedom::SecondTurn),
         Take::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
         Take::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
-        Take::OtherAxes(_) | Take::OtherAngles(_) => part != scene.output.body,
+        Take::OtherAxes(_) | Take::OtherAngles(_) => part != machine.output.body,
         Take::Given(..) | Take::Taken(..) => {
-            known(scene.solver.energy_ledger) && (!signal.of_elements || !scene.elements.is_empty())
+            known(machine.solver.energy_ledger) && (!signal.of_elements || !machine.elements.is_empty())
         }
-        Take::ProbeError => known(scene.output.probe.is_some()),
+        Take::ProbeError => known(machine.output.probe.is_some()),
         Take::Element(_) => known(true),
-        Take::ElementValue(_) => scene.elements[part].kind.points.len() == 2,
+        Take::ElementValue(_) => {
+            let element = &machine.elements[part];
+            element.coordinate().is_none() && element.points.len() == 2
+        }
         _ => true,
     }
 }
@@ -259,6 +262,7 @@ fn has(scene: &Scene, first: Option<&Frame>, signal: &Signal, part: usize, freed
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
 
     #[test]
     fn every_plot_has_a_signal_and_no_two_signals_have_one_column() {
@@ -285,9 +289,9 @@ mod tests {
         let load = "[[load]]\nname = \"wind\"\non = { body = \"rod\" }\nforce = \"1 0 0 N\"\n";
         let scene = Scene::parse(&format!("{text}\n{load}"), None, &[]).expect("reads");
         let mut first = Frame::default();
-        let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+        let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
         simulation.sample(0.0, &mut first);
-        let (names, readings) = run_columns(&scene, &first);
+        let (names, readings) = run_columns(&scene.machine, &first);
         let last = "drive_work_J,gravity_work_J,restitution_loss_J,friction_loss_J,clearance_work_J,energy_residual_J,\
                     wind_force_x_N,wind_force_y_N,wind_force_z_N,wind_torque_x_Nm,wind_torque_y_Nm,wind_torque_z_Nm,\
                     damping_loss_J,external_work_J";

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use crate::scene::{self, format_quantity_digits};
+use crate::machine;
+use crate::units::format_quantity_digits;
 
 /// Ball joints that a doubt concerns.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,8 +56,8 @@ impl LedgerTerm {
 /// Why a result is not to be trusted. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
-    /// Follows from the scene's settings, whatever happened in the run.
-    Scene(scene::Doubt),
+    /// Follows from the machine's settings, whatever happened in the run.
+    Machine(machine::Doubt),
     /// Contacts that lasted fewer fixed steps than needed to resolve their forces.
     Unresolved {
         /// Where.
@@ -185,7 +186,7 @@ impl Doubt {
     /// Its kind, an index into [`Self::KINDS`].
     pub fn kind(&self) -> usize {
         match self {
-            Self::Scene(_) => 0,
+            Self::Machine(_) => 0,
             Self::Unresolved { .. } => 1,
             Self::Late { .. } => 2,
             Self::Rebound { .. } => 3,
@@ -204,7 +205,7 @@ impl Doubt {
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Scene(doubt) => doubt.fmt(f),
+            Self::Machine(doubt) => doubt.fmt(f),
             Self::Unresolved { joints, short, contacts, steps } => write!(
                 f,
                 "{joints}: {short} of {contacts} contacts lasted fewer than {steps} steps: their forces are not resolved."

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Ledger;
+use crate::machine::{Mat3, Vec3};
 pub use crate::mechanism::ElementReport;
-use crate::scene::{Mat3, Vec3};
 
 /// Everything that is reported about one instant. SI units, world axes.
 #[derive(Clone, Debug, Default)]

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::machine::{JointKind, Machine, Vec3};
 use crate::mechanism::Mechanism;
-use crate::scene::{JointKind, Scene, Vec3};
 
 /// The largest size of a force, N, or of a torque, N m, and when, s; `None` where there is no such load.
 pub type LoadPeak = Option<(f64, f64)>;
@@ -19,9 +19,9 @@ pub struct LoadPeaks {
 }
 
 impl LoadPeaks {
-    pub(super) fn new(scene: &Scene, mechanism: &Mechanism) -> Self {
-        let holding = scene.joints.iter().filter(|joint| joint.kind != JointKind::Free);
-        let parts = scene.elements.len() + holding.count() + scene.closing_joints.len();
+    pub(super) fn new(machine: &Machine, mechanism: &Mechanism) -> Self {
+        let holding = machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
+        let parts = machine.elements.len() + holding.count() + machine.closing_joints.len();
         Self { parts: vec![[None; 2]; parts], seen: 0.0, actuators: vec![0.0; mechanism.drives()] }
     }
 

@@ -26,7 +26,7 @@ pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
 pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
 pub use simulation::ideal::{ProbeFault, closed};
-pub use simulation::live::{ChangeError, differs_in_conditions_alone};
+pub use simulation::live::ChangeError;
 pub use simulation::saved::{Misfit, SavedState};
 pub use simulation::{CLEARANCE_SPEED, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
@@ -36,9 +36,9 @@ use serde::{Deserialize, Serialize};
 
 use std::sync::Arc;
 
+use crate::machine::Machine;
 pub use crate::mechanism::Pull;
-use crate::mechanism::{CostOf, Counts, MechanismError, Structure};
-use crate::scene::{Scene, SceneError};
+use crate::mechanism::{Counts, MechanismError, Structure};
 
 /// The longest run, s: at its end a double still resolves 0.1 ns.
 pub const LONGEST_RUN: f64 = 1e6;
@@ -47,37 +47,6 @@ pub const LONGEST_RUN: f64 = 1e6;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct StartError(#[from] pub MechanismError);
-
-impl StartError {
-    /// The same error, with the line of `scene`'s file and the change that it concerns.
-    pub fn located(&self, scene: &Scene) -> SceneError {
-        let one = |joint: &str, parts: &[&str]| {
-            let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
-            for part in parts {
-                keys.push(format!("contact.{part}"));
-                keys.push(format!("joint.{joint}.{part}"));
-            }
-            (format!("joint.{joint}"), keys)
-        };
-        let (title, keys) = match &self.0 {
-            MechanismError::Unreachable(_) | MechanismError::OtherBranch | MechanismError::Singular => {
-                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
-            }
-            MechanismError::Open { given: gap }
-            | MechanismError::NoClosure { given: gap, .. }
-            | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
-            MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
-            MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
-                let keys = ["solver.method", "chain.links", "formulation"];
-                let of_form = matches!(self.0, MechanismError::TooCostly { of: CostOf::Formulation(_), .. });
-                let title = if of_form { keys[2] } else { keys[0] };
-                (title.to_owned(), keys.map(str::to_owned).to_vec())
-            }
-            MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
-        };
-        scene.start_error(&title, &keys, self.to_string())
-    }
-}
 
 /// When a changed parameter takes effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -182,8 +151,7 @@ impl Statistics {
 /// The whole state of a simulation: resuming from it reproduces the same bits.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
-    scene: Arc<Scene>,
-    running: Arc<Scene>,
+    machine: Arc<Machine>,
     structure: Structure,
     state: simulation::State,
     polynomial: Option<crate::integrate::Polynomial>,
@@ -204,57 +172,5 @@ impl Snapshot {
     /// Approximate size in bytes, without the shared scene.
     pub fn bytes(&self) -> usize {
         self.state.bytes()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::built_in_text;
-
-    fn start_error(text: &str, changes: &[(&str, &str)]) -> SceneError {
-        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
-        let scene = Scene::parse(text, Some("mine.toml"), &changes).expect("reads");
-        let error = Simulation::new(&scene).err().expect("cannot start");
-        error.located(&scene)
-    }
-
-    #[test]
-    fn a_start_error_points_to_its_line_and_names_the_change() {
-        let text = built_in_text("spcmm").expect("built in");
-        let line_of = |text: &str, what: &str| {
-            let at = text.lines().position(|line| line == what);
-            at.map(|at| at as u32 + 1)
-        };
-        let far = text.replace("amplitude_x = \"25 mm\"", "amplitude_x = \"200 mm\"");
-        let error = start_error(&far, &[]);
-        assert_eq!(error.position.map(|p| p.0), line_of(text, "[spcmm]"));
-        assert_eq!(error.line_text.as_deref(), Some("[spcmm]"));
-        let error = start_error(text, &[("spcmm.amplitude_x", "200 mm")]);
-        assert_eq!(error.key.as_deref(), Some("spcmm.amplitude_x"));
-        assert!(error.to_string().starts_with("mine.toml:"), "{error}");
-
-        let text = built_in_text("slider-crank").expect("built in");
-        let open = text.replace("at = \"0 0 80 mm\"", "at = \"0 0 380 mm\"");
-        let error = start_error(&open, &[]);
-        assert_eq!(error.position.map(|p| p.0), line_of(text, "[[ball_joint]]"));
-        assert!(error.to_string().contains("ball joint B"), "{error}");
-    }
-
-    #[test]
-    fn values_as_given_are_not_turned_to_the_closed_form() {
-        let text = built_in_text("spcmm").expect("built in");
-        let given = text
-            .replace("start = \"ideal\"", "start = \"as-given\"")
-            .replace("0.4106585548949 rad", "0.4111585548949 rad");
-        let scene = Scene::parse(&given, None, &[]).expect("reads");
-        let mut simulation = Simulation::new(&scene).expect("starts");
-        let mut frame = Frame::default();
-        simulation.sample(0.0, &mut frame);
-        let eccentricities = frame.joints.iter().map(|joint| joint.eccentricity.norm());
-        let most = eccentricities.fold(0.0, f64::max);
-        // Half a milliradian at the end of a rod of 200 mm.
-        assert!((most / 0.1e-3 - 1.0).abs() < 0.01, "{most}");
     }
 }

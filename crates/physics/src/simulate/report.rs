@@ -3,21 +3,21 @@
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactState, Frame, JointReport};
 use crate::contact::Memory;
+use crate::machine::{Attachment, BallJoint, Machine, Vec3};
 use crate::mechanism::Mechanism;
-use crate::scene::{Scene, Vec3};
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
 /// contact memory `memory`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
-    scene: &Scene,
+    machine: &Machine,
     memory: &[Memory],
     (time, y): (f64, &[f64]),
     out: &mut Frame,
 ) {
     out.time = time;
     out.bodies.clear();
-    for (b, m) in mechanism.motion()[..scene.bodies.len()].iter().enumerate() {
+    for (b, m) in mechanism.motion()[..machine.bodies.len()].iter().enumerate() {
         let arm = m.rotation * mechanism.frame_origin(b);
         out.bodies.push(BodyMotion {
             position: m.position + arm,
@@ -28,9 +28,9 @@ pub(super) fn fill(
             angular_acceleration: m.angular_acceleration,
         });
     }
-    out.pose = pose_of(&out.bodies[scene.output.body]);
+    out.pose = pose_of(&out.bodies[machine.output.body]);
     out.joints.clear();
-    for (j, joint) in scene.ball_joints.iter().enumerate() {
+    for (j, joint) in machine.ball_joints.iter().enumerate() {
         out.joints.push(joint_report(mechanism, joint, &memory[j], j));
     }
     out.closing.clear();
@@ -41,7 +41,7 @@ pub(super) fn fill(
     let (kinetic, gravitational) = mechanism.energies();
     out.kinetic = kinetic;
     out.potential = gravitational + out.elastic;
-    out.probe_error = probe_error(mechanism, scene, out);
+    out.probe_error = probe_error(mechanism, machine, out);
     out.coordinates.clear();
     out.coordinates.extend(mechanism.coordinates(y));
     out.actuators.resize(mechanism.drives(), 0.0);
@@ -52,9 +52,9 @@ pub(super) fn fill(
     }
 }
 
-fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, memory: &Memory, j: usize) -> JointReport {
+fn joint_report(mechanism: &Mechanism, joint: &BallJoint, memory: &Memory, j: usize) -> JointReport {
     let motion = mechanism.motion();
-    let centre = |a: &crate::scene::Attachment| match a.body {
+    let centre = |a: &Attachment| match a.body {
         None => a.point,
         Some(b) => {
             let m = &motion[b];
@@ -95,9 +95,9 @@ fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, memory: 
 }
 
 /// Probe tip minus the tip of the ideal mechanism at the same time, m.
-fn probe_error(mechanism: &Mechanism, scene: &Scene, frame: &Frame) -> Option<Vec3> {
-    let (probe, ideal) = (scene.output.probe?, mechanism.closed_motion()?);
-    let body = &frame.bodies[scene.output.body];
+fn probe_error(mechanism: &Mechanism, machine: &Machine, frame: &Frame) -> Option<Vec3> {
+    let (probe, ideal) = (machine.output.probe?, mechanism.closed_motion()?);
+    let body = &frame.bodies[machine.output.body];
     let ideal_tip = Vec3::from_fn(|i, _| ideal.position[i].value) + ideal.rotation * probe;
     Some(body.position + body.rotation * probe - ideal_tip)
 }

@@ -29,8 +29,8 @@ use super::stepper::{AnyStepper, Member};
 use super::{Frame, LoadPeaks, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
+use crate::machine::Machine;
 use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, Touching};
-use crate::scene::Scene;
 use adaptive::Whole;
 use automatic::{Choice, controller_of, prepare_implicit};
 use corners::Piece;
@@ -64,10 +64,8 @@ fn shortest_step(t: f64) -> f64 {
 ///
 /// The same scene and the same calls give the same bits.
 pub struct Simulation {
-    /// Including changes that wait for a reset.
-    scene: Arc<Scene>,
-    /// As it is running.
-    running: Arc<Scene>,
+    /// With the changes so far.
+    machine: Arc<Machine>,
     mechanism: Mechanism,
     stepper: AnyStepper,
     state: State,
@@ -206,16 +204,16 @@ struct Record {
 }
 
 impl Control {
-    fn new(scene: &Scene) -> Self {
+    fn new(machine: &Machine) -> Self {
         Self {
-            h_next: scene.solver.step.min(LONGEST_STEP),
+            h_next: machine.solver.step.min(LONGEST_STEP),
             h_contact: FIRST_CONTACT_STEP,
             contact_began: false,
             chatter: 0,
             chatters: false,
             member: Member::Explicit,
             choice: Choice::default(),
-            controller: controller_of(scene.solver.method, Member::Explicit),
+            controller: controller_of(machine.solver.method, Member::Explicit),
             grid_origin: 0.0,
             grid_count: 0,
         }
@@ -224,7 +222,7 @@ impl Control {
 
 impl State {
     /// At t = 0 with the coordinates and velocities `y`.
-    fn new(scene: &Scene, mechanism: &Mechanism, y: Vec<f64>) -> Self {
+    fn new(machine: &Machine, mechanism: &Mechanism, y: Vec<f64>) -> Self {
         let joints = mechanism.contacts.len();
         let now = StepEnd::new(y, joints);
         Self {
@@ -234,7 +232,7 @@ impl State {
             clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
             pull: None,
             flights: vec![None; mechanism.flyers().len()],
-            control: Control::new(scene),
+            control: Control::new(machine),
             record: Record {
                 account: Account::default(),
                 wear: None,
@@ -258,18 +256,18 @@ impl State {
 }
 
 impl Simulation {
-    /// Starts `scene` at t = 0.
+    /// Starts `machine` at t = 0.
     ///
     /// # Errors
     /// Ball joints that do not close, a trajectory that the rods cannot reach.
-    pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        let mut mechanism = Mechanism::new(scene)?;
+    pub fn new(machine: &Machine) -> Result<Self, StartError> {
+        let mut mechanism = Mechanism::new(machine)?;
         let y = mechanism.start()?;
-        prepare_implicit(&mut mechanism, scene.solver.method)?;
-        let state = State::new(scene, &mechanism, y);
-        let scene = Arc::new(scene.clone());
-        let reference = Reference::of(&scene, mechanism.has_closed_form());
-        let mut simulation = Self::assembled(&scene, mechanism, state, reference);
+        prepare_implicit(&mut mechanism, machine.solver.method)?;
+        let state = State::new(machine, &mechanism, y);
+        let machine = Arc::new(machine.clone());
+        let reference = Reference::of(&machine, mechanism.has_closed_form());
+        let mut simulation = Self::assembled(&machine, mechanism, state, reference);
         simulation.begin_contacts_at_start();
         simulation.choose_first_member();
         simulation.refresh();
@@ -295,12 +293,11 @@ impl Simulation {
     }
 
     /// Takes `state` as it is.
-    fn assembled(scene: &Arc<Scene>, mechanism: Mechanism, state: State, reference: Reference) -> Self {
+    fn assembled(machine: &Arc<Machine>, mechanism: Mechanism, state: State, reference: Reference) -> Self {
         let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
-            scene: scene.clone(),
-            running: scene.clone(),
-            stepper: AnyStepper::new(scene.solver.method, n),
+            machine: machine.clone(),
+            stepper: AnyStepper::new(machine.solver.method, n),
             reference,
             sampled: vec![(0.0, 0.0); joints],
             loads: None,
@@ -309,8 +306,8 @@ impl Simulation {
                 located: None,
                 corner: None,
                 edge: false,
-                sides: Vec::with_capacity(2 * scene.elements.len()),
-                pressed: std::array::from_fn(|_| Vec::with_capacity(2 * scene.elements.len())),
+                sides: Vec::with_capacity(2 * machine.elements.len()),
+                pressed: std::array::from_fn(|_| Vec::with_capacity(2 * machine.elements.len())),
                 turned: false,
                 whole: None,
                 beside: None,
@@ -330,7 +327,7 @@ impl Simulation {
 
     /// Whether the method locates the instants at which contacts begin and end.
     fn locates(&self) -> bool {
-        self.running.solver.method.is_adaptive()
+        self.machine.solver.method.is_adaptive()
     }
 
     /// Recomputes derivative and gaps after anything but a step changed the state; discards the previous step.
@@ -352,14 +349,9 @@ impl Simulation {
         self.state.discard_previous_step();
     }
 
-    /// The scene with every change, including those that wait for a reset.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    /// The scene as it is running: without the changes that wait for a reset.
-    pub fn running_scene(&self) -> &Scene {
-        &self.running
+    /// The machine with the changes so far.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
     }
 
     /// Equations of motion.
@@ -422,7 +414,7 @@ impl Simulation {
         self.attempt.edge = false;
         if self.mechanism.is_kinematic() {
             self.kinematic_step(follows_drives)?;
-        } else if self.running.solver.method.is_adaptive() {
+        } else if self.machine.solver.method.is_adaptive() {
             let step = self.adaptive_step(follows_drives);
             if step.is_err() {
                 self.forget_flown();
@@ -440,11 +432,11 @@ impl Simulation {
         let (t_end, h) = if self.mechanism.is_kinematic() {
             let h = self.mechanism.kinematic_step().min(LONGEST_STEP);
             (t + h, h)
-        } else if self.running.solver.method.is_adaptive() {
+        } else if self.machine.solver.method.is_adaptive() {
             let h = control.h_next.min(LONGEST_STEP);
             (t + h, h)
         } else {
-            let step = self.running.solver.step;
+            let step = self.machine.solver.step;
             let next = (control.grid_count + 1) as f64;
             (control.grid_origin + next * step, step)
         };
@@ -452,7 +444,7 @@ impl Simulation {
     }
 
     fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let step = self.running.solver.step;
+        let step = self.machine.solver.step;
         let control = &self.state.control;
         let mut t_end = control.grid_origin + (control.grid_count + 1) as f64 * step;
         if t_end >= limit - NEARLY * step {
@@ -476,13 +468,13 @@ impl Simulation {
     /// Tries a step of size `h` from the current state; returns the scaled error estimate.
     fn try_step(&mut self, h: f64) -> f64 {
         let located = self.locates();
-        let Self { mechanism, stepper, state, attempt, running, .. } = self;
+        let Self { mechanism, stepper, state, attempt, machine, .. } = self;
         let StepEnd { t, y, k, memory, .. } = &state.now;
         mechanism.contacts.forget_left_pieces();
         mechanism.hold_elements(&attempt.sides);
         let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
         let end = &mut attempt.end;
-        let tolerance = running.solver.tolerance;
+        let tolerance = machine.solver.tolerance;
         let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance);
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
@@ -556,7 +548,7 @@ impl Simulation {
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
         let fault = if passed { Some(StopFault::SingularLoops) } else { self.objection(open, h) };
         if let Some(fault) = fault {
-            let solver = &self.running.solver;
+            let solver = &self.machine.solver;
             let advice = if passed || open.is_nan() || open > OPEN_LOOP {
                 StopAdvice::Dependent
             } else if solver.method.is_adaptive() {
@@ -645,15 +637,6 @@ impl Simulation {
     /// otherwise only the latest 64 (more with more ball joints) are guaranteed.
     pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
         self.state.record.impacts.hand_out(out);
-    }
-
-    /// Back to t = 0 with the current parameters, including those that wait for a reset.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; the simulation is then unchanged.
-    pub fn reset(&mut self) -> Result<(), StartError> {
-        *self = Self::new(&self.scene)?;
-        Ok(())
     }
 
     /// Coordinates, then velocities, as the formulation orders them.

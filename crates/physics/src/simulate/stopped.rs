@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::scene::format_quantity_digits;
+use crate::units::format_quantity_digits;
 
 /// Why the divergence guard stopped a simulation. The state is the last good one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]

@@ -6,8 +6,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::machine::{BallJoint, Machine, Mat3, Vec3};
 use crate::mechanism::Mechanism;
-use crate::scene::{BallJoint, Mat3, Scene, Vec3};
 
 /// Cells on each socket: about 14 degrees across.
 const CELLS: usize = 200;
@@ -189,7 +189,7 @@ impl Wear {
     }
 
     /// An empty one.
-    pub(super) fn new(scene: &Scene) -> Self {
+    pub(super) fn new(machine: &Machine) -> Self {
         let grid = grid_of_sockets();
         let socket = |joint: &BallJoint| {
             let contact = &joint.contact;
@@ -201,14 +201,14 @@ impl Wear {
                 cells: cells.into(),
             }
         };
-        let sockets: Vec<Socket> = scene.ball_joints.iter().map(socket).collect();
+        let sockets: Vec<Socket> = machine.ball_joints.iter().map(socket).collect();
         let most = MOST_ENTRIES * sockets.len();
         Self { presses: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
     }
 
     /// Whether it is one of `scene`: nothing in it points elsewhere.
-    pub(super) fn fits(&self, scene: &Scene) -> bool {
-        let own = Self::new(scene);
+    pub(super) fn fits(&self, machine: &Machine) -> bool {
+        let own = Self::new(machine);
         let cells = |wear: &Self| wear.sockets.iter().map(|s| s.cells.len()).collect::<Vec<_>>();
         let has = |joint: usize, cell: usize| {
             let socket = self.sockets.get(joint);

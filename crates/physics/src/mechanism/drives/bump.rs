@@ -2,28 +2,17 @@
 //! both ends. A ramp of constant rate, or a pulse that is half a sine, would ask for an infinite force at its corners.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 use super::{Law, step_end_within};
+use crate::expression::smooth_step;
 use crate::jet::Jet;
-use crate::scene::{Drive, smooth_step};
 
 #[derive(Debug)]
-struct Ramp {
-    from: f64,
-    rise: f64,
-    start: f64,
-    duration: f64,
-}
-
-pub(super) fn make_ramp(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    let from = drive.number("from");
-    Arc::new(Ramp {
-        from,
-        rise: drive.number("to") - from,
-        start: drive.number("start"),
-        duration: drive.number("duration"),
-    })
+pub(super) struct Ramp {
+    pub from: f64,
+    pub rise: f64,
+    pub start: f64,
+    pub duration: f64,
 }
 
 impl Law for Ramp {
@@ -43,20 +32,11 @@ impl Law for Ramp {
 }
 
 #[derive(Debug)]
-struct Pulse {
-    base: f64,
-    height: f64,
-    start: f64,
-    duration: f64,
-}
-
-pub(super) fn make_pulse(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    Arc::new(Pulse {
-        base: drive.number("base"),
-        height: drive.number("height"),
-        start: drive.number("start"),
-        duration: drive.number("duration"),
-    })
+pub(super) struct Pulse {
+    pub base: f64,
+    pub height: f64,
+    pub start: f64,
+    pub duration: f64,
 }
 
 impl Law for Pulse {

@@ -1,22 +1,15 @@
 //! An expression of time.
 
-use std::sync::Arc;
-
 use super::Law;
+use crate::expression::Program;
 use crate::jet::Jet;
-use crate::scene::{Drive, DriveData, Program};
 
 #[derive(Debug)]
-struct Formula {
-    program: Program,
-    scale: f64,
+pub(super) struct Formula {
+    pub program: Program,
+    pub scale: f64,
     /// Longest step, s.
-    resolve: f64,
-}
-
-pub(super) fn make(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    let DriveData::Formula(program, scale) = &drive.data else { unreachable!("a formula is read with its expression") };
-    Arc::new(Formula { program: program.clone(), scale: *scale, resolve: drive.number("resolve") })
+    pub resolve: f64,
 }
 
 impl Law for Formula {

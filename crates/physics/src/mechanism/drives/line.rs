@@ -1,20 +1,13 @@
 //! Constant velocity.
 
-use std::sync::Arc;
-
 use super::Law;
 use crate::jet::Jet;
-use crate::scene::Drive;
 
 #[derive(Debug)]
-struct Line {
-    position: f64,
-    velocity: f64,
-    turns: bool,
-}
-
-pub(super) fn make(drive: &Drive, turns: bool) -> Arc<dyn Law> {
-    Arc::new(Line { position: drive.number("position"), velocity: drive.number("velocity"), turns })
+pub(super) struct Line {
+    pub position: f64,
+    pub velocity: f64,
+    pub turns: bool,
 }
 
 impl Law for Line {

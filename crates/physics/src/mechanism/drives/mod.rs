@@ -7,11 +7,17 @@ mod harmonic;
 mod line;
 mod table;
 
+use bump::{Pulse, Ramp};
+use formula::Formula;
+use harmonic::Harmonics;
+use line::Line;
+use table::Table;
+
 use std::fmt::Debug;
 use std::sync::Arc;
 
 use crate::jet::Jet;
-use crate::scene::{Drive, Joint, Scene};
+use crate::machine::{Drive, ElementKind, Joint, Machine};
 
 /// A coordinate, m or rad, as a function of time, s. Allocates nothing.
 pub trait Law: Debug + Send + Sync {
@@ -49,20 +55,6 @@ pub enum Course {
     Own(Arc<dyn Law>),
 }
 
-/// Makes a law; `turns` for a hinge.
-type Make = fn(&Drive, turns: bool) -> Arc<dyn Law>;
-
-/// All laws by word, besides those of closed forms.
-const LAWS: [(&str, Make); 7] = [
-    ("constant", line::make),
-    ("harmonic", harmonic::make),
-    ("harmonics", harmonic::make_sum),
-    ("ramp", bump::make_ramp),
-    ("pulse", bump::make_pulse),
-    ("table", table::make),
-    ("formula", formula::make),
-];
-
 /// Shortest time to the end of a step that [`Law::step_end`] asks for, s: at an instant that is reached only up to rounding,
 /// no step of that length follows.
 const NEAR: f64 = 1e-9;
@@ -71,25 +63,37 @@ const PARTS: f64 = 50.0;
 
 /// What a coordinate with this `drive` follows, an angle if it `turns`.
 pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
-    if let Some(coordinate) = drive.slider() {
-        return Course::ClosedForm(coordinate);
-    }
-    let (_, make) =
-        LAWS.iter().find(|(word, _)| *word == drive.kind.word).expect("every law of the scene format has its motion");
-    Course::Own(make(drive, turns))
+    Course::Own(match drive {
+        Drive::ClosedForm(coordinate) => return Course::ClosedForm(*coordinate),
+        Drive::Constant { position, velocity } => Arc::new(Line { position: *position, velocity: *velocity, turns }),
+        Drive::Harmonic { mean, terms } => Arc::new(Harmonics::new(*mean, terms)),
+        Drive::Ramp { from, to, start, duration } => {
+            Arc::new(Ramp { from: *from, rise: to - from, start: *start, duration: *duration })
+        }
+        Drive::Pulse { base, height, start, duration } => {
+            Arc::new(Pulse { base: *base, height: *height, start: *start, duration: *duration })
+        }
+        Drive::Table { points, repeats } => Arc::new(Table::new(points, *repeats)),
+        Drive::Formula { program, scale, resolve } => {
+            Arc::new(Formula { program: program.clone(), scale: *scale, resolve: *resolve })
+        }
+    })
 }
 
 /// Periods of the motions that drives of joints prescribe, of what force elements follow and of loads, s; infinite where one does
 /// not repeat or nothing moves.
-pub fn periods_of(scene: &Scene) -> impl Iterator<Item = f64> {
-    let drives = scene.joints.iter().flat_map(Joint::drives);
+pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
+    let drives = machine.joints.iter().flat_map(Joint::drives);
     let of_drives = drives.map(|(freedom, drive)| {
         let course = course_of(drive, freedom.turns());
-        course.law().map_or_else(|| closed_period(scene), |law| law.period())
+        course.law().map_or_else(|| closed_period(machine), |law| law.period())
     });
-    let of_elements = scene.elements.iter().map(|element| match &element.law {
-        Some(law) => course_of(law, element.on_hinge).law().map_or(f64::INFINITY, |law| law.period()),
-        None => element.kind.frequency.map_or(f64::INFINITY, |key| 1.0 / element.number(key)),
+    let of_elements = machine.elements.iter().map(|element| match &element.kind {
+        ElementKind::Load(load) => 1.0 / load.frequency,
+        _ => element.law().map_or(f64::INFINITY, |law| {
+            let course = course_of(law, element.is_on_hinge());
+            course.law().map_or(f64::INFINITY, |law| law.period())
+        }),
     });
     of_drives.chain(of_elements)
 }
@@ -104,14 +108,14 @@ impl Course {
     }
 
     /// As [`Law::swing`].
-    pub(super) fn swing(&self, scene: &Scene) -> f64 {
-        self.law().map_or_else(|| closed_period(scene), |law| law.swing())
+    pub(super) fn swing(&self, machine: &Machine) -> f64 {
+        self.law().map_or_else(|| closed_period(machine), |law| law.swing())
     }
 }
 
 /// Period of the closed form of `scene`, s.
-fn closed_period(scene: &Scene) -> f64 {
-    scene.spcmm.map_or(f64::INFINITY, |spcmm| period_if(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency))
+fn closed_period(machine: &Machine) -> f64 {
+    machine.spcmm.map_or(f64::INFINITY, |spcmm| period_if(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency))
 }
 
 /// Period of a swing with these amplitudes, s.

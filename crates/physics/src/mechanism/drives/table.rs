@@ -1,35 +1,32 @@
 //! A cubic spline through points. Its second derivative has no jump between the first point and the last; where the points
 //! repeat, nowhere. Otherwise the end values hold outside, and the rate is 0 at both ends.
 
-use std::sync::Arc;
-
 use super::{Law, NEAR};
 use crate::jet::Jet;
 use crate::mechanism::spline::{Ends, Spline};
-use crate::scene::{Drive, DriveData};
 
 /// Parts into which an interval is stepped, at least, as long as they are not shorter than `FINE`, s.
 const PARTS: f64 = 8.0;
 const FINE: f64 = 1e-3;
 
 #[derive(Debug)]
-struct Table {
+pub(super) struct Table {
     /// Over the instants of the points, s.
     spline: Spline,
     end: f64,
     repeats: bool,
 }
 
-pub(super) fn make(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
-    let DriveData::Points { points, repeats } = &drive.data else { unreachable!("a table is read with its points") };
-    let ends = match repeats {
-        true => Ends::Joined,
-        false => Ends::Level,
-    };
-    Arc::new(Table { spline: Spline::new(points, ends), end: points[points.len() - 1][1], repeats: *repeats })
-}
-
 impl Table {
+    /// Through `points`, which are a period if it `repeats`.
+    pub fn new(points: &[[f64; 2]], repeats: bool) -> Self {
+        let ends = match repeats {
+            true => Ends::Joined,
+            false => Ends::Level,
+        };
+        Self { spline: Spline::new(points, ends), end: points[points.len() - 1][1], repeats }
+    }
+
     /// `t`, moved by whole periods to within the points where they repeat.
     fn within(&self, t: f64) -> f64 {
         let [first, last] = self.spline.ends();

@@ -18,7 +18,7 @@ fn scene(drive: &str) -> Scene {
 }
 
 fn law(drive: &str) -> Arc<dyn Law> {
-    let joint = &scene(drive).joints[0];
+    let joint = &scene(drive).machine.joints[0];
     let (freedom, drive) = joint.drives().next().expect("driven");
     match course_of(drive, freedom.turns()) {
         Course::Own(law) => law,
@@ -176,7 +176,7 @@ fn the_period_of_a_law_is_the_time_after_which_it_repeats() {
         ("law = \"formula\", formula = \"sin(t)\"".into(), f64::INFINITY),
     ] {
         let scene = scene(&text);
-        let found = periods_of(&scene).next().expect("driven");
+        let found = periods_of(&scene.machine).next().expect("driven");
         assert!(found == period || (found - period).abs() < 1e-9, "{text}: {found}");
         if period.is_finite() {
             let law = law(&text);

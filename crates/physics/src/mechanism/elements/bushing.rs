@@ -6,10 +6,10 @@
 //! the relative angular velocity of the rate of theta. About one axis that is -L theta.
 
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, Turning, push};
+use crate::machine::{self, Mat3, Quat, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::{Kinematics, quaternion_of};
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, Mat3, Vec3};
 
 struct Bushing {
     from: Anchor,
@@ -39,17 +39,17 @@ struct State {
     spin: Vec3,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
-    let matrix = |key| element.rotation(key).to_rotation_matrix().into_inner();
+pub(super) fn make(bushing: &machine::Bushing, site: &Site<'_>) -> Box<dyn SceneElement> {
+    let matrix = |rotation: Quat| rotation.to_rotation_matrix().into_inner();
     Box::new(Bushing {
         from: site.anchors[0],
         to: site.anchors[1],
-        axes: matrix("axes"),
-        rest: matrix("rotation"),
-        stiffness: element.vector("stiffness"),
-        damping: element.vector("damping"),
-        turning_stiffness: element.vector("turning_stiffness"),
-        turning_damping: element.vector("turning_damping"),
+        axes: matrix(bushing.axes),
+        rest: matrix(bushing.rotation),
+        stiffness: bushing.stiffness,
+        damping: bushing.damping,
+        turning_stiffness: bushing.turning_stiffness,
+        turning_damping: bushing.turning_damping,
     })
 }
 

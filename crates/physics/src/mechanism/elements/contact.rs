@@ -2,11 +2,11 @@
 
 use super::{At, Coupling, ForceElement, Loads, Touching};
 use crate::contact::{Coefficients, Force, Separation, Slope};
+use crate::machine::Vec3;
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::{Anchor, BallJoint};
 use crate::mechanism::{Powers, Touch};
-use crate::scene::Vec3;
 
 /// One ball joint at the latest evaluation.
 #[derive(Clone, Copy, Debug, Default)]

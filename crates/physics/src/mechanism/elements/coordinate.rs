@@ -5,9 +5,9 @@
 use std::f64::consts::TAU;
 
 use super::{Coupling, ElementReport, Turning, push};
+use crate::machine::{Freedom, JointCoordinate, Machine, Mat3, Vec3};
 use crate::mechanism::kinematics::{Kinematics, Wrench};
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, Freedom, Mat3, Scene, Vec3};
 
 /// A displacement along an axis or an angle about it.
 #[derive(Clone, Copy)]
@@ -46,10 +46,10 @@ pub(super) struct Slopes {
 }
 
 impl Coordinate {
-    /// The one on which `element` of `scene` acts; `ends` are the points that its joint connects.
-    pub fn of(scene: &Scene, element: &Element, ends: &[Anchor]) -> Option<Self> {
-        let (index, freedom) = element.joint?;
-        let joint = scene.kinematic_joints().nth(index)?;
+    /// The coordinate `on` of `machine`; `ends` are the points that its joint connects.
+    pub fn of(machine: &Machine, on: JointCoordinate, ends: &[Anchor]) -> Self {
+        let freedom = on.freedom;
+        let joint = machine.kinematic_joints().nth(on.joint).expect("an element acts on a joint of its machine");
         let (axis, second, rest) = (joint.axis, joint.child_axis, joint.rotation);
         let [across, seen] = match freedom {
             Freedom::FirstTurn => [rest * second, second],
@@ -61,7 +61,7 @@ impl Coordinate {
             }
         };
         let in_child = freedom == Freedom::SecondTurn;
-        Some(Self {
+        Self {
             parent: ends[0],
             child: ends[1],
             turns: freedom.turns(),
@@ -69,7 +69,7 @@ impl Coordinate {
             in_child,
             across,
             seen,
-        })
+        }
     }
 
     /// The coordinate from `position`, and its rate.

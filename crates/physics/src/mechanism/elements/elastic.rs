@@ -2,8 +2,8 @@
 //! curve through points, straight beyond them. Of one that acts one way only, what is left of it.
 
 use crate::jet::Jet;
+use crate::machine::{self, SpringSide};
 use crate::mechanism::spline::{Ends, Spline};
-use crate::scene::{Element, SpringSide};
 
 /// Beyond any stretch, m or rad.
 const FARTHEST: f64 = 1e7;
@@ -20,11 +20,13 @@ pub(super) enum Elastic {
 }
 
 impl Elastic {
-    /// That of `element`, which acts on `side`.
-    pub fn of(element: &Element, side: SpringSide) -> Self {
-        match &element.curve {
-            Some(points) => Self::Curve(Curve::new(points, side)),
-            None => Self::Line { preload: element.number("preload"), stiffness: element.number("stiffness"), side },
+    /// That of a spring which acts on `side`.
+    pub fn new(elastic: &machine::Elastic, side: SpringSide) -> Self {
+        match elastic {
+            machine::Elastic::Curve(points) => Self::Curve(Curve::new(points, side)),
+            machine::Elastic::Line { preload, stiffness } => {
+                Self::Line { preload: *preload, stiffness: *stiffness, side }
+            }
         }
     }
 

@@ -4,10 +4,10 @@
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use crate::machine::{self, SpringSide};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, SpringSide};
 
 struct JointSpring {
     on: Coordinate,
@@ -16,12 +16,12 @@ struct JointSpring {
     damping: f64,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(spring: &machine::JointSpring, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(JointSpring {
         on: site.coordinate(),
-        position: element.number("position"),
-        elastic: Elastic::of(element, SpringSide::Both),
-        damping: element.number("damping"),
+        position: spring.position,
+        elastic: Elastic::new(&spring.elastic, SpringSide::Both),
+        damping: spring.damping,
     })
 }
 

@@ -1,10 +1,10 @@
 //! External force and torque on a body, constant or harmonic, in world or body axes.
 
 use super::{At, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
+use crate::machine::{self, LoadAxes, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, LoadAxes, Vec3};
 
 struct Load {
     on: Anchor,
@@ -16,14 +16,14 @@ struct Load {
     phase: f64,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(load: &machine::Load, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(Load {
         on: site.anchors[0],
-        force: element.vector("force"),
-        torque: element.vector("torque"),
-        turns: element.choice::<LoadAxes>("axes") == LoadAxes::Body,
-        omega: std::f64::consts::TAU * element.number("frequency"),
-        phase: element.number("phase"),
+        force: load.force,
+        torque: load.torque,
+        turns: load.axes == LoadAxes::Body,
+        omega: std::f64::consts::TAU * load.frequency,
+        phase: load.phase,
     })
 }
 

@@ -24,7 +24,7 @@ use super::drives::{Law, course_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
-use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
+use crate::machine::{Attachment, Drive, Element, ElementKind, Machine, Mat3, Vec3};
 use coordinate::Coordinate;
 pub use pull::Pull;
 
@@ -278,45 +278,35 @@ impl Site<'_> {
     }
 }
 
-/// Makes an element of one kind.
-type Make = fn(&Element, &Site<'_>) -> Box<dyn SceneElement>;
-
-/// All kinds by section.
-const KINDS: [(&str, Make); 7] = [
-    ("spring", spring::make),
-    ("load", load::make),
-    ("joint_spring", joint_spring::make),
-    ("stop", stop::make),
-    ("bushing", bushing::make),
-    ("motor", motor::make),
-    ("tyre", tyre::make),
-];
-
 /// The force elements of `scene`, in its order.
-pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElement>> {
+pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn SceneElement>> {
     let make = |element: &Element| {
-        let anchors: Vec<Anchor> = element.points.iter().map(|point| model.anchor(scene, point)).collect();
-        let (_, make) = KINDS
-            .iter()
-            .find(|(section, _)| *section == element.kind.section)
-            .expect("every kind of the scene format has its element");
-        let site = Site { coordinate: Coordinate::of(scene, element, &anchors), anchors: &anchors };
-        make(element, &site)
+        let anchors: Vec<Anchor> = element.points.iter().map(|point| model.anchor(machine, point)).collect();
+        let coordinate = element.coordinate().map(|on| Coordinate::of(machine, on, &anchors));
+        let site = Site { anchors: &anchors, coordinate };
+        match &element.kind {
+            ElementKind::Spring(spring) => spring::make(spring, &site),
+            ElementKind::Load(load) => load::make(load, &site),
+            ElementKind::JointSpring(spring) => joint_spring::make(spring, &site),
+            ElementKind::Stop(stop) => stop::make(stop, &site),
+            ElementKind::Bushing(bushing) => bushing::make(bushing, &site),
+            ElementKind::Motor(motor) => motor::make(motor, &site),
+            ElementKind::Tyre(tyre) => tyre::make(tyre, &site),
+        }
     };
-    scene.elements.iter().map(make).collect()
+    machine.elements.iter().map(make).collect()
 }
 
 /// The element for a pulling hand.
-pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn SceneElement> {
+pub(super) fn hand(machine: &Machine, model: &Model, pull: Pull) -> Box<dyn SceneElement> {
     let point = Attachment { body: Some(pull.body), point: pull.point };
-    let on = model.anchor(scene, &point);
+    let on = model.anchor(machine, &point);
     Box::new(pull::Hand { on, pull })
 }
 
-/// The law of time of `element`, if it has one.
-fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
-    let course = course_of(element.law.as_ref()?, element.on_hinge);
-    course.law().cloned()
+/// The law of time that an element follows, of an angle if it `turns`.
+fn law_of(drive: Option<&Drive>, turns: bool) -> Option<Arc<dyn Law>> {
+    course_of(drive?, turns).law().cloned()
 }
 
 /// Position and velocity of a point, m and m/s, and its arm from the centroid.

@@ -4,11 +4,11 @@
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of};
 use crate::jet::Jet;
+use crate::machine;
 use crate::mechanism::Powers;
 use crate::mechanism::drives::Law;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::Element;
 use std::sync::Arc;
 
 struct Motor {
@@ -20,14 +20,14 @@ struct Motor {
     target: Option<Arc<dyn Law>>,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(motor: &machine::Motor, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(Motor {
         on: site.coordinate(),
-        force: element.number("force"),
-        stiffness: element.number("stiffness"),
-        damping: element.number("damping"),
-        limit: element.number("limit"),
-        target: law_of(element),
+        force: motor.force,
+        stiffness: motor.stiffness,
+        damping: motor.damping,
+        limit: motor.limit,
+        target: law_of(motor.target.as_ref(), motor.on.freedom.turns()),
     })
 }
 

@@ -4,9 +4,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::{At, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push};
+use crate::machine::{Machine, Vec3};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Scene, Vec3};
 
 /// Natural frequency of all moving bodies together on the spring, Hz: soft enough for every method, and a few times the
 /// weight over the length of a hand movement.
@@ -36,8 +36,8 @@ pub(super) struct Hand {
 
 impl Pull {
     /// On `point` (m, scene frame) of body `body` of `scene`, as softly as suits the scene's masses; the hand is at `hand`, m.
-    pub fn softly(scene: &Scene, body: usize, point: Vec3, hand: Vec3) -> Self {
-        let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
+    pub fn softly(machine: &Machine, body: usize, point: Vec3, hand: Vec3) -> Self {
+        let mass: f64 = machine.bodies.iter().map(|body| body.mass).sum();
         let rate = std::f64::consts::TAU * FREQUENCY;
         Self { body, point, hand, stiffness: mass * rate * rate, damping: 2.0 * DAMPING * mass * rate }
     }

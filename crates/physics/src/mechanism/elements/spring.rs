@@ -3,10 +3,10 @@
 
 use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
+use crate::machine::{self, Mat3, SpringSide, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, Mat3, SpringSide, Vec3};
 
 struct Spring {
     from: Anchor,
@@ -37,15 +37,14 @@ struct State {
     slack: bool,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
-    let side = element.choice("side");
+pub(super) fn make(spring: &machine::Spring, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(Spring {
         from: site.anchors[0],
         to: site.anchors[1],
-        length: element.number("length"),
-        elastic: Elastic::of(element, side),
-        damping: element.number("damping"),
-        side,
+        length: spring.length,
+        elastic: Elastic::new(&spring.elastic, spring.side),
+        damping: spring.damping,
+        side: spring.side,
         held: None,
     })
 }

@@ -7,10 +7,10 @@
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
 use crate::contact::{NormalLaw, damping_factor};
+use crate::machine;
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::Element;
 
 struct Stop {
     on: Coordinate,
@@ -41,23 +41,22 @@ struct Press {
     force: f64,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
-    let [lower, upper] = ["lower", "upper"].map(|key| element.number(key));
+pub(super) fn make(stop: &machine::Stop, site: &Site<'_>) -> Box<dyn SceneElement> {
+    let machine::Stop { lower, upper, depth, .. } = *stop;
     let middle = match (lower.is_finite(), upper.is_finite()) {
         (true, true) => 0.5 * (lower + upper),
         (true, false) => lower,
         _ => upper,
     };
-    let depth = element.number("depth");
-    let chi = damping_factor(NormalLaw::Gonthier, element.number("restitution"));
+    let chi = damping_factor(NormalLaw::Gonthier, stop.restitution);
     Box::new(Stop {
         on: site.coordinate(),
         middle,
         lower: lower - middle,
         upper: upper - middle,
         depth,
-        stiffness: element.number("force") / (depth * depth.sqrt()),
-        damping: if chi > 0.0 { chi / element.number("speed") } else { 0.0 },
+        stiffness: stop.force / (depth * depth.sqrt()),
+        damping: if chi > 0.0 { chi / stop.speed } else { 0.0 },
         held: None,
     })
 }

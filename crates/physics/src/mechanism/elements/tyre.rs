@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of, point_of, push};
 use crate::jet::Jet;
+use crate::machine::{self, Mat3, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::drives::Law;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, Mat3, Vec3};
 
 struct Tyre {
     /// The wheel's centre.
@@ -37,14 +37,14 @@ struct State {
     force: f64,
 }
 
-pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(tyre: &machine::Tyre, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(Tyre {
         on: site.anchors[0],
-        up: element.vector("up"),
-        radius: element.number("radius"),
-        stiffness: element.number("stiffness"),
-        damping: element.number("damping"),
-        ground: law_of(element),
+        up: tyre.up,
+        radius: tyre.radius,
+        stiffness: tyre.stiffness,
+        damping: tyre.damping,
+        ground: law_of(tyre.ground.as_ref(), false),
         held: None,
     })
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use super::table::TIME;
 use super::{Reading, lay_out};
-use crate::scene::{Scene, suggest};
+use crate::machine::Machine;
 use crate::simulate::Frame;
+use crate::suggest::nearest;
 
 /// Place of the signals that `run` writes only if asked for: behind all others.
 const ASKED: u8 = u8::MAX;
@@ -59,13 +60,13 @@ pub struct NoChannel {
 
 /// Every channel of `scene` in order: the columns that `run` writes unasked, then the others. `first` as in
 /// [`run_columns`](super::run_columns).
-pub fn channels_of(scene: &Scene, first: &Frame) -> Vec<Listed> {
+pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<Listed> {
     let (mut list, mut names, mut columns) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
     let place = |signal: &super::Signal| {
         let known = !signal.name.is_empty();
         known.then(|| signal.run.unwrap_or(ASKED))
     };
-    lay_out(scene, Some(first), usize::MAX, place, |found| {
+    lay_out(machine, Some(first), usize::MAX, place, |found| {
         // A term that plots always show and rows only of some scenes has two signals.
         if names.insert(found.name.clone()) {
             let mut column = found.column;
@@ -92,15 +93,15 @@ pub fn channels_of(scene: &Scene, first: &Frame) -> Vec<Listed> {
 /// # Errors
 /// A pattern without a match.
 pub fn chosen_columns(
-    scene: &Scene,
+    machine: &Machine,
     first: &Frame,
     patterns: &[String],
 ) -> Result<(Vec<String>, Vec<Reading>), NoChannel> {
-    let list = channels_of(scene, first);
+    let list = channels_of(machine, first);
     for pattern in patterns {
         if !list.iter().any(|channel| channel.is_chosen_by(pattern)) {
             return Err(NoChannel {
-                near: suggest(pattern, list.iter().flat_map(Listed::names)),
+                near: nearest(pattern, list.iter().flat_map(Listed::names)),
                 pattern: pattern.clone(),
             });
         }
@@ -159,7 +160,7 @@ mod tests {
     use super::super::run_columns;
     use super::super::table::TABLE;
     use super::*;
-    use crate::scene::built_in_text;
+    use crate::scene::{Scene, built_in_text};
     use crate::simulate::Simulation;
 
     fn scene(changes: &str) -> Scene {
@@ -172,7 +173,7 @@ mod tests {
 
     fn first(scene: &Scene) -> Frame {
         let mut frame = Frame { reactions: Some(Vec::new()), ..Frame::default() };
-        let mut simulation = Simulation::new(scene).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         simulation.sample(0.0, &mut frame);
         frame
     }
@@ -183,8 +184,8 @@ mod tests {
                     [[joint]]\nname = \"alpha\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n";
         let scene = Scene::parse(text, None, &[]).expect("reads");
         let mut first = Frame::default();
-        crate::simulate::Simulation::new(&scene).expect("starts").sample(0.0, &mut first);
-        let (columns, _) = chosen_columns(&scene, &first, &["alpha.rate".to_owned()]).expect("has one");
+        crate::simulate::Simulation::new(&scene.machine).expect("starts").sample(0.0, &mut first);
+        let (columns, _) = chosen_columns(&scene.machine, &first, &["alpha.rate".to_owned()]).expect("has one");
         assert_eq!(columns, ["t_s", "part_alpha_rate_rad_s"]);
     }
 
@@ -215,10 +216,10 @@ mod tests {
         for text in ["", SPRING] {
             let scene = scene(text);
             let first = first(&scene);
-            let list = channels_of(&scene, &first);
+            let list = channels_of(&scene.machine, &first);
             let unasked = list.iter().filter(|channel| channel.unasked);
             let unasked: Vec<&str> = unasked.map(|channel| &channel.column[..]).collect();
-            assert_eq!(unasked, run_columns(&scene, &first).0);
+            assert_eq!(unasked, run_columns(&scene.machine, &first).0);
             assert!(list[..unasked.len()].iter().all(|channel| channel.unasked));
             let names: BTreeSet<&str> = list.iter().map(|channel| &channel.name[..]).collect();
             assert_eq!(names.len(), list.len());
@@ -228,7 +229,7 @@ mod tests {
                 assert_eq!(channel.unit.is_empty(), channel.name.ends_with(".state"));
                 assert!(!channel.help.is_empty(), "{channel:?}");
             }
-            let all = chosen_columns(&scene, &first, &["*".to_owned()]).expect("matches");
+            let all = chosen_columns(&scene.machine, &first, &["*".to_owned()]).expect("matches");
             assert_eq!(all.0.len(), list.len());
         }
         let nameless = TABLE.iter().filter(|signal| signal.name.is_empty());
@@ -241,7 +242,7 @@ mod tests {
         let first = first(&scene);
         let columns = |patterns: &[&str]| {
             let patterns: Vec<String> = patterns.iter().map(|&p| p.to_owned()).collect();
-            chosen_columns(&scene, &first, &patterns).map(|found| found.0.join(","))
+            chosen_columns(&scene.machine, &first, &patterns).map(|found| found.0.join(","))
         };
         for (patterns, found) in [
             (&["B.force", "time"][..], "t_s,B_force_x_N,B_force_y_N,B_force_z_N"),
@@ -254,7 +255,7 @@ mod tests {
         ] {
             assert_eq!(columns(patterns).expect("matches"), found, "{patterns:?}");
         }
-        let output = &scene.bodies[scene.output.body].name;
+        let output = &scene.machine.bodies[scene.machine.output.body].name;
         let pose = columns(&[&format!("{output}.pose")]).expect("matches");
         assert_eq!(pose, "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad");
         let wrong = columns(&["B.force", "B.froce"]).expect_err("no such channel");

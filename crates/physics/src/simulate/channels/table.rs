@@ -8,7 +8,7 @@ use Take::{
     Whole,
 };
 
-use crate::scene::Vec3;
+use crate::machine::Vec3;
 use crate::simulate::angles::pose_of;
 use crate::simulate::{BodyMotion, ContactState, ElementReport, Frame, JointReport, Ledger, Pose};
 
@@ -56,6 +56,26 @@ pub enum PlotKind {
     /// Bands stacked on both sides of zero.
     Bands,
 }
+
+/// Words for the plots of a window, in the order in which it lists them.
+pub const PLOT_WORDS: [&str; 16] = [
+    "normal-force",
+    "friction-force",
+    "eccentricity",
+    "penetration",
+    "position",
+    "angles",
+    "velocity",
+    "angle-rates",
+    "acceleration",
+    "angle-accelerations",
+    "actuator-force",
+    "actuator-torque",
+    "energy",
+    "energy-balance",
+    "probe-error",
+    "tip-error",
+];
 
 /// Every plot, in list order.
 const PLOTS: &[Plot] = &[
@@ -195,7 +215,7 @@ impl Quantity {
 
     /// Its word in scene files and links.
     pub fn word(self) -> &'static str {
-        crate::scene::PLOT_WORDS[self as usize]
+        PLOT_WORDS[self as usize]
     }
 
     /// Sentence-case name.

@@ -63,11 +63,11 @@ impl Simulation {
             let shortest = shortest_step(self.state.now.t);
             if !(self.state.control.h_next >= shortest) {
                 self.state.record.statistics.count(self.attempt.counts);
-                self.state.control.h_next = self.running.solver.step;
+                self.state.control.h_next = self.machine.solver.step;
                 if self.mechanism.is_nearly_singular() {
                     return Err(self.stopped(StopFault::SingularLoops, StopAdvice::Dependent));
                 }
-                let tolerance = self.running.solver.tolerance;
+                let tolerance = self.machine.solver.tolerance;
                 let advice = StopAdvice::LooserTolerance { tolerance };
                 return Err(self.stopped(StopFault::ShortStep { shortest }, advice));
             }
@@ -78,7 +78,7 @@ impl Simulation {
         if stiffness > STABILITY_LIMIT {
             self.state.record.statistics.stability_limited_time += h;
         }
-        if self.running.solver.method == Method::Automatic {
+        if self.machine.solver.method == Method::Automatic {
             self.choose_member(h, stiffness, evaluations as f64);
         }
         Ok(())
@@ -86,7 +86,7 @@ impl Simulation {
 
     /// Scaled error that a step may have.
     fn allowed_error(&self) -> f64 {
-        let solver = &self.running.solver;
+        let solver = &self.machine.solver;
         let allowed = match (solver.method, self.state.control.member) {
             (Method::Automatic, Member::Explicit) => solver.tolerance.min(OF_IMPACTS),
             _ => solver.tolerance,
@@ -98,7 +98,7 @@ impl Simulation {
     /// One attempt at a step with its event; `None` if it must be repeated with the smaller `h_next` it has set.
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.now.t;
-        let tolerance = self.running.solver.tolerance;
+        let tolerance = self.machine.solver.tolerance;
         let asked = self.state.control.h_next;
         let beside = self.attempt.beside.take();
         self.attempt.whole = None;

@@ -103,11 +103,11 @@ impl Simulation {
     /// Lets the implicit member take the first steps where balls touch from the start, without a law that damps them: explicit
     /// steps hold their ringing at a multiple of the tolerance, from which the implicit ones would have to follow it.
     pub(super) fn choose_first_member(&mut self) {
-        let Self { mechanism, running, state, .. } = self;
+        let Self { mechanism, machine, state, .. } = self;
         let touching = || state.now.memory.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
         let undamped = |j| mechanism.contacts.coefficients(j).damping == 0.0;
         let velocities = state.now.y.len() - mechanism.positions();
-        if running.solver.method == Method::Automatic
+        if machine.solver.method == Method::Automatic
             && velocities <= mechanism.largest_implicit()
             && touching().next().is_some()
             && touching().all(undamped)
@@ -142,7 +142,7 @@ impl Simulation {
     /// After an explicit step that blew up: whether friction on its ramp may be the cause, and now steps implicitly.
     pub(super) fn turn_to_friction(&mut self) -> bool {
         let touches = self.state.now.memory.iter().any(|m| m.active);
-        let turns = self.running.solver.method == Method::Automatic
+        let turns = self.machine.solver.method == Method::Automatic
             && self.state.control.member == Member::Explicit
             && self.state.control.choice.friction.wait == 0
             && touches
@@ -157,7 +157,7 @@ impl Simulation {
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
-        let tries_friction = self.running.solver.tolerance < TRIED_BELOW;
+        let tries_friction = self.machine.solver.tolerance < TRIED_BELOW;
         let state = &mut self.state;
         let member = state.control.member;
         let algebra = match member {
@@ -284,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_failed_trial_leaves_a_step_that_advances_time() {
-        let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap()).unwrap();
+        let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap().machine).unwrap();
         simulation.advance_to(1.0).unwrap();
         assert_eq!(simulation.state.control.member, Member::Implicit);
         simulation.state.control.choice = Choice {

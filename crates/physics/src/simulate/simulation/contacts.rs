@@ -3,7 +3,7 @@
 use super::search::NEAR_PEAK;
 use super::{Simulation, State};
 use crate::contact::{Coefficients, Memory, Separation};
-use crate::scene::least_impact_steps;
+use crate::machine::least_impact_steps;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Deepest penetration, as a fraction of the clearance, of a ball that is at its wall but for rounding.
@@ -60,9 +60,9 @@ impl Simulation {
     /// Contacts that exist at the start take the floor as their approach speed: how they began is unknown. One whose ball is
     /// at its wall within rounding begins there, at the rate it has.
     pub(super) fn begin_contacts_at_start(&mut self) {
-        let Self { mechanism, running, state, .. } = self;
+        let Self { mechanism, machine, state, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
-        for (j, joint) in running.ball_joints.iter().enumerate() {
+        for (j, joint) in machine.ball_joints.iter().enumerate() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
@@ -83,9 +83,9 @@ impl Simulation {
     /// Begins the contacts of balls that are exactly at their walls and move into them: over the next step no sign changes. The
     /// force is still 0.
     pub(super) fn begin_contacts_at_walls(&mut self) {
-        let Self { mechanism, running, state, .. } = self;
+        let Self { mechanism, machine, state, .. } = self;
         let mut begins = false;
-        for (j, joint) in running.ball_joints.iter().enumerate() {
+        for (j, joint) in machine.ball_joints.iter().enumerate() {
             let gap = state.now.gaps[j];
             if mechanism.contacts.has_clearance(j) && gap.arrives() && !state.now.memory[j].active {
                 let (asked, coefficients) = (joint.contact.restitution, mechanism.contacts.coefficients(j));
@@ -103,9 +103,9 @@ impl Simulation {
     pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
         let located = self.attempt.located.take();
         let fixed = !self.locates();
-        let Self { mechanism, running, state, attempt, .. } = self;
+        let Self { mechanism, machine, state, attempt, .. } = self;
         let strongest = &attempt.strongest;
-        let least = least_impact_steps(running.solver.method);
+        let least = least_impact_steps(machine.solver.method);
         let mut switched = Switched { contacts: false, forces: false };
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
@@ -143,7 +143,7 @@ impl Simulation {
                 let theta = if crosses { course.crossing() } else { 1.0 };
                 let rate = if crosses { course.at(theta).1 } else { end.rate };
                 let time = state.before.t + theta * h;
-                let asked = running.ball_joints[j].contact.restitution;
+                let asked = machine.ball_joints[j].contact.restitution;
                 let push = (rate - start.rate) / (theta * h);
                 let mut memory = state.begin(j, time, rate, push, asked, coefficients);
                 if !fixed && located != Some(j) && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {

@@ -61,7 +61,7 @@ impl Simulation {
     /// Whether the method locates corners. It needs its own interpolant: over a step longer than the contact's oscillation
     /// a cubic through both ends overshoots, and a step that ends on it gains energy.
     fn locates_corners(&self) -> bool {
-        let method = self.running.solver.method;
+        let method = self.machine.solver.method;
         let whole = self.state.control.member == Member::Friction;
         method.is_adaptive() && method != Method::Rosenbrock && !whole
     }

@@ -93,7 +93,7 @@ mod tests {
     fn a_twin_that_steps_like_its_run_takes_the_same_steps() {
         let change = ("solver.preset".to_owned(), "preview".to_owned());
         let scene = Scene::load("four-bar", &[change]).expect("loads");
-        let mut run = Simulation::new(&scene).expect("starts");
+        let mut run = Simulation::new(&scene.machine).expect("starts");
         run.advance_to(0.3).expect("runs");
         let twin = |offset: f64| {
             let mut twin = Simulation::of(&run.snapshot());

@@ -3,7 +3,7 @@
 use super::Simulation;
 use crate::contact::{FrictionVelocity, settled_penetration};
 use crate::integrate::Method;
-use crate::scene::{BallJoint, least_impact_steps};
+use crate::machine::{BallJoint, least_impact_steps};
 use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
@@ -39,8 +39,8 @@ impl Simulation {
     /// Reasons not to trust the results since the last reset; empty if there are none. Begins with
     /// [`crate::scene::Scene::doubts`] of the running scene.
     pub fn doubts(&self) -> Vec<Doubt> {
-        let scene = self.running.doubts().into_iter().map(Doubt::Scene);
-        let mut doubts: Vec<Doubt> = scene.collect();
+        let machine = self.machine.doubts().into_iter().map(Doubt::Machine);
+        let mut doubts: Vec<Doubt> = machine.collect();
         let statistics = self.statistics();
         let part = |part: &[u64], j: usize| part[j] as f64 / statistics.impacts[j].max(1) as f64;
         let unresolved = self.worst(0.0, |j| part(&statistics.coarse, j));
@@ -48,7 +48,7 @@ impl Simulation {
             joints,
             short: statistics.coarse[j],
             contacts: statistics.impacts[j],
-            steps: least_impact_steps(self.running.solver.method),
+            steps: least_impact_steps(self.machine.solver.method),
         }));
         let floored = self.worst(MOST_FLOORED, |j| part(&statistics.floored, j));
         doubts.extend(floored.map(|(joints, j)| Doubt::Floored {
@@ -74,10 +74,10 @@ impl Simulation {
             usual: usual(j),
         }));
         doubts.extend(self.state.record.starts_inside.map(|(i, [depth, usual], force)| {
-            let element = &self.running.elements[i];
-            Doubt::StartsInside { stop: element.name.clone(), turns: element.on_hinge, depth, usual, force }
+            let element = &self.machine.elements[i];
+            Doubt::StartsInside { stop: element.name.clone(), turns: element.is_on_hinge(), depth, usual, force }
         }));
-        let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
+        let clearances = self.machine.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).reduce(f64::min);
         let distance = statistics.constraint_drift;
         if distance > least.map_or(DRIFT, |c| DRIFT.min(DRIFT_OF_CLEARANCE * c)) {
@@ -93,9 +93,9 @@ impl Simulation {
     /// Unaccounted energy, compared with what the machine held and lost, or with each work; and losses that are gains.
     fn energy_doubt(&self, ledger: &Ledger) -> Option<Doubt> {
         let residual = ledger.residual();
-        let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
+        let clearances = self.machine.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).fold(DRIFT, f64::min);
-        let mass: f64 = self.running.bodies.iter().map(|body| body.mass).sum();
+        let mass: f64 = self.machine.bodies.iter().map(|body| body.mass).sum();
         let slow = mass * (least / CREEP) * (least / CREEP);
         let scale = ledger.scale() + slow;
         let may_drive = |joint: &BallJoint| joint.contact.friction_velocity != FrictionVelocity::Surface;
@@ -103,7 +103,7 @@ impl Simulation {
             (LedgerTerm::Restitution, ledger.restitution_loss),
             (
                 LedgerTerm::Friction,
-                if self.running.ball_joints.iter().any(may_drive) { 0.0 } else { ledger.friction_loss },
+                if self.machine.ball_joints.iter().any(may_drive) { 0.0 } else { ledger.friction_loss },
             ),
             (LedgerTerm::Damping, ledger.damping_loss),
         ];
@@ -135,7 +135,7 @@ impl Simulation {
     /// An explicit method at a loose tolerance, limited by stability and not by its error: the estimate then says little
     /// about how much energy settled contacts lose.
     fn stability_doubt(&self) -> Option<Doubt> {
-        let solver = &self.running.solver;
+        let solver = &self.machine.solver;
         let share = self.statistics().stability_limited_time / self.state.now.t;
         let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_HELD;
         (loose && share > MOST_HELD).then_some(Doubt::Held {
@@ -147,7 +147,7 @@ impl Simulation {
 
     /// The joint for which `measure` is largest and above `limit`, and how many others are above it.
     fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(Joints, usize)> {
-        let joints = &self.running.ball_joints;
+        let joints = &self.machine.ball_joints;
         let beyond = || (0..joints.len()).filter(|&j| measure(j) > limit);
         let worst = beyond().max_by(|&a, &b| measure(a).total_cmp(&measure(b)))?;
         let joints = Joints { worst: joints[worst].name.clone(), others: beyond().count() - 1 };

@@ -24,7 +24,7 @@ impl Simulation {
     pub(super) fn open_account(&mut self) {
         let Self { mechanism, state, .. } = self;
         let energies = energies(mechanism, state);
-        state.record.account = Account::start(self.running.solver.energy_ledger, energies);
+        state.record.account = Account::start(self.machine.solver.energy_ledger, energies);
     }
 
     /// Books what a live change did to the energies; the state was just fully evaluated.

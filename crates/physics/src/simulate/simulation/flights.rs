@@ -13,7 +13,7 @@ impl Simulation {
     /// known until then.
     pub(super) fn choose_flights(&mut self, limit: f64) {
         let flyers = self.mechanism.flyers().len();
-        if self.running.solver.method != Method::Automatic || flyers < FEWEST_FLYERS {
+        if self.machine.solver.method != Method::Automatic || flyers < FEWEST_FLYERS {
             return;
         }
         let Self { mechanism, state, .. } = self;

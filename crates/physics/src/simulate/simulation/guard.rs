@@ -32,19 +32,19 @@ impl Simulation {
             let penetration = self.attempt.end.gaps[j].penetration;
             let radius = self.mechanism.contacts.coefficients(j).ball_radius;
             if !(penetration <= LEFT_SOCKET * radius) {
-                return Some(StopFault::LeftSocket { joint: self.running.ball_joints[j].name.clone(), penetration });
+                return Some(StopFault::LeftSocket { joint: self.machine.ball_joints[j].name.clone(), penetration });
             }
-            if !self.running.solver.method.is_adaptive()
+            if !self.machine.solver.method.is_adaptive()
                 && let Some(times) = self.energy_of_overshoot(j, h)
             {
                 return Some(StopFault::Overshoot {
-                    joint: self.running.ball_joints[j].name.clone(),
+                    joint: self.machine.ball_joints[j].name.clone(),
                     penetration,
                     times,
                 });
             }
         }
-        for (m, body) in self.mechanism.motion().iter().zip(&self.running.bodies) {
+        for (m, body) in self.mechanism.motion().iter().zip(&self.machine.bodies) {
             let (v, w) = (m.velocity.norm(), m.angular_velocity.norm());
             let sane = v <= ABSURD_SPEED && w <= ABSURD_SPEED;
             if !(sane && m.position.iter().all(|x| x.is_finite())) {
@@ -69,12 +69,12 @@ impl Simulation {
             return None;
         }
         let coefficients = self.mechanism.contacts.coefficients(j);
-        let mass: f64 = self.running.bodies.iter().map(|body| body.mass).sum();
-        let least = self.running.bodies.iter().map(|body| body.mass);
+        let mass: f64 = self.machine.bodies.iter().map(|body| body.mass).sum();
+        let least = self.machine.bodies.iter().map(|body| body.mass);
         let pushed = self.mechanism.element_reports(self.state.now.t + h);
         let push: f64 = pushed.map(|element| element.force.norm()).sum();
         let least = least.fold(f64::INFINITY, f64::min);
-        let pull = self.running.most_acceleration([(push, least)]);
+        let pull = self.machine.most_acceleration([(push, least)]);
         let speed = start.speed + pull * h + coefficients.speed_floor;
         let times = coefficients.elastic_energy(end.penetration) / (0.5 * mass * speed * speed);
         (times > MOST_OVERSHOOT).then_some(times)

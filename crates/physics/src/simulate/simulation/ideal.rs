@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Simulation;
 use crate::integrate::Method;
-use crate::scene::{Formulation, Scene, StartRule, Vec3};
+use crate::machine::{Formulation, Machine, StartRule, Vec3};
 use crate::simulate::{Frame, Snapshot, StartError, Stopped};
 
 /// Tolerance of the ideal motion: without impacts, accuracy is cheap.
@@ -74,14 +74,14 @@ pub(in crate::simulate) struct Kept {
 
 impl Reference {
     /// For `scene`, whose mechanism may know its ideal motion in closed form.
-    pub(super) fn of(scene: &Scene, closed_form: bool) -> Self {
-        let Some(probe) = scene.output.probe.filter(|_| !closed_form) else {
+    pub(super) fn of(machine: &Machine, closed_form: bool) -> Self {
+        let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
             return Self::Elsewhere;
         };
-        if scene.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
+        if machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
             return Self::Itself;
         }
-        match IdealMotion::new(scene, probe) {
+        match IdealMotion::new(machine, probe) {
             Ok(motion) => Self::Alongside(Box::new(motion)),
             Err(error) => Self::None(error),
         }
@@ -131,11 +131,11 @@ impl Reference {
 
 impl Reference<Kept> {
     /// What it was kept of, for `scene`.
-    pub(super) fn resume(&self, scene: &Scene) -> Reference {
+    pub(super) fn resume(&self, machine: &Machine) -> Reference {
         self.map(|kept| IdealMotion {
             simulation: Simulation::of(&kept.snapshot),
-            body: scene.output.body,
-            probe: scene.output.probe.unwrap_or_default(),
+            body: machine.output.body,
+            probe: machine.output.probe.unwrap_or_default(),
             frame: Frame::default(),
             marks: kept.marks.clone(),
         })
@@ -155,8 +155,8 @@ impl<M> Reference<M> {
 
 /// `scene` with every ball joint ideal, with the same drives and gravity, solved accurately enough to serve as a reference.
 /// It has no probe of its own.
-pub fn closed(scene: &Scene) -> Scene {
-    let mut ideal = scene.clone();
+pub fn closed(machine: &Machine) -> Machine {
+    let mut ideal = machine.clone();
     for joint in &mut ideal.ball_joints {
         joint.contact.clearance = 0.0;
     }
@@ -173,10 +173,10 @@ pub fn closed(scene: &Scene) -> Scene {
 }
 
 impl IdealMotion {
-    fn new(scene: &Scene, probe: Vec3) -> Result<Self, StartError> {
+    fn new(machine: &Machine, probe: Vec3) -> Result<Self, StartError> {
         let mut motion = Self {
-            simulation: Simulation::new(&closed(scene))?,
-            body: scene.output.body,
+            simulation: Simulation::new(&closed(machine))?,
+            body: machine.output.body,
             probe,
             frame: Frame::default(),
             marks: Marks { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
@@ -257,6 +257,8 @@ fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
+    use crate::simulate::Effect;
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
         let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
@@ -267,16 +269,16 @@ mod tests {
     #[test]
     fn the_motion_alongside_is_the_closed_form_of_the_paper() {
         let scene = scene("spcmm", &[]);
-        let probe = scene.output.probe.expect("has a probe");
-        let mut alongside = IdealMotion::new(&scene, probe).expect("starts");
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        let probe = scene.machine.output.probe.expect("has a probe");
+        let mut alongside = IdealMotion::new(&scene.machine, probe).expect("starts");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
         for k in 0..40 {
             // Between step ends of either motion, and not always forward.
             let time = 0.0137 * f64::from(k) - 0.001 * f64::from(k % 3);
             simulation.advance_to(time).expect("runs");
             simulation.sample(time, &mut frame);
-            let body = &frame.bodies[scene.output.body];
+            let body = &frame.bodies[scene.machine.output.body];
             let tip = body.position + body.rotation * probe;
             let closed = tip - frame.probe_error.expect("has a closed form");
             let off = (alongside.tip(frame.time).expect("goes on") - closed).norm();
@@ -287,14 +289,14 @@ mod tests {
     #[test]
     fn a_change_of_gravity_holds_from_its_instant_on() {
         let mut scene = scene("pendulum", &[]);
-        scene.output.probe = Some(Vec3::new(0.0, 0.0, -0.1));
-        let mut simulation = Simulation::new(&scene).expect("starts");
+        scene.machine.output.probe = Some(Vec3::new(0.0, 0.0, -0.1));
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
         simulation.advance_to(0.05).expect("runs");
         simulation.sample(0.05, &mut frame);
         let change = simulation.time();
-        simulation.set("gravity.z", "0").expect("sets");
-        simulation.set("gravity.x", "0").expect("sets");
+        let weightless = Machine { gravity: Vec3::zeros(), ..scene.machine };
+        assert_eq!(simulation.adopt(&weightless), Ok(Effect::Now));
         simulation.sample(change, &mut frame);
         assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
         // Without gravity a rod in an ideal joint rotates uniformly: its tip stays on its circle, at its speed.

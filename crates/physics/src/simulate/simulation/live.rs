@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::automatic::{Choice, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
+use crate::machine::{Machine, Vec3};
 use crate::mechanism::{ElementReport, MechanismError, Pull, Ramp};
-use crate::scene::{Scene, SceneError};
 use crate::simulate::stepper::{AnyStepper, Member};
 use crate::simulate::{Effect, Frame};
 
@@ -16,9 +16,6 @@ const FARTHEST_HAND: f64 = 1e6;
 /// Why a running simulation was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChangeError {
-    /// A parameter or value that the scene does not accept.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
     /// A method that the equations do not allow.
     #[error("solver.method: {0}")]
     Method(#[from] MechanismError),
@@ -38,39 +35,47 @@ pub enum ChangeError {
     },
 }
 
-/// Whether `next` is what `running` is but for gravity and contacts, which take effect at once: a parameter of the scene's own may
-/// be used there alone.
-pub fn differs_in_conditions_alone(running: &Scene, next: &Scene) -> bool {
-    let mut like_next = Scene::clone(running);
-    like_next.gravity = next.gravity;
-    like_next.contact = next.contact;
-    for (joint, next) in like_next.ball_joints.iter_mut().zip(&next.ball_joints) {
-        joint.contact = next.contact;
-    }
-    like_next.source.clone_from(&next.source);
-    like_next.changes.clone_from(&next.changes);
-    like_next == *next
-}
-
 impl Simulation {
-    /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
+    /// Goes on with the gravity, the contacts and the stepper of `next`. [`Effect::AtReset`] if it differs in anything else, or if a
+    /// ball joint becomes ideal or stops being so, which changes the equations; nothing has changed then.
     ///
     /// # Errors
-    /// Unknown key, bad unit, out of range: the running simulation is unchanged.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
-        let mut next = Scene::clone(&self.scene);
-        let waits = next.set(key, value)?.at_reset;
-        self.adopt(next, |running| running.set(key, value).map(|_| ()), waits)
-    }
-
-    /// As [`Self::set`], with a value in SI units.
-    ///
-    /// # Errors
-    /// As [`Self::set`].
-    pub fn set_value(&mut self, key: &str, value: &crate::scene::Value) -> Result<Effect, ChangeError> {
-        let mut next = Scene::clone(&self.scene);
-        let waits = next.set_value(key, value)?.at_reset;
-        self.adopt(next, |running| running.set_value(key, value).map(|_| ()), waits)
+    /// A method that is too costly for the equations; nothing has changed then.
+    pub fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
+        let pairs = self.machine.ball_joints.iter().zip(&next.ball_joints);
+        let clearances = pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance));
+        let changes_equations = clearances.into_iter().any(|(a, b)| (a == 0.0) != (b == 0.0));
+        if changes_equations || !self.machine.differs_in_conditions_alone(next) {
+            return Ok(Effect::AtReset);
+        }
+        if next.solver.method != self.machine.solver.method {
+            prepare_implicit(&mut self.mechanism, next.solver.method)?;
+        }
+        let before = std::mem::replace(&mut self.machine, Arc::new(next.clone()));
+        if self.machine.gravity != before.gravity {
+            let gravity = self.machine.gravity;
+            self.reference.set_gravity(self.state.now.t, gravity);
+        }
+        for j in 0..self.machine.ball_joints.len() {
+            let contact = self.machine.ball_joints[j].contact;
+            if contact != before.ball_joints[j].contact {
+                self.change_contact(j, &contact);
+            }
+        }
+        if self.machine.solver != before.solver {
+            let solver = &self.machine.solver;
+            if solver.method != before.solver.method {
+                self.stepper = AnyStepper::new(solver.method, self.state.now.y.len());
+                self.state.control.member = Member::Explicit;
+                self.state.control.controller = controller_of(solver.method, Member::Explicit);
+                self.state.control.choice = Choice::default();
+            }
+            self.state.control.h_next = self.state.control.h_next.min(solver.step);
+        }
+        self.put_conditions();
+        self.refresh();
+        self.book_change();
+        Ok(Effect::Now)
     }
 
     /// Starts, changes or (with `None`) ends the pull of a hand on a body.
@@ -91,7 +96,7 @@ impl Simulation {
     /// # Errors
     /// An unknown body, or a position out of reach.
     pub fn check_pull(&self, pull: &Pull) -> Result<(), ChangeError> {
-        let bodies = self.running.bodies.len();
+        let bodies = self.machine.bodies.len();
         let far = pull.hand.amax().max(pull.point.amax());
         if pull.body >= bodies {
             let body = pull.body;
@@ -117,72 +122,21 @@ impl Simulation {
         self.state.pull
     }
 
-    fn adopt(
-        &mut self,
-        next: Scene,
-        change: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
-        waits: bool,
-    ) -> Result<Effect, ChangeError> {
-        let mut running = Scene::clone(&self.running);
-        // What the running scene cannot accept may suit the waiting one, say a joint of a longer chain.
-        let refused = change(&mut running).is_err();
-        let waits = refused || (waits && !differs_in_conditions_alone(&self.running, &running));
-        // A joint that becomes ideal, or stops being so, changes the equations.
-        let turns = |running: &Scene| {
-            let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
-            pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance)).any(|(a, b)| (a == 0.0) != (b == 0.0))
-        };
-        if waits || turns(&running) {
-            self.scene = Arc::new(next);
-            return Ok(Effect::AtReset);
-        }
-        if running.solver.method != self.running.solver.method {
-            prepare_implicit(&mut self.mechanism, running.solver.method)?;
-        }
-        self.scene = Arc::new(next);
-        let before = std::mem::replace(&mut self.running, Arc::new(running));
-        if self.running.gravity != before.gravity {
-            let gravity = self.running.gravity;
-            self.reference.set_gravity(self.state.now.t, gravity);
-        }
-        for j in 0..self.running.ball_joints.len() {
-            let contact = self.running.ball_joints[j].contact;
-            if contact != before.ball_joints[j].contact {
-                self.change_contact(j, &contact);
-            }
-        }
-        if self.running.solver != before.solver {
-            let solver = &self.running.solver;
-            if solver.method != before.solver.method {
-                self.stepper = AnyStepper::new(solver.method, self.state.now.y.len());
-                self.state.control.member = Member::Explicit;
-                self.state.control.controller = controller_of(solver.method, Member::Explicit);
-                self.state.control.choice = Choice::default();
-            }
-            self.state.control.h_next = self.state.control.h_next.min(solver.step);
-        }
-        self.put_conditions();
-        self.refresh();
-        self.book_change();
-        Ok(Effect::Now)
-    }
-
-    /// Sets gravity from now on, m/s^2, for a simulation whose scene is not changed otherwise.
-    pub fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
-        Arc::make_mut(&mut self.running).gravity = gravity;
-        Arc::make_mut(&mut self.scene).gravity = gravity;
+    /// Sets gravity from now on, m/s^2, of a simulation that is not changed otherwise.
+    pub fn set_gravity(&mut self, gravity: Vec3) {
+        Arc::make_mut(&mut self.machine).gravity = gravity;
         self.put_conditions();
         self.refresh();
     }
 
-    /// Gives the equations what live changes reach: the running scene and the state have it.
+    /// Gives the equations what live changes reach: the machine and the state have it.
     pub(super) fn put_conditions(&mut self) {
-        let Self { mechanism, state, running, .. } = self;
-        mechanism.gravity = running.gravity;
+        let Self { mechanism, state, machine, .. } = self;
+        mechanism.gravity = machine.gravity;
         if mechanism.pull() != state.pull {
-            mechanism.set_pull(running, state.pull);
+            mechanism.set_pull(machine, state.pull);
         }
-        for (j, joint) in running.ball_joints.iter().enumerate() {
+        for (j, joint) in machine.ball_joints.iter().enumerate() {
             if joint.contact.clearance > 0.0 {
                 let contacts = &mut mechanism.contacts;
                 contacts.set_ramp(j, state.ramps[j]);

@@ -22,7 +22,7 @@ impl Simulation {
         let time = time.clamp(self.state.before.t, self.state.now.t);
         self.look(time);
         let (memory, at) = (&self.scratch_memory, (time, &self.scratch_y[..]));
-        report::fill(&mut self.mechanism, &self.running, memory, at, out);
+        report::fill(&mut self.mechanism, &self.machine, memory, at, out);
         for (sampled, report) in self.sampled.iter_mut().zip(&out.joints) {
             let force = report.normal_force.norm();
             if force > sampled.0 {
@@ -103,13 +103,13 @@ mod tests {
                 let method = ("solver.preset".to_owned(), "accurate".to_owned());
                 let change = ("formulation".to_owned(), form.to_owned());
                 let scene = Scene::load(name, &[change, method]).expect("loads");
-                let mut simulation = Simulation::new(&scene).expect("starts");
+                let mut simulation = Simulation::new(&scene.machine).expect("starts");
                 // Driven, it turns more than once; otherwise it stays within half a turn.
                 let time = if name == "slider-crank" { 0.1 } else { 1.3 };
                 simulation.advance_to(time).expect("runs");
                 let mut frame = Frame::default();
                 simulation.sample(time, &mut frame);
-                let moving = scene.joints.iter().flat_map(|joint| joint.kind.freedoms());
+                let moving = scene.machine.joints.iter().flat_map(|joint| joint.kind.freedoms());
                 assert_eq!(frame.coordinates.len(), moving.count());
                 frame
             };

@@ -62,10 +62,10 @@ impl State {
             // Only a window has a hand.
             && self.pull.is_none()
             && record.account.fits()
-            && record.starts_inside.is_none_or(|(element, ..)| element < simulation.running.elements.len())
+            && record.starts_inside.is_none_or(|(element, ..)| element < simulation.machine.elements.len())
             && record.impacts.fits(joints)
             && record.statistics.fits(joints)
-            && worn.is_none_or(|wear| wear.fits(&simulation.running))
+            && worn.is_none_or(|wear| wear.fits(&simulation.machine))
             && record.reactions.len() == joints
             && record.contact_steps.len() == joints
             && record.peaks.len() == joints
@@ -97,7 +97,7 @@ impl Simulation {
         let polynomial = self.stepper.polynomial();
         let fits = saved.state.fits(self)
             && saved.sampled.len() == self.sampled.len()
-            && saved.loads.as_ref().is_none_or(|loads| loads.fits(&LoadPeaks::new(&self.running, &self.mechanism)))
+            && saved.loads.as_ref().is_none_or(|loads| loads.fits(&LoadPeaks::new(&self.machine, &self.mechanism)))
             && saved.polynomial.is_some() == polynomial.is_some()
             && saved.polynomial.iter().all(|p| p.fits(self.state.now.y.len()));
         if !fits {
@@ -112,8 +112,7 @@ impl Simulation {
             _ => return Err(Misfit),
         }
         let snapshot = Snapshot {
-            scene: self.scene.clone(),
-            running: self.running.clone(),
+            machine: self.machine.clone(),
             structure: self.mechanism.structure(),
             state: saved.state.clone(),
             polynomial: saved.polynomial.clone(),

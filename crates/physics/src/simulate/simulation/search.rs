@@ -68,7 +68,7 @@ impl Simulation {
 
     /// Keeps the peaks of loads from now on. It does not affect the steps.
     pub fn keep_load_peaks(&mut self) {
-        self.loads = Some(LoadPeaks::new(&self.running, &self.mechanism));
+        self.loads = Some(LoadPeaks::new(&self.machine, &self.mechanism));
         self.look_at_loads();
     }
 

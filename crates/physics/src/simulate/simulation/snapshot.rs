@@ -39,8 +39,7 @@ impl Simulation {
     /// The whole state.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
-            scene: self.scene.clone(),
-            running: self.running.clone(),
+            machine: self.machine.clone(),
             structure: self.mechanism.structure(),
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
@@ -51,11 +50,11 @@ impl Simulation {
     /// A simulation in the state of `snapshot`. Nothing is assembled: a live change may have led to where no start would
     /// be accepted. Continuing gives the same bits as where the snapshot was taken.
     pub fn of(snapshot: &Snapshot) -> Self {
-        let running = &snapshot.running;
-        let mut mechanism = Mechanism::resumed(running, &snapshot.structure);
-        prepare(&mut mechanism, running.solver.method);
-        let reference = snapshot.reference.resume(running);
-        let mut simulation = Self::assembled(running, mechanism, snapshot.state.clone(), reference);
+        let machine = &snapshot.machine;
+        let mut mechanism = Mechanism::resumed(machine, &snapshot.structure);
+        prepare(&mut mechanism, machine.solver.method);
+        let reference = snapshot.reference.resume(machine);
+        let mut simulation = Self::assembled(machine, mechanism, snapshot.state.clone(), reference);
         simulation.restore(snapshot);
         simulation
     }
@@ -67,16 +66,15 @@ impl Simulation {
             *self = Self::of(snapshot);
             return;
         }
-        let method = snapshot.running.solver.method;
-        if method != self.running.solver.method {
+        let method = snapshot.machine.solver.method;
+        if method != self.machine.solver.method {
             prepare(&mut self.mechanism, method);
             self.stepper = AnyStepper::new(method, self.state.now.y.len());
         }
         self.stepper.invalidate();
         self.state.clone_from(&snapshot.state);
-        self.running = snapshot.running.clone();
+        self.machine = snapshot.machine.clone();
         self.sampled.fill((0.0, 0.0));
-        self.scene = snapshot.scene.clone();
         if let Some(polynomial) = &snapshot.polynomial {
             self.stepper.set_polynomial(polynomial);
         }

@@ -7,7 +7,7 @@ impl Simulation {
     /// Keeps a wear map from now on, empty except for the contacts under way, which count as begun. It belongs to the
     /// state: a snapshot holds it, and a reset ends it. It does not affect the steps.
     pub fn keep_wear(&mut self) {
-        let mut wear = Wear::new(&self.running);
+        let mut wear = Wear::new(&self.machine);
         self.look(self.state.now.t);
         for (j, memory) in self.state.now.memory.iter().enumerate() {
             if memory.active {

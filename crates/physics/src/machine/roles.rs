@@ -1,8 +1,8 @@
 //! What a body does, where its shapes do not say it.
 
-use super::{Freedom, JointKind, Role, Scene};
+use super::{Freedom, JointKind, Machine, Role};
 
-impl Scene {
+impl Machine {
     /// Roles that shapes without one have, by body; on the world it is that of a frame.
     pub fn body_roles(&self) -> Vec<Role> {
         let mut roles: Vec<Role> = Vec::with_capacity(self.bodies.len());

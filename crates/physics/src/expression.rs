@@ -4,7 +4,7 @@
 //! Written here because the crates for this call std's elementary functions, whose bits differ between native and wasm, or
 //! bring a regex engine, and do not say at which byte an expression is wrong.
 
-use super::error::{brief, did_you_mean, nearest_name};
+use crate::suggest::{brief, did_you_mean, nearest_name};
 use std::fmt;
 
 /// Longest expression, bytes.

@@ -248,7 +248,7 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
 }
 
 /// Powers of kg, m, s and rad in a dimension.
-pub(super) fn powers(dimension: Dimension) -> [i8; 4] {
+pub fn powers(dimension: Dimension) -> [i8; 4] {
     match dimension {
         Dimension::None => [0, 0, 0, 0],
         Dimension::Length => [0, 1, 0, 0],
@@ -272,7 +272,7 @@ pub(super) fn powers(dimension: Dimension) -> [i8; 4] {
 }
 
 /// Every unit with its dimension and its size in SI units.
-pub(super) fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)> {
+pub fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)> {
     UNITS.iter().flat_map(|(dimension, _, units)| {
         let size = |&(name, scale): &Unit| (name, *dimension, apply("1", 1.0, scale));
         units.iter().map(size)
@@ -280,7 +280,7 @@ pub(super) fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)
 }
 
 /// Length in bytes of the longest unit with which `text` begins, and its place in [`all_units`].
-pub(super) fn unit_at_start(text: &str) -> Option<(usize, usize)> {
+pub fn unit_at_start(text: &str) -> Option<(usize, usize)> {
     let ends = |length: usize| !text[length..].starts_with(|c: char| c.is_alphanumeric() || c == '_');
     let begins = |(place, (name, ..)): (usize, (&str, Dimension, f64))| {
         (text.starts_with(name) && ends(name.len())).then_some((name.len(), place))
@@ -289,17 +289,17 @@ pub(super) fn unit_at_start(text: &str) -> Option<(usize, usize)> {
 }
 
 /// What follows the number with which `text` begins; empty if it does not begin with one.
-pub(super) fn split_unit(text: &str) -> &str {
+pub fn split_unit(text: &str) -> &str {
     split_number(text.trim()).1
 }
 
 /// Whether a unit is written so, too.
-pub(super) fn same_unit(unit: &str, written: &str) -> bool {
+pub fn same_unit(unit: &str, written: &str) -> bool {
     normalise(unit) == normalise(written)
 }
 
 /// The unit of `dimension` that a quantity is written in.
-pub(super) fn unit_within(text: &str, dimension: Dimension) -> Option<&'static str> {
+pub fn unit_within(text: &str, dimension: Dimension) -> Option<&'static str> {
     let same = |(name, _): &&Unit| same_unit(name, split_unit(text));
     units(dimension).iter().find(same).map(|(name, _)| *name)
 }
@@ -330,7 +330,7 @@ pub fn format_quantity(si: f64, unit: &str) -> String {
 }
 
 /// A text that [`parse_quantity`] reads back to the same bits, in `unit` if possible, otherwise in SI.
-pub(super) fn exact_quantity(si: f64, unit: &str, dimension: Dimension) -> String {
+pub fn exact_quantity(si: f64, unit: &str, dimension: Dimension) -> String {
     let friendly = format_quantity_digits(si, unit, 15);
     if parse_quantity(&friendly, dimension).map(f64::to_bits) == Ok((si + 0.0).to_bits()) {
         return friendly;

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use super::{format_quantity, format_quantity_digits};
 use crate::contact::NormalLaw;
+use crate::units::{format_quantity, format_quantity_digits};
 
 /// Why a scene's results are not to be trusted, whatever happens in the run. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]

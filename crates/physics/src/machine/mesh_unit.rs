@@ -15,7 +15,7 @@ const SMALL_IN_MACHINE: f64 = 0.001;
 /// What a file is likely to be in, with what the key `unit` then says.
 const UNITS: [(&str, f64); 2] = [("mm", 1e-3), ("m", 1.0)];
 
-impl Scene {
+impl Machine {
     /// The warning of the mesh whose unit fits worst, if another would make it fit.
     pub(super) fn mesh_unit_warning(&self) -> Option<Warning> {
         let is_mesh = |shape: &Shape| matches!(shape.geometry, Geometry::Mesh { .. });

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 /// Volume and its first two moments.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Solid {
+pub struct Solid {
     /// m^3.
     pub volume: f64,
     /// Centroid, m.
@@ -153,8 +153,8 @@ fn round(axis: &Vec3, [across, along]: [f64; 2]) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::Quat;
     use crate::mesh::Format;
-    use crate::scene::Quat;
 
     /// Whether `point` lies in the form: written from its definition.
     fn holds(geometry: &Geometry, point: &Vec3) -> bool {

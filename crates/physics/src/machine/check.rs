@@ -1,0 +1,314 @@
+//! Consistency checks of a machine, and warnings about choices that are allowed but doubtful.
+
+use std::cmp::Ordering;
+
+use super::{BallJoint, Doubt, ElementKind, Machine, Warning};
+use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
+use crate::integrate::Method;
+use crate::units::{Dimension, format_quantity, unit_names};
+
+/// With fewer fixed steps than this much of an impact is lost; twice as many resolve it. Implicit Euler contacts need more:
+/// numerical damping takes about the same share of an impact as a step does of its duration.
+pub fn least_impact_steps(method: Method) -> u64 {
+    match method {
+        Method::ImexEuler => 40,
+        _ => 5,
+    }
+}
+
+/// Loosest tolerance at which impacts conserve energy to a few per cent.
+const LOOSEST: f64 = 1e-3;
+
+/// Most sentences about ball joints; a last one stands for the rest.
+const MOST_LISTED: usize = 40;
+
+/// Largest difference between the restitution that a law gives and the one asked for. The paper's 0.9, of which its law makes
+/// 0.913, is within it.
+const RESTITUTION_ERROR: f64 = 0.02;
+
+/// A slide's stop counts as a ball this many times as large as its depth.
+const OF_A_DEPTH: f64 = 50.0;
+
+impl Machine {
+    /// Length that a relative tolerance multiplies, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
+    /// most 1 m. A joint that closes a loop counts as a ball joint of the scene's radius.
+    pub fn length_scale(&self) -> f64 {
+        let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
+        let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
+        let depths = self.elements.iter().filter_map(|element| match &element.kind {
+            ElementKind::Stop(stop) if !element.is_on_hinge() => Some(OF_A_DEPTH * stop.depth),
+            _ => None,
+        });
+        radii.chain(closing).chain(depths).fold(1.0, f64::min)
+    }
+
+    /// Checks the contact parameters of each joint for consistency.
+    pub fn check_contacts(&self) -> Result<(), ContactConflict> {
+        let joints = self.ball_joints.iter().enumerate();
+        let own = joints.map(|(index, joint)| (Some(index), &joint.contact));
+        for (joint, contact) in std::iter::once((None, &self.contact)).chain(own) {
+            check_contact(contact).map_err(|fault| ContactConflict { joint, fault })?;
+        }
+        Ok(())
+    }
+
+    /// Choices that are allowed but may not mean what the user expects: [`Self::doubts`], and whatever slows a run down.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let doubts = self.doubts().into_iter();
+        let mut warnings: Vec<Warning> = doubts.map(Warning::Doubt).collect();
+        let doubts = warnings.len();
+        for (joints, contact) in self.contact_groups() {
+            if warnings.len() - doubts >= MOST_LISTED {
+                warnings.push(Warning::Doubt(Doubt::MoreJoints));
+                break;
+            }
+            if contact.clearance > 0.0
+                && contact.slip_speed_high < 1e-6
+                && contact.friction_law == FrictionLaw::ModifiedCoulomb
+            {
+                warnings.push(Warning::StiffFriction { joints, slip_speed_high: contact.slip_speed_high });
+            }
+        }
+        warnings.extend(self.mesh_unit_warning());
+        warnings
+    }
+
+    /// Reasons to doubt any result of this scene, whatever happens in the run.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        let mut doubts = Vec::new();
+        for (joints, contact) in self.contact_groups() {
+            if doubts.len() >= MOST_LISTED {
+                doubts.push(Doubt::MoreJoints);
+                break;
+            }
+            let (law, asked) = (contact.normal_law, contact.restitution);
+            let given = contact::undisturbed_restitution(contact::damping_factor(law, asked));
+            if contact.clearance > 0.0 && (given - asked).abs() > RESTITUTION_ERROR {
+                doubts.push(Doubt::Restitution { joints: joints.clone(), law, asked, given });
+            }
+            if contact.clearance > 0.0
+                && contact.friction_velocity == FrictionVelocity::Printed
+                && contact.friction_law != FrictionLaw::None
+                && contact.friction > 0.0
+            {
+                doubts.push(Doubt::PrintedFriction { joints: joints.clone() });
+            }
+            if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
+                doubts.push(Doubt::Clearance {
+                    joints,
+                    clearance: contact.clearance,
+                    ball_radius: contact.ball_radius,
+                });
+            }
+        }
+        doubts.extend(self.step_warning());
+        doubts.extend(self.tolerance_warning());
+        doubts
+    }
+
+    /// Warns of a tolerance too loose for impacts.
+    fn tolerance_warning(&self) -> Option<Doubt> {
+        let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
+        let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
+        (rattles && loose).then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST })
+    }
+
+    /// Warns of a fixed step too long for the shortest expected impact, and recommends one that is not.
+    fn step_warning(&self) -> Option<Doubt> {
+        if self.solver.method.is_adaptive() {
+            return None;
+        }
+        let clearances = self.ball_joints.iter().filter(|j| j.contact.clearance > 0.0);
+        let pushes = self.pushes();
+        let (joint, duration) = clearances
+            .map(|joint| (joint, self.impact_duration(joint, &pushes)))
+            .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
+        let (impact, friction) = duration;
+        let duration = impact / friction;
+        let steps = least_impact_steps(self.solver.method) as f64;
+        if self.solver.step <= duration / steps {
+            return None;
+        }
+        // Round to 1, 2 or 5 times a power of ten.
+        let most = duration / (2.0 * steps);
+        let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
+        let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
+        let recommended = digit.unwrap_or(1.0) * decade;
+        Some(Doubt::Step {
+            joint: joint.name.clone(),
+            step: self.solver.step,
+            duration,
+            sliding: friction > 1.0,
+            // It integrates force elements explicitly.
+            stable: self.solver.method == Method::ImexEuler && friction <= 1.0 && self.elements.is_empty(),
+            recommended,
+        })
+    }
+
+    /// Sum of the magnitudes of the forces of elements on each body, N. What the stretch of a spring adds is left out: it needs
+    /// the start poses.
+    fn pushes(&self) -> Vec<f64> {
+        let mut pushes = vec![0.0; self.bodies.len()];
+        for element in &self.elements {
+            for body in element.points.iter().filter_map(|point| point.body) {
+                pushes[body] += element.own_force();
+            }
+        }
+        pushes
+    }
+
+    /// Bound on the acceleration between bodies that gravity and forces, each N on kg, can cause, m/s^2.
+    pub fn most_acceleration(&self, pushes: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+        let pushes = pushes.into_iter().map(|(force, mass)| force / mass);
+        pushes.fold(self.gravity.norm(), |sum, push| sum + push)
+    }
+
+    /// Estimated duration of the first impact of a joint with clearance, s, whose bodies gravity and the forces `pushes` (N, by
+    /// body) drive through the gap, or of the oscillation under those forces, if shorter; and how many times within it friction
+    /// could reverse sliding at the approach speed, at least 1.
+    fn impact_duration(&self, joint: &BallJoint, pushes: &[f64]) -> (f64, f64) {
+        let c = &joint.contact;
+        let coefficients = contact::Coefficients::new(c, c.clearance);
+        // Inverse effective masses at the ball's centre, normal and in sliding: a force there also rotates the body.
+        let (mut normal, mut sliding) = (0.0, 0.0);
+        let mut pushed = Vec::new();
+        for attachment in [&joint.ball, &joint.socket] {
+            let Some(b) = attachment.body else { continue };
+            let (body, hung) = (&self.bodies[b], &self.joints[b]);
+            if hung.is_prescribed() {
+                continue;
+            }
+            let arm = (attachment.point - body.centre).norm_squared();
+            let moments = body.inertia.symmetric_eigenvalues();
+            let at_centre = 1.0 / body.mass + arm / moments.max();
+            normal += at_centre;
+            let turning = match c.friction_velocity {
+                contact::FrictionVelocity::Surface => c.ball_radius * c.ball_radius / moments.min(),
+                contact::FrictionVelocity::Centres | contact::FrictionVelocity::Printed => 0.0,
+            };
+            sliding += at_centre + turning;
+            pushed.push((pushes[b], body.mass));
+        }
+        if normal == 0.0 {
+            return (f64::INFINITY, 1.0);
+        }
+        let load = pushed.iter().map(|(force, _)| force).sum();
+        let fall = (2.0 * self.most_acceleration(pushed) * c.clearance).sqrt();
+        let speed = fall.max(c.impact_speed_floor);
+        let (stiffness, damping) = (coefficients.stiffness, coefficients.damping);
+        let duration = contact::impact_duration(stiffness, damping, 1.0 / normal, speed)
+            .min(contact::settled_half_period(stiffness, 1.0 / normal, load));
+        (duration, (coefficients.friction * sliding / normal).max(1.0))
+    }
+
+    /// Groups of ball joints with equal contact parameters, with their names.
+    fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
+        let mut joints: Vec<_> = self.ball_joints.iter().enumerate().collect();
+        // No value is NaN: ranges have no place for it.
+        joints.sort_by(|a, b| a.1.contact.partial_cmp(&b.1.contact).unwrap_or(Ordering::Equal));
+        let mut groups: Vec<_> = joints.chunk_by(|a, b| a.1.contact == b.1.contact).collect();
+        groups.sort_by_key(|group| group[0].0);
+        let title = |group: &[(usize, &BallJoint)]| match group {
+            [first, .., last] if group.len() > 6 => format!("{} to {}", first.1.name, last.1.name),
+            _ => group.iter().map(|(_, joint)| joint.name.as_str()).collect::<Vec<_>>().join(", "),
+        };
+        groups.into_iter().map(|group| (title(group), group[0].1.contact)).collect()
+    }
+}
+
+/// Two contact parameters that are inconsistent.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+pub enum ContactFault {
+    /// A ball that does not fit into its socket.
+    #[error(
+        "clearance {} must be below the ball radius, {}; allowed 0 mm to below {1}; units {}",
+        format_quantity(*.clearance, "mm"),
+        format_quantity(*.ball_radius, "mm"),
+        unit_names(Dimension::Length).join(", ")
+    )]
+    Clearance {
+        /// m.
+        clearance: f64,
+        /// m.
+        ball_radius: f64,
+    },
+    /// A friction ramp that ends before it begins.
+    #[error(
+        "slip_speed_low {} must be below slip_speed_high {}; units {}",
+        format_quantity(*.low, "mm/s"),
+        format_quantity(*.high, "mm/s"),
+        unit_names(Dimension::Speed).join(", ")
+    )]
+    SlipSpeeds {
+        /// m/s.
+        low: f64,
+        /// m/s.
+        high: f64,
+    },
+    /// A restitution of 0 under a law that divides by it.
+    #[error("the law {0} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit")]
+    DividesByRestitution(NormalLaw),
+}
+
+impl ContactFault {
+    /// Last parts of the keys at fault, the likelier first.
+    pub fn parts(&self) -> [&'static str; 2] {
+        match self {
+            Self::Clearance { .. } => ["clearance", "ball_radius"],
+            Self::SlipSpeeds { .. } => ["slip_speed_low", "slip_speed_high"],
+            Self::DividesByRestitution(_) => ["restitution", "normal_law"],
+        }
+    }
+}
+
+/// An inconsistency of the machine's contact parameters, or of those of one of its ball joints, by index.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactConflict {
+    /// Ball joint; `None` for those of the machine as a whole.
+    pub joint: Option<usize>,
+    /// What is inconsistent.
+    pub fault: ContactFault,
+}
+
+fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
+    if contact.clearance >= contact.ball_radius {
+        return Err(ContactFault::Clearance { clearance: contact.clearance, ball_radius: contact.ball_radius });
+    }
+    if contact.slip_speed_low >= contact.slip_speed_high {
+        return Err(ContactFault::SlipSpeeds { low: contact.slip_speed_low, high: contact.slip_speed_high });
+    }
+    let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
+    if divides && contact.restitution == 0.0 {
+        return Err(ContactFault::DividesByRestitution(contact.normal_law));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Scene, built_in_text};
+
+    /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
+    fn doubted(sections: &str) -> Option<f64> {
+        let text = format!("{}\n{sections}", built_in_text("pendulum").expect("built in"));
+        let method = ("solver.method".to_owned(), "rk4".to_owned());
+        let step = ("solver.step".to_owned(), "10 us".to_owned());
+        let scene = Scene::parse(&text, None, &[method, step]).expect("reads");
+        scene.machine.doubts().into_iter().find_map(|doubt| match doubt {
+            Doubt::Step { duration, .. } => Some(duration),
+            _ => None,
+        })
+    }
+
+    #[test]
+    fn a_load_shortens_the_estimated_impact() {
+        let load = |force: &str| {
+            let on = "{ body = \"rod\", at = [0, 0, 0] }";
+            format!("[[load]]\nname = \"l\"\non = {on}\nforce = \"0 0 {force}\"\n")
+        };
+        assert_eq!(doubted(&load("1 N")), None);
+        let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted(&load(force)).expect("short"));
+        assert!(less < 5e-5 && more < 0.5 * less, "{less:e} {more:e}");
+    }
+}

@@ -1,0 +1,187 @@
+//! Joints: those that bodies hang on or that close loops, and ball-and-socket joints.
+
+use super::{Drive, Quat, Vec3};
+use crate::contact;
+use crate::words::words;
+
+/// The joint that connects `child` to `parent`: one that the child hangs on in the tree, or one that closes a loop.
+///
+/// Pose of the child for joint coordinate q, with R the parent's (world: identity) rotation, `rotation` = R0: revolute
+/// `R_child = R Rot(axis, q) R0`, the two points coincide; prismatic `R_child = R R0`, the child's point is at the parent's
+/// point + q axis; cylindrical both, first the slide, then the turn; universal `R_child = R Rot(axis, q1) R0 Rot(child_axis, q2)`,
+/// the two points coincide; fixed as prismatic with q = 0; free (parent is the world): see `start`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Unique name.
+    pub name: String,
+    /// Kind of motion.
+    pub kind: JointKind,
+    /// Parent body; `None` is the world.
+    pub parent: Option<usize>,
+    /// Child body.
+    pub child: usize,
+    /// Joint point in the parent's frame, m.
+    pub parent_point: Vec3,
+    /// Joint point in the child's frame, m.
+    pub child_point: Vec3,
+    /// Unit axis in the parent's frame (all but fixed and free).
+    pub axis: Vec3,
+    /// Second unit axis of a universal joint in the child's frame, perpendicular to `axis`.
+    pub child_axis: Vec3,
+    /// Child's orientation in the parent at q = 0.
+    pub rotation: Quat,
+    /// Prescribes q(t), of two coordinates the first; `None` leaves it to the dynamics.
+    pub drive: Option<Drive>,
+    /// Prescribes the second of two coordinates.
+    pub second_drive: Option<Drive>,
+    /// Its start values; without meaning where a drive prescribes its motion.
+    pub start: JointStart,
+    /// Whether the view draws a pin or a rail for it.
+    pub drawn: bool,
+}
+
+impl Joint {
+    /// The points that it connects: the parent's, then the child's.
+    pub fn points(&self) -> [Attachment; 2] {
+        let parent = Attachment { body: self.parent, point: self.parent_point };
+        let child = Attachment { body: Some(self.child), point: self.child_point };
+        [parent, child]
+    }
+
+    /// Its driven coordinates.
+    pub fn drives(&self) -> impl Iterator<Item = (Freedom, &Drive)> {
+        let drives = [&self.drive, &self.second_drive];
+        let coordinates = self.kind.freedoms().iter().zip(drives);
+        coordinates.filter_map(|(freedom, drive)| Some((*freedom, drive.as_ref()?)))
+    }
+
+    /// Whether time alone moves its child against its parent.
+    pub fn is_prescribed(&self) -> bool {
+        self.kind != JointKind::Free && self.drives().count() == self.kind.freedoms().len()
+    }
+}
+
+/// Kind of a tree joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// No motion.
+    Fixed,
+    /// Slides along `axis`.
+    Prismatic,
+    /// Turns about `axis`.
+    Revolute,
+    /// Six degrees of freedom.
+    Free,
+    /// Slides along `axis` and turns about it.
+    Cylindrical,
+    /// Turns about `axis` of the parent and about `child_axis` of the child.
+    Universal,
+}
+
+words!(JointKind {
+    Fixed => "fixed",
+    Prismatic => "prismatic",
+    Revolute => "revolute",
+    Free => "free",
+    Cylindrical => "cylindrical",
+    Universal => "universal",
+});
+
+/// What one coordinate of a joint measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// Displacement along the axis of a slide or a cylindrical joint, m.
+    Slide,
+    /// Angle of a hinge, rad.
+    Turn,
+    /// Angle of a cylindrical joint, rad.
+    TurnOfSlide,
+    /// Angle of a universal joint about its axis in the parent, rad.
+    FirstTurn,
+    /// The same about its axis in the child.
+    SecondTurn,
+}
+
+impl Freedom {
+    /// The coordinate's name in files and channels.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Slide => "position",
+            Self::Turn | Self::TurnOfSlide | Self::FirstTurn => "angle",
+            Self::SecondTurn => "child_angle",
+        }
+    }
+
+    /// Whether it is an angle.
+    pub fn turns(self) -> bool {
+        self != Self::Slide
+    }
+}
+
+impl JointKind {
+    /// Its coordinates; a free joint's pose has none.
+    pub fn freedoms(self) -> &'static [Freedom] {
+        match self {
+            Self::Fixed | Self::Free => &[],
+            Self::Prismatic => &[Freedom::Slide],
+            Self::Revolute => &[Freedom::Turn],
+            Self::Cylindrical => &[Freedom::Slide, Freedom::TurnOfSlide],
+            Self::Universal => &[Freedom::FirstTurn, Freedom::SecondTurn],
+        }
+    }
+}
+
+/// Start values of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointStart {
+    /// Coordinate (m or rad) and rate of a one-degree joint.
+    Scalar {
+        /// q at t = 0.
+        position: f64,
+        /// dq/dt at t = 0.
+        velocity: f64,
+    },
+    /// Coordinates (m or rad) and rates of a joint of two degrees, in the order of [`JointKind::freedoms`].
+    Pair {
+        /// q at t = 0.
+        position: [f64; 2],
+        /// dq/dt at t = 0.
+        velocity: [f64; 2],
+    },
+    /// Pose of the body frame and its motion, world axes.
+    Pose {
+        /// Body frame's origin, m.
+        position: Vec3,
+        /// Orientation.
+        rotation: Quat,
+        /// Velocity of the body frame's origin, m/s.
+        velocity: Vec3,
+        /// Angular velocity, rad/s.
+        angular_velocity: Vec3,
+    },
+}
+
+/// A point on a body, or fixed in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attachment {
+    /// Body; `None` is the world.
+    pub body: Option<usize>,
+    /// Point in that body's frame, m.
+    pub point: Vec3,
+}
+
+/// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BallJoint {
+    /// Unique name.
+    pub name: String,
+    /// Socket centre Z_i.
+    pub socket: Attachment,
+    /// Ball centre Z_j.
+    pub ball: Attachment,
+    /// Unit vector in the socket body's frame: the drawn socket is cut open on that side, so that the rod can pass and the
+    /// ball inside is visible. It has no effect on the motion.
+    pub opening: Vec3,
+    /// Contact parameters.
+    pub contact: contact::Parameters,
+}

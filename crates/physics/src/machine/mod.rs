@@ -1,0 +1,151 @@
+//! What a machine is: bodies, joints, drives and force elements as typed data in SI units, which a program can build as well as a
+//! scene file.
+
+mod body;
+mod check;
+mod doubts;
+mod drive;
+mod element;
+mod joint;
+mod mesh_unit;
+mod roles;
+mod settings;
+mod solid;
+
+pub use body::*;
+pub use check::{ContactConflict, ContactFault, least_impact_steps};
+pub use doubts::*;
+pub use drive::*;
+pub use element::*;
+pub use joint::*;
+pub use settings::*;
+pub use solid::Solid;
+
+use crate::contact;
+
+/// A vector in three dimensions, f64.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3 x 3 matrix, f64.
+pub type Mat3 = nalgebra::Matrix3<f64>;
+/// An orientation, f64.
+pub type Quat = nalgebra::UnitQuaternion<f64>;
+
+/// A mechanism and everything needed to simulate and draw it.
+///
+/// Cut every ball joint and every joint that closes a loop, and a forest remains: each body hangs on its parent by exactly one
+/// entry of `joints`, and parents come before children.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// Gravity, world axes, m/s^2.
+    pub gravity: Vec3,
+    /// Contact parameters of the machine as a whole: those of joints that close loops, where these count as ball joints.
+    pub contact: contact::Parameters,
+    /// Equations of motion.
+    pub formulation: Formulation,
+    /// Stepper settings.
+    pub solver: Solver,
+    /// What its drives follow where they follow a closed form.
+    pub spcmm: Option<Spcmm>,
+    /// What the pose columns report.
+    pub output: Output,
+    /// How the start values are to be understood.
+    pub start: StartRule,
+    /// Moving bodies, parents before children.
+    pub bodies: Vec<Body>,
+    /// One tree joint for each body, in body order: `joints[i].child == i`.
+    pub joints: Vec<Joint>,
+    /// The cut joints.
+    pub ball_joints: Vec<BallJoint>,
+    /// Joints that close loops: both bodies hang elsewhere. They have neither drive nor start values.
+    pub closing_joints: Vec<Joint>,
+    /// Force elements: springs, external loads.
+    pub elements: Vec<Element>,
+    /// Fixed shapes (rails, frame), world axes.
+    pub fixed_shapes: Vec<Shape>,
+}
+
+impl Default for Machine {
+    /// Nothing but the world, without gravity.
+    fn default() -> Self {
+        Self {
+            gravity: Vec3::zeros(),
+            contact: contact::Parameters::default(),
+            formulation: Formulation::Tree,
+            solver: Solver::default(),
+            spcmm: None,
+            output: Output { body: 0, probe: None },
+            start: StartRule::default(),
+            bodies: Vec::new(),
+            joints: Vec::new(),
+            ball_joints: Vec::new(),
+            closing_joints: Vec::new(),
+            elements: Vec::new(),
+            fixed_shapes: Vec::new(),
+        }
+    }
+}
+
+impl Machine {
+    /// Names of the joints at which trees are cut, in the order in which they are counted: ball joints, then joints that close
+    /// loops.
+    pub fn cut_joints(&self) -> impl Iterator<Item = &str> {
+        let balls = self.ball_joints.iter().map(|joint| joint.name.as_str());
+        balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
+    }
+
+    /// Whether `next` is this machine but for gravity, contacts and the stepper, which may change while it runs.
+    pub fn differs_in_conditions_alone(&self, next: &Self) -> bool {
+        let mut like_next = self.clone();
+        like_next.gravity = next.gravity;
+        like_next.contact = next.contact;
+        for (joint, next) in like_next.ball_joints.iter_mut().zip(&next.ball_joints) {
+            joint.contact = next.contact;
+        }
+        let energy_ledger = like_next.solver.energy_ledger;
+        like_next.solver = Solver { energy_ledger, ..next.solver };
+        like_next == *next
+    }
+
+    /// Joints besides ball joints: those that bodies hang on, then those that close loops.
+    pub fn kinematic_joints(&self) -> impl Iterator<Item = &Joint> + Clone {
+        self.joints.iter().chain(&self.closing_joints)
+    }
+
+    /// Driven coordinates in the order in which they are counted, each with its joint.
+    pub fn driven(&self) -> impl Iterator<Item = (&Joint, Freedom)> {
+        let of = |joint| Joint::drives(joint).map(move |(freedom, _)| (joint, freedom));
+        self.joints.iter().flat_map(of)
+    }
+}
+
+/// The paper's mechanism: dimensions and trajectory for its slider laws. SI units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spcmm {
+    /// a1, distance along +X from O_A to the slider plane, m.
+    pub slider_plane: f64,
+    /// Amplitude of x, m (59).
+    pub amplitude_x: f64,
+    /// Amplitude of beta, rad (59).
+    pub amplitude_beta: f64,
+    /// Drive frequency, Hz (59): 0.5 Hz is the paper's period of 2 s.
+    pub frequency: f64,
+    /// Mean of x, m (59).
+    pub mean_x: f64,
+    /// gamma, rad (59).
+    pub gamma: f64,
+    /// b, hinge radius on the platform, m.
+    pub hinge_radius: f64,
+    /// L1, driving rod, m.
+    pub driving_rod: f64,
+    /// L2, driven rod, m.
+    pub driven_rod: f64,
+}
+
+/// What the pose columns report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output {
+    /// Index of the body whose frame is reported.
+    pub body: usize,
+    /// Probe tip in that body's frame, m.
+    pub probe: Option<Vec3>,
+}

@@ -1,0 +1,92 @@
+//! How a machine is to be simulated: form of the equations, start, stepper.
+
+use crate::integrate::Method;
+use crate::words::words;
+
+/// How the start values of the joints are to be understood.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartRule {
+    /// Exactly as the file gives them.
+    #[default]
+    AsGiven,
+    /// Initial guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities that
+    /// follow from the drives.
+    Ideal,
+    /// As [`Self::Ideal`], and then every ball lies on the wall of its socket where the mechanism without play would press it,
+    /// as deep as that force needs.
+    Settled,
+}
+
+words!(StartRule {
+    AsGiven => "as-given",
+    Ideal => "ideal",
+    Settled => "settled",
+});
+
+/// Formulation of the equations of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formulation {
+    /// Generalized coordinates of a spanning forest.
+    Tree,
+    /// All bodies, Lagrange multipliers, Baumgarte stabilisation; paper eqs. (44)-(58).
+    Lagrange,
+}
+
+words!(Formulation {
+    Tree => "tree",
+    Lagrange => "lagrange",
+});
+
+/// A named point on the speed-accuracy front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// Fast, rough.
+    Preview,
+    /// The fastest that keeps impacts resolved.
+    RealTime,
+    /// For figures.
+    Accurate,
+    /// The reference for the others.
+    Reference,
+}
+
+words!(Preset {
+    Preview => "preview",
+    RealTime => "real-time",
+    Accurate => "accurate",
+    Reference => "reference",
+});
+
+/// Stepper settings. An explicit method, step or tolerance takes precedence over the preset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// Named point; fills in what is not given.
+    pub preset: Option<Preset>,
+    /// Method in force.
+    pub method: Method,
+    /// Fixed step, s; the first step of an adaptive method.
+    pub step: f64,
+    /// Relative tolerance of an adaptive method.
+    pub tolerance: f64,
+    /// Whether the energy ledger is kept.
+    pub energy_ledger: bool,
+}
+
+impl Default for Solver {
+    /// The automatic choice of methods at a tolerance of 1e-6.
+    fn default() -> Self {
+        Self { preset: None, method: Method::Automatic, step: 10e-6, tolerance: 1e-6, energy_ledger: true }
+    }
+}
+
+impl Preset {
+    /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
+    pub fn point(self) -> (Method, f64, f64) {
+        match self {
+            Self::Preview => (Method::Automatic, 10e-6, 1e-4),
+            Self::RealTime => (Method::Automatic, 10e-6, 1e-6),
+            Self::Accurate => (Method::Automatic, 10e-6, 1e-7),
+            Self::Reference => (Method::DormandPrince5, 10e-6, 1e-11),
+        }
+    }
+}
