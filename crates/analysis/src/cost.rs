@@ -5,7 +5,7 @@ use super::{AnalysisError, RunContext, Setting, WorkBudget};
 use jointplay_physics::integrate::System as _;
 use jointplay_physics::machine::Preset;
 use jointplay_physics::mechanism::{Mechanism, Touching};
-use jointplay_physics::scene::Scene;
+use jointplay_scene::Scene;
 
 /// Preset used for the runs.
 const PRESET: Preset = Preset::Accurate;

@@ -3,8 +3,8 @@
 use super::orbit::Orbit;
 use jointplay_physics::machine::Machine;
 use jointplay_physics::mechanism::periods_of;
-use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Frame, Pose, Simulation, StartError, Stopped};
+use jointplay_scene::Scene;
 
 /// Why a scene has no sections at a fixed drive phase.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use jointplay_physics::scene::{Kind, Scene, SceneError, Value, ValueError};
+use jointplay_scene::{Kind, Scene, SceneError, Value, ValueError};
 
 /// Points per block in a `follow` sweep: each block starts cold at its first point, so that neither threads nor shards
 /// affect which point continues from which.

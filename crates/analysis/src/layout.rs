@@ -3,7 +3,7 @@
 use super::drive::OBSERVABLES;
 use super::exponent::Exponent;
 use super::point::{JointResult, Plan, PointResult};
-use jointplay_physics::scene::Scene;
+use jointplay_scene::Scene;
 
 /// How a point ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

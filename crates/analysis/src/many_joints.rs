@@ -2,7 +2,7 @@
 
 use super::stretch::time_to;
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
-use jointplay_physics::scene::Scene;
+use jointplay_scene::Scene;
 
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-9;

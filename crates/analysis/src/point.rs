@@ -5,8 +5,8 @@ use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
 use super::section::{Schedule, SectionRun};
 use jointplay_physics::machine::{Machine, Solver};
-use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Effect, Peak};
+use jointplay_scene::Scene;
 
 /// Largest number of samples per period for the means and the tip error.
 const SAMPLES: f64 = 400.0;

@@ -10,7 +10,7 @@ use super::stretch::time_to;
 use super::work_precision::{Baseline, measure as measure_point};
 use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision};
 use jointplay_physics::machine::Preset;
-use jointplay_physics::scene::Scene;
+use jointplay_scene::Scene;
 
 /// What `jointplay tradeoff --all --write` measured.
 const RECORD: &str = include_str!("../../../assets/presets.json");
@@ -168,7 +168,7 @@ pub fn measure(scene: &Scene, presets: &[Preset], context: &mut RunContext) -> R
 #[cfg(test)]
 mod tests {
     use super::*;
-    use jointplay_physics::scene::BUILT_IN;
+    use jointplay_scene::BUILT_IN;
 
     #[test]
     fn a_built_in_scene_says_beforehand_that_real_time_is_too_fast_for_it() {

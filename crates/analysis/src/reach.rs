@@ -3,8 +3,8 @@
 use super::reference_solution::{MeanForces, done};
 use super::stretch::{advance_capped, time_to};
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
-use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::Simulation;
+use jointplay_scene::Scene;
 
 /// Tolerance of the automatic pair that is to reach them.
 const TOLERANCE: f64 = 1e-5;

@@ -3,7 +3,7 @@
 use super::grid::Start;
 use super::source::SceneSource;
 use super::sweep_task::SweepTask;
-use jointplay_physics::scene::{Scene, SceneError};
+use jointplay_scene::{Scene, SceneError};
 
 /// A sweep over a built-in scene.
 #[derive(Debug, PartialEq, Eq)]

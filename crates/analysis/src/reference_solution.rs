@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::stretch::advance_capped;
 use super::{AnalysisError, End, RunContext, Setting, WorkBudget};
 use jointplay_physics::machine::Vec3;
-use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Frame, Peak, Simulation, Snapshot};
+use jointplay_scene::Scene;
 
 /// Number of impacts compared.
 const IMPACTS: usize = 6;

@@ -16,8 +16,8 @@ use super::paper::{Case, Coordinate, PAPER, Series, Variant};
 use super::point::{Plan, resolution};
 use super::response::{Observation, Response, ResponseError, derivatives, respond};
 use super::sweep::{Sweep, SweepError};
-use jointplay_physics::scene::{Scene, SceneError};
 use jointplay_physics::simulate::{Frame, Simulation};
+use jointplay_scene::{Scene, SceneError};
 
 /// Points per period of a settled curve.
 const CURVE_POINTS: usize = 800;

@@ -1,7 +1,7 @@
 //! Response of a mechanism beside its ideal motion: what Sheng & Chen show in section 4.2, Figures 5 to 17.
 
-use jointplay_physics::scene::{Scene, SceneError};
 use jointplay_physics::simulate::{Frame, Pose, Simulation, StartError, Stopped};
+use jointplay_scene::{Scene, SceneError};
 
 /// Coordinates of the output body: x, y, z, alpha, beta, gamma.
 pub const COORDINATES: usize = 6;

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use jointplay_physics::scene::SceneError;
 use jointplay_physics::simulate::{ChangeError, StartError, Stopped};
+use jointplay_scene::SceneError;
 
 /// Clock and progress callback from the caller of an analysis: the command line, a background thread, a worker in a browser.
 pub struct RunContext<'a> {

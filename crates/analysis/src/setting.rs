@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::AnalysisError;
 use jointplay_physics::integrate::Method;
 use jointplay_physics::machine::{Machine, Preset};
-use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Simulation, Snapshot};
+use jointplay_scene::Scene;
 
 /// A method with its step size or tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

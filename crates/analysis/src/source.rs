@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::AnalysisError;
 use super::grid::RangeError;
 use super::sweep::SweepError;
-use jointplay_physics::scene::{Scene, SceneError};
+use jointplay_scene::{Scene, SceneError};
 
 /// A scene in transferable form: text and changes, from which it is parsed again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

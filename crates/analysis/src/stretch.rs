@@ -6,8 +6,8 @@ use serde::{Serialize, Serializer};
 
 use super::{AnalysisError, RunContext};
 use jointplay_physics::machine::BallJoint;
-use jointplay_physics::scene::Scene;
 use jointplay_physics::simulate::{Simulation, StartError, Stopped};
+use jointplay_scene::Scene;
 
 /// Steps between two checks of the clock, the cap and cancellation.
 const STEPS_IN_A_PIECE: u32 = 32;
@@ -190,7 +190,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use jointplay_physics::scene::Scene;
+    use jointplay_scene::Scene;
 
     #[test]
     fn work_is_capped_and_can_be_broken_off() {

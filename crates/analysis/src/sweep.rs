@@ -5,8 +5,8 @@ use super::drive::{NoPeriod, ObservedRun, drive_period};
 use super::grid::{Grid, ParameterRange, Start};
 use super::layout::Layout;
 use super::point::{Plan, PointResult, PointRun};
-use jointplay_physics::scene::{Scene, SceneError, Value};
 use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
+use jointplay_scene::{Scene, SceneError, Value};
 
 /// Largest total number of kept sections: an array of them takes 512 MiB.
 const MOST_SECTIONS: usize = 1 << 26;

@@ -270,7 +270,7 @@ fn tell_result(point: &mut SweptPoint, result: &PointResult) {
 mod tests {
     use super::*;
     use crate::task::{Job, Message, perform};
-    use jointplay_physics::scene::Scene;
+    use jointplay_scene::Scene;
 
     fn task(vary: &[&str]) -> SweepTask {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];

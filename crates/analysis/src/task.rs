@@ -113,7 +113,7 @@ mod tests {
 
     use super::*;
     use crate::grid::Start;
-    use jointplay_physics::scene::Scene;
+    use jointplay_scene::Scene;
 
     fn job(changes: &[(&str, &str)], presets: &[&str]) -> Job {
         let own = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());

@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use jointplay_physics::scene::{Scene, SceneError, evaluate};
 use jointplay_physics::simulate::{Frame, Impact, NoChannel, Reading, Simulation, StartError, Stopped, chosen_columns};
+use jointplay_scene::{Scene, SceneError, evaluate};
 
 /// A run of a scene, and what is known of it.
 #[derive(Clone, Debug, Deserialize)]
@@ -319,7 +319,7 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use jointplay_physics::scene::BENCHMARKS;
+    use jointplay_scene::BENCHMARKS;
 
     #[test]
     fn every_benchmark_has_a_case_and_every_case_a_right_value() {

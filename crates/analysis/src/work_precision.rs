@@ -7,7 +7,7 @@ use super::stretch::time_to;
 use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::machine::Preset;
-use jointplay_physics::scene::Scene;
+use jointplay_scene::Scene;
 
 /// A run over the first impacts, or in settled motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]

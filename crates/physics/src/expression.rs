@@ -4,6 +4,8 @@
 //! Written here because the crates for this call std's elementary functions, whose bits differ between native and wasm, or
 //! bring a regex engine, and do not say at which byte an expression is wrong.
 
+mod derivatives;
+
 use crate::suggest::{brief, did_you_mean, nearest_name};
 use std::fmt;
 

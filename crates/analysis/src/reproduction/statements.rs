@@ -289,7 +289,7 @@ mod tests {
     use super::*;
     use crate::reproduction::{Agenda, COLUMNS, Extent, Outcome, ReportJob, SettledCurve};
     use crate::response::respond;
-    use jointplay_physics::scene::Scene;
+    use jointplay_scene::Scene;
 
     /// The same short run for every case, settled curves at rest, and sweeps of zeros: each test fills in what it needs.
     fn nothing_moves() -> Findings {

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Mat3, Quat, Vec3};
-use crate::mesh::Mesh;
+use super::{Mat3, Mesh, Quat, Vec3};
 use crate::words::words;
 
 /// A rigid body. The file places its frame; the centroid may lie elsewhere.
@@ -21,6 +20,13 @@ pub struct Body {
     pub shapes: Vec<Shape>,
     /// Density of the shapes from which mass, centroid and inertia were computed, kg/m^3; `None` where the file gives those.
     pub density: Option<f64>,
+}
+
+impl Body {
+    /// A body of `mass`, kg, whose centroid is the origin of its frame, with the inertia about that, kg m^2, and without shapes.
+    pub fn new(name: &str, mass: f64, inertia: Mat3) -> Self {
+        Self { name: name.to_owned(), mass, centre: Vec3::zeros(), inertia, shapes: Vec::new(), density: None }
+    }
 }
 
 /// What a shape represents: the view picks its colour and material.

@@ -41,6 +41,45 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// Leaves body `child` free, at rest in the world's origin.
+    pub fn free(child: usize) -> Self {
+        let start = JointStart::Pose {
+            position: Vec3::zeros(),
+            rotation: Quat::identity(),
+            velocity: Vec3::zeros(),
+            angular_velocity: Vec3::zeros(),
+        };
+        Self { start, ..Self::new(JointKind::Free, None, child, Vec3::x()) }
+    }
+
+    /// A hinge about the unit vector `axis`, through the origins of the frames of `child` and `parent`, the world if `None`.
+    pub fn revolute(parent: Option<usize>, child: usize, axis: Vec3) -> Self {
+        Self::new(JointKind::Revolute, parent, child, axis)
+    }
+
+    /// A slide along the unit vector `axis`, through the same points.
+    pub fn prismatic(parent: Option<usize>, child: usize, axis: Vec3) -> Self {
+        Self::new(JointKind::Prismatic, parent, child, axis)
+    }
+
+    fn new(kind: JointKind, parent: Option<usize>, child: usize, axis: Vec3) -> Self {
+        Self {
+            name: format!("{kind}{}", child + 1),
+            kind,
+            parent,
+            child,
+            parent_point: Vec3::zeros(),
+            child_point: Vec3::zeros(),
+            axis,
+            child_axis: Vec3::y(),
+            rotation: Quat::identity(),
+            drive: None,
+            second_drive: None,
+            start: JointStart::Scalar { position: 0.0, velocity: 0.0 },
+            drawn: true,
+        }
+    }
+
     /// The points that it connects: the parent's, then the child's.
     pub fn points(&self) -> [Attachment; 2] {
         let parent = Attachment { body: self.parent, point: self.parent_point };
@@ -170,6 +209,18 @@ pub struct Attachment {
     pub point: Vec3,
 }
 
+impl Attachment {
+    /// A point of the world, m.
+    pub fn world(point: Vec3) -> Self {
+        Self { body: None, point }
+    }
+
+    /// A point of a body, in its frame, m.
+    pub fn on(body: usize, point: Vec3) -> Self {
+        Self { body: Some(body), point }
+    }
+}
+
 /// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallJoint {
@@ -184,4 +235,11 @@ pub struct BallJoint {
     pub opening: Vec3,
     /// Contact parameters.
     pub contact: contact::Parameters,
+}
+
+impl BallJoint {
+    /// With the default contact, and its socket drawn open towards -z.
+    pub fn new(name: &str, socket: Attachment, ball: Attachment) -> Self {
+        Self { name: name.to_owned(), socket, ball, opening: -Vec3::z(), contact: contact::Parameters::default() }
+    }
 }

@@ -7,6 +7,7 @@ mod doubts;
 mod drive;
 mod element;
 mod joint;
+mod mesh;
 mod mesh_unit;
 mod roles;
 mod settings;
@@ -18,6 +19,7 @@ pub use doubts::*;
 pub use drive::*;
 pub use element::*;
 pub use joint::*;
+pub use mesh::Mesh;
 pub use settings::*;
 pub use solid::Solid;
 

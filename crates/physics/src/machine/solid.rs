@@ -1,7 +1,6 @@
 //! Mass properties of the forms that shapes have: what a body of one density weighs.
 
-use super::{Geometry, Mat3, Shape, Vec3};
-use crate::mesh::Mesh;
+use super::{Geometry, Mat3, Mesh, Shape, Vec3};
 use std::f64::consts::PI;
 
 /// Volume and its first two moments.
@@ -154,7 +153,7 @@ fn round(axis: &Vec3, [across, along]: [f64; 2]) -> Mat3 {
 mod tests {
     use super::*;
     use crate::machine::Quat;
-    use crate::mesh::Format;
+    use crate::scene::mesh::Format;
 
     /// Whether `point` lies in the form: written from its definition.
     fn holds(geometry: &Geometry, point: &Vec3) -> bool {

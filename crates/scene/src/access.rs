@@ -1,0 +1,277 @@
+//! Reading and changing the parameters of a scene by key.
+
+use super::error::nearest_parameter;
+use super::field::Access;
+use super::numbers::{row_of_number, row_of_own};
+use super::read::{REBUILDS, file_only};
+use super::table::{contact_part, contact_rows, find};
+use super::*;
+use jointplay_physics::suggest::{brief, nearest};
+
+/// A key resolved against a scene: its row, and the joint it is for.
+struct Resolved {
+    parameter: &'static Parameter,
+    joint: Option<usize>,
+}
+
+/// A contact parameter of a ball joint by the last part of its key; `None` if there is no such part.
+pub fn contact_value(joint: &BallJoint, part: &str) -> Option<Value> {
+    let (_, field) = contact_rows().find(|(of, _)| *of == part)?;
+    Some((field.get)(&joint.contact))
+}
+
+impl Scene {
+    /// Keys (without prefix) in which ball joint `joint` differs from the scene's `contact.*`.
+    pub fn overrides(&self, joint: usize) -> &[&'static str] {
+        &self.overrides[joint]
+    }
+
+    /// Whether this scene has a row's keys.
+    fn has(&self, parameter: &Parameter) -> bool {
+        match parameter.scope {
+            Scope::Every | Scope::Contact => true,
+            Scope::Spcmm => self.machine.spcmm.is_some(),
+            Scope::Chain => self.chain.is_some(),
+            Scope::Own => self.source.numbers.contains_key(parameter.key),
+        }
+    }
+
+    /// Parameters this scene has, in table order and then its own; a contact row also stands for `joint.<name>.<key>`.
+    pub fn parameters(&self) -> Vec<&'static Parameter> {
+        table().iter().filter(|parameter| self.has(parameter)).chain(self.source.own.iter().map(row_of_own)).collect()
+    }
+
+    /// Row of a number of the file, by its key.
+    fn number(&self, key: &str) -> Option<&'static Parameter> {
+        let number = self.source.numbers.get(key)?;
+        if file_only(key) {
+            return None;
+        }
+        let own = self.source.own.iter().find(|row| row.key == key);
+        Some(own.map_or_else(|| row_of_number(key, number), row_of_own))
+    }
+
+    fn resolve(&self, key: &str) -> Result<Resolved, SceneError> {
+        if let Some(parameter) = self.number(key) {
+            return Ok(Resolved { parameter, joint: None });
+        }
+        let Some((name, part)) = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) else {
+            return match find(key) {
+                Some(parameter) if self.has(parameter) => Ok(Resolved { parameter, joint: None }),
+                Some(parameter) => {
+                    let place = parameter.scope.describe();
+                    Err(SceneError::about(
+                        key,
+                        None,
+                        format!("the scene `{}` has no such key: it exists only in {place}", self.name),
+                    ))
+                }
+                None if file_only(key) => {
+                    Err(SceneError::about(key, None, "only in the scene file: it cannot be changed from outside it"))
+                }
+                None => {
+                    let here = self.parameters();
+                    let table = here.iter().map(|parameter| parameter.key);
+                    // Beyond this many the search takes longer than it helps.
+                    let numbers = self.source.numbers.keys().map(String::as_str).take(MOST_CHANGES);
+                    let near = nearest_parameter(key, table.chain(numbers), &[]);
+                    Err(SceneError::about(key, None, format!("unknown key{near}")))
+                }
+            };
+        };
+        let Some(joint) = self.machine.ball_joints.iter().position(|joint| joint.name == name) else {
+            let names: Vec<&str> = self.machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
+            let listed = if names.len() > 12 { format!("{}, …", names[..12].join(", ")) } else { names.join(", ") };
+            let first = name.split('.').next().unwrap_or(name);
+            let mut others = self.machine.joints.iter().chain(&self.machine.closing_joints);
+            let hinge = others.any(|joint| joint.name == first);
+            let message = if hinge {
+                // Its numbers are keys where the file gives them.
+                let own = format!("joint.{first}.");
+                let numbers = self.source.numbers.keys().map(String::as_str);
+                let given: Vec<&str> = numbers.filter(|key| key.starts_with(&own)).collect();
+                let near = nearest(key, given.iter().copied());
+                let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
+                format!(
+                    "`{first}` is not a ball joint, and the file gives no such number of it{near}; its numbers: {}. Ball joints, \
+                     {listed}, have joint.<ball joint>.<key>; keys: {}",
+                    if given.is_empty() { "none".to_owned() } else { given.join(", ") },
+                    parts.join(", ")
+                )
+            } else {
+                let near = nearest(name, names.iter().copied());
+                format!("no ball joint `{}`{near}; ball joints: {listed}", brief(name))
+            };
+            return Err(SceneError::about(key, None, message));
+        };
+        match find(&format!("contact.{part}")) {
+            Some(parameter) => Ok(Resolved { parameter, joint: Some(joint) }),
+            None => {
+                let parts = table().iter().filter_map(contact_part);
+                Err(SceneError::about(key, None, format!("unknown key{}", nearest(part, parts))))
+            }
+        }
+    }
+
+    /// Value of `key` (including `joint.<name>.<…>`).
+    ///
+    /// # Errors
+    /// A key this scene does not have; the error suggests the nearest one.
+    pub fn get(&self, key: &str) -> Result<Value, SceneError> {
+        let Resolved { parameter, joint } = self.resolve(key)?;
+        Ok(match parameter.access {
+            Access::Contact(field) => {
+                let own = joint.map(|joint| &self.machine.ball_joints[joint].contact);
+                (field.get)(own.unwrap_or(&self.machine.contact))
+            }
+            Access::Scene(field) => (field.get)(self),
+            Access::Number => {
+                let number = self.source.numbers.get(key);
+                number.map_or(Value::Unset, |number| Value::Number(number.value))
+            }
+        })
+    }
+
+    /// Parameter row of `key` (including `joint.<name>.<…>`).
+    ///
+    /// # Errors
+    /// A key this scene does not have; the error suggests the nearest one.
+    pub fn parameter(&self, key: &str) -> Result<&'static Parameter, SceneError> {
+        self.resolve(key).map(|resolved| resolved.parameter)
+    }
+
+    /// Changes a parameter in place and records it in `changes`. Some parameters rebuild the scene from its source with all
+    /// changes so far.
+    ///
+    /// # Errors
+    /// Unknown key, wrong unit, out of range, or an inconsistent scene; `self` is then unchanged.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
+        let mut next = self.clone();
+        let parameter = next.change(key, value)?;
+        if REBUILDS.contains(&key) || matches!(parameter.access, Access::Number) {
+            next = next.rebuilt()?;
+        }
+        next.machine.check_contacts().map_err(|conflict| next.blame_change(&conflict, key))?;
+        *self = next;
+        Ok(parameter)
+    }
+
+    /// As [`Self::set`] with a value in SI units, for sliders: the recorded text reads back to the same bits.
+    ///
+    /// # Errors
+    /// As [`Self::set`]; [`Value::Unset`] reverts the change, as [`Self::undo_change`].
+    pub fn set_value(&mut self, key: &str, value: &Value) -> Result<&'static Parameter, SceneError> {
+        let parameter = self.parameter(key)?;
+        if *value == Value::Unset {
+            return self.undo_change(key);
+        }
+        if matches!(value, Value::Number(number) if !number.is_finite()) {
+            return Err(SceneError::about(key, None, format!("must be a finite number; {}", parameter.allowed())));
+        }
+        self.set(key, &parameter.write(value))
+    }
+
+    /// Reverts a change: the parameter is again as in the scene's text.
+    ///
+    /// # Errors
+    /// A key this scene does not have, or an inconsistent scene; `self` is then unchanged.
+    pub fn undo_change(&mut self, key: &str) -> Result<&'static Parameter, SceneError> {
+        let parameter = self.parameter(key)?;
+        let mut next = self.clone();
+        next.changes.retain(|(changed, _)| changed != key);
+        *self = next.rebuilt()?;
+        Ok(parameter)
+    }
+
+    /// The scene read again from its text with its changes, except those of joints that no longer exist.
+    fn rebuilt(&self) -> Result<Self, SceneError> {
+        let mut changes = self.changes.clone();
+        if let Some((_, links)) = changes.iter().find(|(key, _)| key == "chain.links") {
+            // The ball joints of a chain are J1 to JN.
+            let links: u64 = links.parse().unwrap_or(u64::MAX);
+            changes.retain(|(key, _)| match key.strip_prefix("joint.J").and_then(|rest| rest.split('.').next()) {
+                Some(index) => index.parse::<u64>().map_or(true, |index| index <= links),
+                None => true,
+            });
+        }
+        let source = &self.source;
+        Self::parse_with(&source.text, source.file.as_deref(), &source.beside, &changes)
+    }
+
+    /// Applies and records one change, without the checks across parameters.
+    pub(super) fn change(&mut self, key: &str, text: &str) -> Result<&'static Parameter, SceneError> {
+        let text = text.trim();
+        let Resolved { parameter, joint } = self.resolve(key).map_err(|mut error| {
+            error.value = Some(text.into());
+            error
+        })?;
+        let value = parameter.read(text).map_err(|error| SceneError::about(key, Some(text), error.to_string()))?;
+        match (parameter.access, joint) {
+            (Access::Contact(field), Some(joint)) => {
+                (field.set)(&mut self.machine.ball_joints[joint].contact, &value);
+                let part = contact_part(parameter).unwrap_or_default();
+                if !self.overrides[joint].contains(&part) {
+                    self.overrides[joint].push(part);
+                }
+            }
+            _ => self.write(parameter, &value),
+        }
+        self.changes.retain(|(changed, _)| changed != key);
+        if self.changes.len() >= MOST_CHANGES {
+            let message = format!("too many parameters are changed; allowed at most {MOST_CHANGES}");
+            return Err(SceneError::about(key, Some(text), message));
+        }
+        self.changes.push((key.to_owned(), text.to_owned()));
+        if parameter.key.starts_with("solver.") {
+            self.resolve_preset();
+        }
+        Ok(parameter)
+    }
+
+    /// Writes a value already checked against the table; a contact value also goes to every joint that does not override
+    /// it.
+    pub(super) fn write(&mut self, parameter: &'static Parameter, value: &Value) {
+        match parameter.access {
+            Access::Contact(field) => {
+                (field.set)(&mut self.machine.contact, value);
+                let part = contact_part(parameter).unwrap_or_default();
+                let joints = self.machine.ball_joints.iter_mut().zip(&self.overrides);
+                for (joint, _) in joints.filter(|(_, overrides)| !overrides.contains(&part)) {
+                    (field.set)(&mut joint.contact, value);
+                }
+            }
+            Access::Scene(field) => (field.set)(self, value),
+            // Read with the text.
+            Access::Number => {}
+        }
+    }
+
+    /// Whatever the scene's text does not give by name follows the preset.
+    pub(super) fn apply_preset(&mut self, preset: Preset) {
+        let (method, step, tolerance) = preset.point();
+        let [method_free, step_free, tolerance_free] = SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));
+        let solver = &mut self.machine.solver;
+        solver.preset = Some(preset);
+        if method_free {
+            solver.method = method;
+        }
+        if step_free {
+            solver.step = step;
+        }
+        if tolerance_free {
+            solver.tolerance = tolerance;
+        }
+    }
+
+    /// Solver settings changed by name take precedence over a preset, in either order.
+    fn resolve_preset(&mut self) {
+        for key in SOLVER_KEYS {
+            let changed = self.changes.iter().rfind(|(changed, _)| changed == key);
+            if let (Some((_, text)), Some(parameter)) = (changed, find(key))
+                && let Ok(value) = parameter.read(text)
+            {
+                self.write(parameter, &value);
+            }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Files that a scene names: read once, when the scene is loaded, and kept in its source, so that whatever reads the scene
+//! again gets the same content.
+
+use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Component, Path};
+use std::sync::Arc;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+
+use super::Texts;
+use super::mesh::{Fault, Format, Mesh};
+
+/// Largest file that is read, bytes: a scene is a few kilobytes.
+pub const LARGEST_FILE: u64 = 4 << 20;
+/// Largest file with a mesh, and all of them together, bytes.
+pub const LARGEST_MESH: u64 = 8 << 20;
+
+/// Largest size, bytes, of the file `name` where it was chosen or dropped.
+pub fn largest_file(name: &str) -> u64 {
+    match Format::of(name) {
+        Some(_) => LARGEST_MESH,
+        None => LARGEST_FILE,
+    }
+}
+
+/// Before the content of a file that is no text, or a text that begins so itself: base64 follows.
+const ENCODED: &str = "base64:";
+
+/// What the file held that a scene keeps as `text`.
+pub fn file_bytes(text: &str) -> Cow<'_, [u8]> {
+    let decoded = text.strip_prefix(ENCODED).map(|data| BASE64.decode(data));
+    match decoded {
+        Some(Ok(bytes)) => bytes.into(),
+        _ => text.as_bytes().into(),
+    }
+}
+
+/// How a scene keeps what a file holds.
+fn kept(bytes: Vec<u8>) -> Arc<str> {
+    match String::from_utf8(bytes) {
+        Ok(text) if !text.starts_with(ENCODED) => text.into(),
+        Ok(text) => encoded(text.as_bytes()),
+        Err(fault) => encoded(fault.as_bytes()),
+    }
+}
+
+fn encoded(bytes: &[u8]) -> Arc<str> {
+    format!("{ENCODED}{}", BASE64.encode(bytes)).into()
+}
+
+/// Why a scene does not get a file that it names.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum BesideFault {
+    #[error("is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`")]
+    NotBeside,
+    #[error(
+        "this scene has no folder in which to find a file: choose or drop that file and the scene's at once, or load the scene \
+         from a disk; what the file holds can also be written into the scene itself"
+    )]
+    NoFolder,
+    #[error("this is a directory, not a file")]
+    Directory,
+    #[error("cannot read this file: {0}")]
+    Unreadable(#[from] std::io::Error),
+    #[error("too large; allowed at most {} MiB in all {files} that a scene names", .limit >> 20)]
+    TooLarge {
+        /// Bytes of all files of this kind.
+        limit: u64,
+        /// The kind.
+        files: &'static str,
+    },
+    #[error("not a text file: it is not valid UTF-8")]
+    NotText,
+    #[error("is no file with a mesh; allowed names that end in {}", Format::ENDINGS)]
+    NotMesh,
+}
+
+/// Why a file gives no mesh.
+pub(super) enum NoMesh {
+    /// It is not there, or not of a known kind.
+    Nowhere(BesideFault),
+    /// What is wrong in it, with its text if it is one.
+    Within { text: Option<Arc<str>>, fault: Fault },
+}
+
+/// What a file is for.
+#[derive(Clone, Copy)]
+enum Use {
+    Text,
+    Mesh,
+}
+
+/// Where a scene finds the files that it names, and those that it has asked for.
+#[derive(Default)]
+pub(super) struct Beside<'d> {
+    /// Folder of a scene file that is being loaded; `None` where only `known` and `given` may be used.
+    folder: Option<&'d Path>,
+    /// Read before.
+    known: Option<&'d Texts>,
+    /// Opened together with the scene, by their own names without a folder.
+    given: Option<&'d BTreeMap<String, Vec<u8>>>,
+    asked: RefCell<Texts>,
+    /// Bytes that were read for each [`Use`].
+    held: [Cell<u64>; 2],
+    /// Read from the files in `asked`.
+    meshes: RefCell<BTreeMap<String, Arc<Mesh>>>,
+}
+
+impl<'d> Beside<'d> {
+    /// Reads files in `folder`.
+    pub fn in_folder(folder: &'d Path) -> Self {
+        Self { folder: Some(folder), ..Self::default() }
+    }
+
+    /// Uses what was read before.
+    pub fn known(texts: &'d Texts) -> Self {
+        Self { known: Some(texts), ..Self::default() }
+    }
+
+    /// Uses what was `given` with the scene, and its `folder`, if it has one.
+    pub fn given(given: &'d BTreeMap<String, Vec<u8>>, folder: Option<&'d Path>) -> Self {
+        Self { folder, given: Some(given), ..Self::default() }
+    }
+
+    /// Text of the file `name`.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn text(&self, name: &str) -> Result<Arc<str>, BesideFault> {
+        let text = self.content(name, Use::Text)?;
+        if text.starts_with(ENCODED) {
+            return Err(BesideFault::NotText);
+        }
+        Ok(text)
+    }
+
+    /// Triangles of the file `name`.
+    ///
+    /// # Errors
+    /// Why there are none.
+    pub fn mesh(&self, name: &str) -> Result<Arc<Mesh>, NoMesh> {
+        if let Some(mesh) = self.meshes.borrow().get(name) {
+            return Ok(mesh.clone());
+        }
+        let format = Format::of(name).ok_or(NoMesh::Nowhere(BesideFault::NotMesh))?;
+        let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
+        // A file that this one names lies beside it.
+        let other = |other: &str| {
+            let other = Path::new(name).with_file_name(other);
+            let text = self.content(&other.to_string_lossy(), Use::Mesh)?;
+            Ok(file_bytes(&text).into_owned())
+        };
+        let mesh = format.read(&file_bytes(&text), &other);
+        let mesh = mesh.map_err(|fault| NoMesh::Within {
+            text: Some(text.clone()).filter(|text| !text.starts_with(ENCODED)),
+            fault,
+        })?;
+        let mesh = Arc::new(mesh);
+        let mut meshes = self.meshes.borrow_mut();
+        meshes.insert(name.to_owned(), mesh.clone());
+        Ok(mesh)
+    }
+
+    /// What the file `name` holds, as it is kept.
+    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, BesideFault> {
+        let found = self.asked.borrow().get(name).cloned();
+        let found = found.or_else(|| self.known?.get(name).cloned());
+        let text = match found {
+            Some(text) => text,
+            None => self.read(name, what)?,
+        };
+        let mut asked = self.asked.borrow_mut();
+        asked.insert(name.to_owned(), text.clone());
+        Ok(text)
+    }
+
+    /// All texts that the scene asked for.
+    pub fn into_texts(self) -> Texts {
+        self.asked.into_inner()
+    }
+
+    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, BesideFault> {
+        let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
+        if name.is_empty() || !Path::new(name).components().all(plain) {
+            return Err(BesideFault::NotBeside);
+        }
+        let (limit, files) = match what {
+            Use::Text => (LARGEST_FILE, "files"),
+            Use::Mesh => (LARGEST_MESH, "meshes"),
+        };
+        let held = &self.held[what as usize];
+        let room = limit.saturating_sub(held.get());
+        // One byte more than allowed: a pipe or a device does not report its size.
+        let bytes = self.bytes(Path::new(name), room + 1)?;
+        if bytes.len() as u64 > room {
+            return Err(BesideFault::TooLarge { limit, files });
+        }
+        held.set(held.get() + bytes.len() as u64);
+        Ok(kept(bytes))
+    }
+
+    /// The first `most` bytes of the file `name`.
+    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, BesideFault> {
+        let path = self.folder.map(|folder| folder.join(name));
+        // Only names come with a file that was dropped on a page.
+        let given = name.file_name().and_then(|own| self.given?.get(own.to_str()?));
+        match (given, path) {
+            (Some(bytes), path) if !path.as_ref().is_some_and(|path| path.exists()) => {
+                let most = bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX));
+                Ok(bytes[..most].to_vec())
+            }
+            (_, Some(path)) if path.is_dir() => Err(BesideFault::Directory),
+            (_, Some(path)) => {
+                let mut bytes = Vec::new();
+                let file = std::fs::File::open(path)?;
+                file.take(most).read_to_end(&mut bytes)?;
+                Ok(bytes)
+            }
+            (_, None) => Err(BesideFault::NoFolder),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_gives_back_the_bytes() {
+        for bytes in [&b"v 1 2 3"[..], b"base64:AAAA", b"base64:", b"", b"\xff\x00solid"] {
+            let text = kept(bytes.to_vec());
+            assert_eq!(&*file_bytes(&text), bytes);
+        }
+        assert_eq!(&*kept(b"plain".to_vec()), "plain");
+    }
+}

@@ -1,0 +1,150 @@
+//! Which key of a scene is to blame for an inconsistency.
+
+use super::error::{line_text, place_of};
+use super::*;
+use jointplay_physics::machine::ContactConflict;
+use jointplay_physics::mechanism::{CostOf, MechanismError};
+use jointplay_physics::simulate::StartError;
+
+impl Scene {
+    /// Why its machine cannot start, with the line of the file and the change that it concerns.
+    pub fn locate(&self, error: &StartError) -> SceneError {
+        let one = |joint: &str, parts: &[&str]| {
+            let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
+            for part in parts {
+                keys.push(format!("contact.{part}"));
+                keys.push(format!("joint.{joint}.{part}"));
+            }
+            (format!("joint.{joint}"), keys)
+        };
+        let (title, keys) = match &error.0 {
+            MechanismError::Unreachable(_) | MechanismError::OtherBranch | MechanismError::Singular => {
+                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
+            }
+            MechanismError::Open { given: gap }
+            | MechanismError::NoClosure { given: gap, .. }
+            | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
+            MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
+            MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
+                let keys = ["solver.method", "chain.links", "formulation"];
+                let of_form = matches!(error.0, MechanismError::TooCostly { of: CostOf::Formulation(_), .. });
+                let title = if of_form { keys[2] } else { keys[0] };
+                (title.to_owned(), keys.map(str::to_owned).to_vec())
+            }
+            MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
+        };
+        self.start_error(&title, &keys, error.to_string())
+    }
+
+    /// An error found when the scene starts, about `title` (see [`Source::places`]): it points to that line of the file,
+    /// and names the latest change whose key is among `keys` or, for those ending in a dot, begins with one.
+    fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
+        let concerns =
+            |changed: &str| keys.iter().any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)));
+        let change = self.changes.iter().rfind(|(changed, _)| concerns(changed));
+        let at = self.source.places.get(title);
+        let place = at.map(|&at| place_of(&self.source.text, at));
+        let mut error = match change {
+            Some((key, value)) => SceneError::about(key, Some(value), message),
+            None => SceneError::about(title, None, message),
+        };
+        error.file.clone_from(&self.source.file);
+        // A built-in scene has no file to look at: a change that explains the error is enough.
+        if self.source.file.is_some() || change.is_none() {
+            error.position = place;
+            error.line_text = place.and_then(|(line, _)| line_text(&self.source.text, line));
+        }
+        error
+    }
+}
+
+impl Scene {
+    /// Keys that could be at fault, the likelier first.
+    pub(super) fn keys_of(&self, conflict: &ContactConflict) -> Vec<String> {
+        let key = |part| match conflict.joint {
+            Some(joint) if self.overrides[joint].contains(&part) => {
+                format!("joint.{}.{part}", self.machine.ball_joints[joint].name)
+            }
+            _ => format!("contact.{part}"),
+        };
+        let mut keys: Vec<String> = conflict.fault.parts().into_iter().map(key).collect();
+        // A joint's own setting is likelier at fault than the general one.
+        keys.sort_by_key(|key| !key.starts_with("joint."));
+        keys
+    }
+
+    fn conflict_text(&self, conflict: &ContactConflict, key: &str) -> String {
+        match conflict.joint.map(|index| &self.machine.ball_joints[index].name) {
+            Some(name) if !key.starts_with("joint.") => {
+                format!("{} (in ball joint {name})", conflict.fault)
+            }
+            _ => conflict.fault.to_string(),
+        }
+    }
+
+    /// The error for the change of `key` that introduced the conflict.
+    pub(super) fn blame_change(&self, conflict: &ContactConflict, key: &str) -> SceneError {
+        let value = self.changes.iter().rfind(|(changed, _)| changed == key).map(|(_, value)| value.as_str());
+        SceneError::about(key, value, self.conflict_text(conflict, key))
+    }
+
+    /// The error for the latest change related to the conflict; `None` if it was in the file.
+    pub(super) fn blame_changes(&self, conflict: &ContactConflict) -> Option<SceneError> {
+        let keys = self.keys_of(conflict);
+        let (key, _) = self.changes.iter().rfind(|(changed, _)| keys.contains(changed))?;
+        Some(self.blame_change(conflict, key))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::built_in_text;
+    use super::*;
+    use jointplay_physics::simulate::{Frame, Simulation};
+
+    fn start_error(text: &str, changes: &[(&str, &str)]) -> SceneError {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        let scene = Scene::parse(text, Some("mine.toml"), &changes).expect("reads");
+        let error = Simulation::new(&scene.machine).err().expect("cannot start");
+        scene.locate(&error)
+    }
+
+    #[test]
+    fn a_start_error_points_to_its_line_and_names_the_change() {
+        let text = built_in_text("spcmm").expect("built in");
+        let line_of = |text: &str, what: &str| {
+            let at = text.lines().position(|line| line == what);
+            at.map(|at| at as u32 + 1)
+        };
+        let far = text.replace("amplitude_x = \"25 mm\"", "amplitude_x = \"200 mm\"");
+        let error = start_error(&far, &[]);
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[spcmm]"));
+        assert_eq!(error.line_text.as_deref(), Some("[spcmm]"));
+        let error = start_error(text, &[("spcmm.amplitude_x", "200 mm")]);
+        assert_eq!(error.key.as_deref(), Some("spcmm.amplitude_x"));
+        assert!(error.to_string().starts_with("mine.toml:"), "{error}");
+
+        let text = built_in_text("slider-crank").expect("built in");
+        let open = text.replace("at = \"0 0 80 mm\"", "at = \"0 0 380 mm\"");
+        let error = start_error(&open, &[]);
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[[ball_joint]]"));
+        assert!(error.to_string().contains("ball joint B"), "{error}");
+    }
+
+    #[test]
+    fn values_as_given_are_not_turned_to_the_closed_form() {
+        let text = built_in_text("spcmm").expect("built in");
+        let given = text
+            .replace("start = \"ideal\"", "start = \"as-given\"")
+            .replace("0.4106585548949 rad", "0.4111585548949 rad");
+        let scene = Scene::parse(&given, None, &[]).expect("reads");
+        let mut simulation = Simulation::new(&scene.machine).expect("starts");
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        let eccentricities = frame.joints.iter().map(|joint| joint.eccentricity.norm());
+        let most = eccentricities.fold(0.0, f64::max);
+        // Half a milliradian at the end of a rod of 200 mm.
+        assert!((most / 0.1e-3 - 1.0).abs() < 0.01, "{most}");
+    }
+}

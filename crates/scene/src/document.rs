@@ -1,0 +1,623 @@
+//! TOML with positions: every value knows its key, line and column, so that every error can name them.
+
+use super::beside::Beside;
+use super::copy::Copy as PatternCopy;
+use super::error::place_of;
+use super::given::{FileNumber, Place};
+use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
+use super::parameters::{Kind, ValueFault};
+use super::reading::Reading;
+use super::visible::visible_line;
+use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
+use jointplay_physics::suggest::{brief, nearest};
+use jointplay_physics::units::{all_units, same_unit, split_unit};
+use jointplay_physics::words::Words;
+use std::borrow::Cow;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The text being read, its name in errors, and what its values may refer to.
+#[derive(Clone, Copy)]
+pub(super) struct Document<'d> {
+    pub file: Option<&'d str>,
+    pub text: &'d str,
+    pub reading: &'d Reading<'d>,
+    /// Whether another file includes it.
+    pub included: bool,
+    /// The copy of a pattern that the values belong to.
+    pub copy: Option<&'d PatternCopy>,
+    /// Whether the values belong to a hinge, where some have other dimensions.
+    pub on_hinge: bool,
+    /// Files that it names.
+    pub beside: &'d Beside<'d>,
+}
+
+/// A table with the path of its keys.
+#[derive(Clone)]
+pub(super) struct Section<'d> {
+    pub document: Document<'d>,
+    pub path: String,
+    pub table: &'d DeTable<'d>,
+    pub span: Range<usize>,
+    /// Which keys it may have.
+    pub rows: &'static FileTable,
+    /// Its variant.
+    pub word: Option<&'static str>,
+}
+
+/// A value with its key.
+#[derive(Clone)]
+pub(super) struct Node<'d> {
+    pub document: Document<'d>,
+    pub key: String,
+    /// Row of the key; of an entry of a list, that of the list.
+    pub row: &'static FileKey,
+    pub value: &'d Spanned<DeValue<'d>>,
+    /// Where the text gives a value, and whether it is not this one: a change came after it.
+    written: Option<Range<usize>>,
+    changed: bool,
+}
+
+impl<'d> Document<'d> {
+    /// Its text as TOML.
+    ///
+    /// # Errors
+    /// Where it is none.
+    pub fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
+        DeTable::parse(self.text).map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            let from = self.text[..span.start].rfind('\n').map_or(0, |at| at + 1);
+            let line = self.text[from..].lines().next().unwrap_or_default();
+            let message = match unquoted(line) {
+                Some(quantity) => format!("a number with a unit is a text: \"{quantity}\", in quotes"),
+                None => format!("not valid TOML: {}", error.message()),
+            };
+            self.error(span, "", None, message)
+        })
+    }
+
+    /// An error at a position in the text.
+    pub fn error(&self, span: Range<usize>, key: &str, value: Option<&str>, message: impl Into<String>) -> SceneError {
+        let key = Some(key).filter(|key| !key.is_empty());
+        SceneError::in_text(self.file, self.text, span.start, key, value, message)
+    }
+
+    /// The text of a value, truncated to fit on a line.
+    pub fn excerpt(&self, span: Range<usize>) -> String {
+        brief(self.text.get(span).unwrap_or(""))
+    }
+}
+
+/// A number with a unit that `line` gives as a value without quotes.
+fn unquoted(line: &str) -> Option<&str> {
+    let value = line.split_once('=')?.1.split('#').next()?.trim();
+    let (unit, number) = (split_unit(value), value.trim_end_matches(split_unit(value)));
+    let known = all_units().any(|(of, ..)| same_unit(of, unit));
+    (!unit.is_empty() && known && number.trim().parse::<f64>().is_ok()).then_some(value)
+}
+
+impl<'d> Section<'d> {
+    /// A table of the file; `rows` says which keys it may have.
+    ///
+    /// # Errors
+    /// The word that selects its variant is missing or wrong, or another key does not belong there.
+    pub fn new(
+        document: Document<'d>,
+        path: String,
+        table: &'d DeTable<'d>,
+        span: Range<usize>,
+        rows: &'static FileTable,
+    ) -> Result<Self, SceneError> {
+        let mut section = Self { document, path, table, span, rows, word: None };
+        // First of all: a word may decide which other keys there are.
+        for key in rows.keys {
+            if let (Takes::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
+                let word = node.choice()?;
+                if matches!(rows.variants, Some(Variants::Word(by, _)) if by == key.name) {
+                    section.word = Some(word);
+                }
+            }
+        }
+        if let Some(Variants::Presence(words)) = rows.variants {
+            let mut given = words.iter().filter(|word| section.get(word).is_some());
+            section.word = given.next().copied().filter(|_| given.next().is_none());
+        }
+        let known: Vec<&str> = rows.of(section.word).map(|key| key.name).collect();
+        let unknown = table
+            .iter()
+            .filter(|(key, _)| !known.contains(&key.get_ref().as_ref()))
+            .min_by_key(|(key, _)| key.span().start);
+        if let Some((key, _)) = unknown {
+            return Err(section.foreign(key, &known));
+        }
+        if let (Some(Variants::Word(by, _)), None) = (rows.variants, section.word) {
+            section.require(by)?;
+        }
+        Ok(section)
+    }
+
+    /// The error for a key that is not among the `known` ones.
+    fn foreign(&self, key: &Spanned<Cow<'_, str>>, known: &[&str]) -> SceneError {
+        let name = key.get_ref();
+        if let (Some(Variants::Word(_, one)), Some(word)) = (self.rows.variants, self.word)
+            && let (false, Some(node)) = (one.is_empty(), self.find(name))
+        {
+            let own = self.rows.of(self.word).filter(|key| !key.of.is_empty());
+            let own: Vec<&str> = own.map(|key| key.name).collect();
+            let rows = self.rows.keys.iter().filter(|key| key.name == name);
+            let words: Vec<&str> = rows.flat_map(|key| key.of).copied().collect();
+            let (one, its) = (one.replace("{}", word), one.replace("{}", &words.join(" or ")));
+            return node.error(format!("not allowed here: a {one} has {}; a {its} has `{name}`", own.join(", ")));
+        }
+        let near = nearest(name, known.iter().copied());
+        let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
+        let document = self.document;
+        document.error(key.span(), &self.key(name), None, message)
+    }
+
+    /// Full path of a key in this table.
+    pub fn key(&self, name: &str) -> String {
+        if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
+    }
+
+    /// An optional value.
+    pub fn get(&self, name: &str) -> Option<Node<'d>> {
+        debug_assert!(self.rows.key(name, None).is_some(), "no row for `{name}` in the table `{}`", self.rows.name);
+        self.find(name)
+    }
+
+    /// The value of a key, if it is there and has a row.
+    fn find(&self, name: &str) -> Option<Node<'d>> {
+        let row = self.rows.key(name, self.word)?;
+        Node::new(self.document, self.key(name), row, self.table.get(name))
+    }
+
+    /// A required value.
+    pub fn require(&self, name: &str) -> Result<Node<'d>, SceneError> {
+        self.get(name).ok_or_else(|| {
+            let row = self.rows.key(name, self.word);
+            let like = row.map_or("", |row| row.like(self.document.on_hinge));
+            self.error(name, format!("missing; write for example `{name} = {like}`"))
+        })
+    }
+
+    /// What the row of a key gives where it is left out, if that is a number.
+    fn default(&self, name: &str) -> Option<f64> {
+        match self.rows.key(name, self.word)?.absent {
+            Absent::Is(number) => Some(number),
+            _ => None,
+        }
+    }
+
+    /// A number as its row says, SI.
+    pub fn number(&self, name: &str) -> Result<f64, SceneError> {
+        match (self.get(name), self.default(name)) {
+            (None, Some(default)) => Ok(default),
+            _ => self.require(name)?.number(),
+        }
+    }
+
+    /// A vector as its row says, SI.
+    pub fn vector(&self, name: &str) -> Result<Vec3, SceneError> {
+        match (self.get(name), self.default(name)) {
+            (None, Some(default)) => Ok(Vec3::repeat(default)),
+            _ => self.require(name)?.vector(),
+        }
+    }
+
+    /// Byte offset of this table in the text.
+    pub fn place(&self) -> usize {
+        self.span.start
+    }
+
+    /// An error about this table as a whole, or about a missing key.
+    pub fn error(&self, name: &str, message: impl Into<String>) -> SceneError {
+        let key = if name.is_empty() { self.path.clone() } else { self.key(name) };
+        self.document.error(self.span.clone(), &key, None, message)
+    }
+
+    /// Rejects a key that makes no sense here.
+    pub fn refuse(&self, name: &str, why: &str) -> Result<(), SceneError> {
+        self.get(name).map_or(Ok(()), |node| Err(node.error(format!("not allowed here: {why}"))))
+    }
+}
+
+impl<'d> Node<'d> {
+    /// What `key` stands for: its change if there is one, else the value in the text, if any.
+    fn new(
+        document: Document<'d>,
+        key: String,
+        row: &'static FileKey,
+        written: Option<&'d Spanned<DeValue<'d>>>,
+    ) -> Option<Self> {
+        let change = document.reading.change(&key);
+        Some(Self {
+            document,
+            key,
+            row,
+            value: change.or(written)?,
+            written: written.map(Spanned::span),
+            changed: change.is_some(),
+        })
+    }
+
+    /// The same value under another key.
+    pub fn retitled(&self, key: String) -> Self {
+        let written = self.written.is_some().then_some(self.value);
+        Self::new(self.document, key, self.row, written).unwrap_or_else(|| self.clone())
+    }
+
+    /// Byte offset of this value in the text.
+    pub fn place(&self) -> usize {
+        self.value.span().start
+    }
+
+    /// An error about this value.
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
+        if self.changed {
+            let value = self.scalar().unwrap_or_default();
+            return SceneError::about(&self.key, Some(&brief(value)), message);
+        }
+        let span = self.value.span();
+        self.document.error(span.clone(), &self.key, Some(&self.document.excerpt(span)), message)
+    }
+
+    /// The error that this names another `what` by the `name` that `first` has given to one.
+    pub fn repeats(&self, first: &Self, what: &str, name: &str) -> SceneError {
+        let (line, _) = place_of(first.document.text, first.place());
+        let file = first.document.file.filter(|_| first.document.file != self.document.file);
+        let of_file = file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
+        self.error(format!(
+            "there is already a {what} of this name, in line {line}{of_file}; names must differ, for example `{name}2`"
+        ))
+    }
+
+    fn wrong_type(&self, wanted: &str) -> SceneError {
+        self.error(format!(
+            "must be {wanted}, not {} {}",
+            article(self.value.get_ref()),
+            self.value.get_ref().type_str()
+        ))
+    }
+
+    /// A number or a text, as written.
+    pub fn scalar(&self) -> Result<&'d str, SceneError> {
+        match self.value.get_ref() {
+            DeValue::String(text) => Ok(text),
+            DeValue::Float(number) => Ok(number.as_str()),
+            DeValue::Integer(number) if number.radix() == 10 => Ok(number.as_str()),
+            _ => Err(self.wrong_type("a number or a text")),
+        }
+    }
+
+    /// A text.
+    pub fn text(&self) -> Result<&'d str, SceneError> {
+        self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a text in quotes"))
+    }
+
+    /// A boolean.
+    pub fn flag(&self) -> Result<bool, SceneError> {
+        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
+    }
+
+    /// A finite quantity, SI: a number with its unit, or an expression. From now on it is a number of the scene, under this key.
+    pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
+        let place = self.place_of(Place::Value);
+        self.evaluated(self.scalar()?, dimension, place)
+    }
+
+    /// Where the scene's text gives this value.
+    fn place_of(&self, here: fn(Range<usize>) -> Place) -> Place {
+        match &self.written {
+            _ if self.document.included => Place::Included,
+            Some(written) => here(written.clone()),
+            None => Place::Absent,
+        }
+    }
+
+    /// The quantity `text`, at `place`, as [`Self::quantity`].
+    fn evaluated(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
+        let reading = self.document.reading;
+        let value =
+            reading.evaluate(text, dimension, self.document.copy).map_err(|error| self.error(error.to_string()))?;
+        self.limit(value, dimension)?;
+        reading.record(&self.key, FileNumber::new(value, dimension, place, text));
+        Ok(value)
+    }
+
+    /// Rejects values beyond any mechanism, before their squares overflow in the equations of motion.
+    fn limit(&self, value: f64, dimension: Dimension) -> Result<(), SceneError> {
+        let moves = !matches!(
+            dimension,
+            Dimension::Mass
+                | Dimension::Density
+                | Dimension::Inertia
+                | Dimension::Stress
+                | Dimension::Force
+                | Dimension::Torque
+                | Dimension::Stiffness
+                | Dimension::Damping
+                | Dimension::TurningStiffness
+                | Dimension::TurningDamping
+        );
+        if moves && value.abs() > MAX_SI {
+            let limit = format_quantity(MAX_SI, si_unit(dimension));
+            return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
+        }
+        Ok(())
+    }
+
+    /// A number as its row says: a quantity of its dimension, in its range, SI.
+    pub fn number(&self) -> Result<f64, SceneError> {
+        self.within(self.dimension(), self.row.range())
+    }
+
+    /// A quantity in a closed range, SI.
+    pub fn within(&self, dimension: Dimension, (least, most): (f64, f64)) -> Result<f64, SceneError> {
+        let value = self.quantity(dimension)?;
+        if (least..=most).contains(&value) {
+            return Ok(value);
+        }
+        let unit = si_unit(dimension);
+        let mut allowed = match format_quantity(most, unit) {
+            top if least == ABOVE_ZERO => format!("out of range; allowed above 0 up to {top}"),
+            top => {
+                let bottom = format_quantity(least, unit);
+                format!("out of range; allowed {bottom} to {top}")
+            }
+        };
+        if !unit.is_empty() {
+            allowed += &format!("; units {}", unit_names(dimension).join(", "));
+        }
+        Err(self.error(allowed))
+    }
+
+    /// An example of a value, by its row.
+    pub fn like(&self) -> &'static str {
+        self.row.like(self.document.on_hinge)
+    }
+
+    /// Dimension of its numbers, by its row.
+    pub fn dimension(&self) -> Dimension {
+        let dimension = self.row.dimension(self.document.on_hinge);
+        dimension.unwrap_or(Dimension::None)
+    }
+
+    /// A whole number as its row says.
+    pub fn whole(&self) -> Result<u32, SceneError> {
+        let (least, most) = match self.row.takes {
+            Takes::Whole(least, most) => (least, most),
+            _ => (0, u32::MAX),
+        };
+        match self.scalar()?.parse() {
+            Ok(number) if (least..=most).contains(&number) => Ok(number),
+            _ => Err(self.error(format!("out of range; allowed {least} to {most}; a whole number, no unit"))),
+        }
+    }
+
+    /// One of the words of its row.
+    pub fn choice(&self) -> Result<&'static str, SceneError> {
+        let words = match self.row.takes {
+            Takes::Word(words) | Takes::Words(words, _) => words,
+            _ => &[],
+        };
+        let text = self.text()?;
+        let found = words.iter().copied().find(|word| *word == text);
+        found.ok_or_else(|| {
+            let near = nearest(text, words.iter().copied());
+            self.error(format!("is not one of the choices{near}; allowed {}", words.join(", ")))
+        })
+    }
+
+    /// One of an enum's words, which are those of its row.
+    pub fn word<T: Words>(&self) -> Result<T, SceneError> {
+        let word = self.choice()?;
+        Ok(T::of_word(word).expect("the row has the words of the enum"))
+    }
+
+    /// A name: letters, digits, `_` and `-`, as keys and column names are built from it; in a copy of a pattern, numbered.
+    pub fn name(&self) -> Result<Cow<'d, str>, SceneError> {
+        let name = self.text()?;
+        let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+        if !name.is_empty() && name.len() <= 40 && name.chars().all(fine) {
+            return Ok(self.numbered(name));
+        }
+        Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
+    }
+
+    /// The name of a body: in a copy of a pattern that has this body, that of the copy.
+    pub fn body(&self) -> Result<Cow<'d, str>, SceneError> {
+        let name = self.text()?;
+        let copy = self.document.copy;
+        Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.body(name)))
+    }
+
+    /// The name of a joint, as [`Self::body`].
+    pub fn joint(&self) -> Result<Cow<'d, str>, SceneError> {
+        let name = self.text()?;
+        let copy = self.document.copy;
+        Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.joint(name)))
+    }
+
+    fn numbered(&self, name: &'d str) -> Cow<'d, str> {
+        match self.document.copy {
+            Some(copy) => Cow::Owned(copy.name(name)),
+            None => Cow::Borrowed(name),
+        }
+    }
+
+    /// The entries of a list, as many as its row allows. As [`Self::elements`].
+    pub fn entries(&self) -> Result<Vec<Node<'d>>, SceneError> {
+        let elements = self.elements()?;
+        let Some(Many { most, what }) = self.row.many() else {
+            return Ok(elements);
+        };
+        match elements.get(most) {
+            None => Ok(elements),
+            Some(first) => Err(self.document.error(
+                first.value.span(),
+                &first.key,
+                None,
+                format!("too many: {} {what}; allowed at most {most}", elements.len()),
+            )),
+        }
+    }
+
+    /// The elements of an array, keyed `key[0]`, `key[1]`, …
+    pub fn elements(&self) -> Result<Vec<Node<'d>>, SceneError> {
+        let array = self.value.get_ref().as_array().ok_or_else(|| self.wrong_type("an array"))?;
+        let node = |(index, value)| {
+            let key = format!("{}[{index}]", self.key);
+            Node::new(self.document, key, self.row, Some(value))
+        };
+        Ok(array.iter().enumerate().filter_map(node).collect())
+    }
+
+    /// N quantities: `["1 mm", 0, "3 mm"]`, or with a common unit, `"1 0 3 mm"`. Each is a number of the scene, with the letter
+    /// of its component for its key where there are three or four.
+    pub fn quantities<const N: usize>(&self, dimension: Dimension) -> Result<[f64; N], SceneError> {
+        let letters = match N {
+            3 => "xyz",
+            4 => "wxyz",
+            _ => "",
+        };
+        let key = |index: usize| match letters.get(index..=index) {
+            Some(letter) => format!("{}.{letter}", self.key),
+            None => format!("{}[{index}]", self.key),
+        };
+        let mut values = [0.0; N];
+        if let Some(text) = self.value.get_ref().as_str() {
+            let words: Vec<&str> = text.split_whitespace().collect();
+            let count = words.iter().take_while(|word| word.parse::<f64>().is_ok()).count();
+            if count != N {
+                return Err(self.error(format!("needs {N} numbers, then one unit for all; has {count} numbers")));
+            }
+            let (numbers, unit) = words.split_at(N);
+            let unit = unit.join(" ");
+            for (index, (value, number)) in values.iter_mut().zip(numbers).enumerate() {
+                let part = Node::new(self.document, key(index), self.row, Some(self.value));
+                let part = part.expect("there is a value");
+                let place = self.place_of(Place::Part);
+                *value = if part.changed {
+                    part.evaluated(part.scalar()?, dimension, place)?
+                } else {
+                    part.evaluated(&format!("{number} {unit}"), dimension, place)?
+                };
+            }
+            return Ok(values);
+        }
+        let elements = self.elements()?;
+        if elements.len() != N {
+            return Err(self.error(format!("needs {N} values, has {}", elements.len())));
+        }
+        for (index, (value, element)) in values.iter_mut().zip(&elements).enumerate() {
+            let part = Node::new(self.document, key(index), self.row, Some(element.value));
+            *value = part.expect("there is a value").quantity(dimension)?;
+        }
+        Ok(values)
+    }
+
+    /// Numbers as its row says, SI.
+    pub fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
+        self.quantities(self.dimension())
+    }
+
+    /// A vector as its row says, SI.
+    pub fn vector(&self) -> Result<Vec3, SceneError> {
+        let vector = Vec3::from(self.numbers::<3>()?);
+        let (least, most) = self.row.range();
+        if vector.min() >= least && vector.max() <= most {
+            return Ok(vector);
+        }
+        let [least, most] = [least, most].map(|at| format_quantity(at, si_unit(self.dimension())));
+        Err(self.error(format!("out of range; allowed {least} to {most}")))
+    }
+
+    /// A direction, normalised.
+    pub fn direction(&self) -> Result<Vec3, SceneError> {
+        let vector = Vec3::from(self.quantities::<3>(Dimension::None)?);
+        // Scaled first: squares of huge or tiny components would leave the range of f64.
+        let size = vector.amax();
+        if size > 0.0 { Ok((vector / size).normalize()) } else { Err(self.error("a direction must not be zero")) }
+    }
+
+    /// A table as its row says.
+    pub fn section(&self) -> Result<Section<'d>, SceneError> {
+        self.section_as(self.key.clone())
+    }
+
+    /// As [`Self::section`], with a different path for its keys.
+    pub fn section_as(&self, path: String) -> Result<Section<'d>, SceneError> {
+        let rows = self.row.table().expect("a row that takes tables");
+        let table = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        Section::new(self.document, path, table, self.value.span(), rows)
+    }
+
+    /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.
+    pub fn title(&self, prefix: &str) -> String {
+        let name = self.value.get_ref().get("name").and_then(|name| name.get_ref().as_str());
+        let title = |name| format!("{prefix}.{}", self.numbered(name));
+        name.map_or_else(|| self.key.clone(), title)
+    }
+
+    /// A parameter's value, read and checked against its row of the table.
+    pub fn parameter(&self) -> Result<super::Value, SceneError> {
+        let parameter = match self.row.takes {
+            Takes::Parameter(key) => find(key),
+            _ => None,
+        };
+        let parameter = parameter.expect("a row of a parameter");
+        // A count or a pure number may be written bare; text and bare numbers read alike.
+        let text = self.scalar()?;
+        let (read, Kind::Number { dimension, .. }) = (parameter.read(text), parameter.kind) else {
+            let read = parameter.read(text);
+            return read.map_err(|error| self.error(error.to_string()));
+        };
+        match read {
+            Err(error) if matches!(error.fault, ValueFault::Quantity(_)) => {
+                // No quantity: an expression, perhaps.
+                let value = self.document.reading.evaluate(text, dimension, self.document.copy);
+                let value = value.map_err(|why| self.error(format!("{why}; {}", error.allowed)))?;
+                let value = super::Value::Number(value);
+                let checked = parameter.check(&value);
+                checked.map_err(|error| self.error(error.to_string()))?;
+                Ok(value)
+            }
+            read => read.map_err(|error| self.error(error.to_string())),
+        }
+    }
+}
+
+/// Entries of the list `name` of all `files`, and `more` of other origin, as many as the row of the list allows.
+///
+/// # Errors
+/// No list, or too many entries.
+pub(super) fn lists<'d>(files: &[Section<'d>], name: &str, more: Vec<Node<'d>>) -> Result<Vec<Node<'d>>, SceneError> {
+    let mut nodes = Vec::new();
+    for file in files {
+        if let Some(list) = file.get(name) {
+            let first = nodes.len();
+            nodes.extend(list.entries()?);
+            // Counted through all files.
+            for (index, node) in nodes.iter_mut().enumerate().skip(first) {
+                node.key = format!("{name}[{index}]");
+            }
+        }
+    }
+    nodes.extend(more);
+    let Some(Many { most, what }) = nodes.first().and_then(|node| node.row.many()) else {
+        return Ok(nodes);
+    };
+    match nodes.get(most) {
+        None => Ok(nodes),
+        Some(first) => Err(first.error(format!(
+            "too many: {} {what} with those of patterns and included files; allowed at most {most}",
+            nodes.len()
+        ))),
+    }
+}
+
+fn article(value: &DeValue<'_>) -> &'static str {
+    if value.is_integer() || value.is_array() { "an" } else { "a" }
+}

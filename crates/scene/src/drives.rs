@@ -1,0 +1,275 @@
+//! Laws of driven joints: one row per law, from which `drive` is read. The motion they prescribe is in `mechanism/drives`.
+
+use super::document::{Node, Section};
+use super::formula::read_formula;
+use super::key::{FileKey, FileTable, MAX_SI, Takes, Variants, key, many, number, positive};
+use super::points::{Graph, MOST_POINTS, SHORTEST_PART, read_file, read_points};
+use super::*;
+use std::sync::LazyLock;
+
+/// Highest frequency of a harmonic drive, Hz.
+pub(super) const FASTEST_DRIVE: f64 = 1e4;
+/// Why the law spcmm drives nothing but a slide.
+pub(super) const SLIDERS_ONLY: &str = "the law spcmm drives prismatic joints only";
+/// Most terms of a sum of harmonics.
+const MOST_TERMS: usize = 100;
+
+const fn place(name: &'static str, help: &'static str) -> FileKey {
+    key(name, number(Dimension::Length), "\"10 mm\"", help).on_hinge(Dimension::Angle, "\"10 deg\"")
+}
+
+const MEAN: FileKey = place("mean", "mean").zero();
+
+/// Amplitude, frequency and phase of a harmonic.
+const TERM: [FileKey; 3] = [
+    place("amplitude", "amplitude"),
+    key("frequency", positive(Dimension::Frequency, FASTEST_DRIVE), "\"1 Hz\"", "frequency"),
+    key("phase", number(Dimension::Angle), "\"90 deg\"", "phase at t = 0").zero(),
+];
+
+static TERMS: FileTable = FileTable::new("term", "a term", "a harmonic of a sum", &TERM);
+
+const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it begins").zero();
+
+const DURATION: FileKey =
+    key("duration", Takes::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
+
+/// A law of driven joints in a scene file.
+#[derive(Debug)]
+pub struct DriveLaw {
+    /// Word of the file: `law = "harmonic"`.
+    pub word: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Its keys.
+    pub keys: &'static [FileKey],
+}
+
+/// Every law of a drive. On a hinge lengths are angles, and speeds angular speeds.
+pub static DRIVE_LAWS: [DriveLaw; 8] = [
+    DriveLaw {
+        word: "spcmm",
+        help: "slider of the paper's machine; places the joint itself",
+        keys: &[key(
+            "slider",
+            Takes::Whole(1, 3),
+            "1",
+            "which slider: 1, 2 or 3",
+        )],
+    },
+    DriveLaw {
+        word: "constant",
+        help: "position + velocity t",
+        keys: &[
+            place("position", "where it is at t = 0").zero(),
+            key(
+                "velocity",
+                number(Dimension::Speed),
+                "\"10 mm/s\"",
+                "its rate",
+            )
+            .on_hinge(Dimension::AngularSpeed, "\"6 rad/s\""),
+        ],
+    },
+    DriveLaw {
+        word: "harmonic",
+        help: "mean + amplitude sin(2π frequency t + phase)",
+        keys: &[MEAN, TERM[0], TERM[1], TERM[2]],
+    },
+    DriveLaw {
+        word: "harmonics",
+        help: "mean + a sum of harmonics",
+        keys: &[
+            MEAN,
+            key(
+                "terms",
+                Takes::List(&TERMS, many(MOST_TERMS, "terms")),
+                "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]",
+                "the harmonics",
+            )
+            .on_hinge(
+                Dimension::Angle,
+                "[{ amplitude = \"10 deg\", frequency = \"1 Hz\" }]",
+            ),
+        ],
+    },
+    DriveLaw {
+        word: "ramp",
+        help: "from one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s³ - 15 s⁴ + 6 s⁵), \
+               whose rate and acceleration are 0 at both ends",
+        keys: &[
+            place("from", "where it is before").zero(),
+            place("to", "where it is afterwards"),
+            START,
+            DURATION,
+        ],
+    },
+    DriveLaw {
+        word: "pulse",
+        help: "one bump: with s from 0 to 1 over the duration, base + height sin³(π s)",
+        keys: &[
+            place("base", "where it is before and afterwards").zero(),
+            place("height", "height of the bump above it"),
+            START,
+            DURATION,
+        ],
+    },
+    DriveLaw {
+        word: "table",
+        help: "cubic spline through points",
+        keys: &[
+            key(
+                "points",
+                Takes::Pairs(
+                    [Dimension::Time, Dimension::Length],
+                    many(MOST_POINTS, "points"),
+                ),
+                "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
+                "time and position, in the order of time, at least two",
+            )
+            .on_hinge(
+                Dimension::Angle,
+                "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]",
+            )
+            .or("file"),
+            key(
+                "file",
+                Takes::File,
+                "\"bump.csv\"",
+                "the points: two columns under a header with units, `time_s,position_mm`",
+            )
+            .or("points"),
+            key(
+                "repeat",
+                Takes::Flag,
+                "true",
+                "whether the points are one period of the motion",
+            )
+            .absent("false"),
+        ],
+    },
+    DriveLaw {
+        word: "formula",
+        help: "an expression of the time t in s, see below",
+        keys: &[
+            key(
+                "formula",
+                Takes::Text,
+                "\"0.01 * sin(2*pi*t)\"",
+                "an expression of `t`",
+            ),
+            key("unit", Takes::Text, "\"mm\"", "unit of its value").absent("`m`, `rad` on a hinge"),
+            key(
+                "resolve",
+                Takes::Number(Dimension::Time, (SHORTEST_PART, 1.0)),
+                "\"1 ms\"",
+                "longest step that an adaptive method takes; a fifth of what the formula does in the shortest time suits it",
+            )
+            .is(1e-3),
+        ],
+    },
+];
+
+/// Laws of drives: the rows of each, with its word.
+pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
+    let words: &[&str] = DRIVE_LAWS.each_ref().map(|kind| kind.word).to_vec().leak();
+    let law = key("law", Takes::Word(words), "\"constant\"", "which motion");
+    let of_kind = |(place, kind): (usize, &'static DriveLaw)| {
+        let keys = kind.keys.iter();
+        keys.map(move |key| key.of(&words[place..=place]))
+    };
+    let keys = DRIVE_LAWS.iter().enumerate().flat_map(of_kind);
+    let keys: Vec<FileKey> = std::iter::once(law).chain(keys).collect();
+    FileTable::new("drive", "a drive", "coordinate of a slide or a hinge as a function of time", keys.leak())
+        .by(Variants::Word("law", ""))
+});
+
+/// A law of a coordinate that is an angle if it `turns`.
+pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<Drive, SceneError> {
+    let mut node = node.clone();
+    node.document.on_hinge = turns;
+    let section = node.section()?;
+    let law = section.require("law")?;
+    let number = |name: &str| section.number(name);
+    Ok(match law.choice()? {
+        "spcmm" => read_slider(&section, &law, scene)?,
+        "constant" => Drive::Constant { position: number("position")?, velocity: number("velocity")? },
+        "harmonic" => Drive::Harmonic { mean: number("mean")?, terms: vec![read_term(&section)?] },
+        "harmonics" => Drive::Harmonic { mean: number("mean")?, terms: read_terms(&section)? },
+        "ramp" => Drive::Ramp {
+            from: number("from")?,
+            to: number("to")?,
+            start: number("start")?,
+            duration: number("duration")?,
+        },
+        "pulse" => Drive::Pulse {
+            base: number("base")?,
+            height: number("height")?,
+            start: number("start")?,
+            duration: number("duration")?,
+        },
+        "table" => read_table(&section)?,
+        "formula" => read_law_of_formula(&section)?,
+        word => unreachable!("`{word}` has a row and no reader"),
+    })
+}
+
+/// Dimension of the joint's coordinate.
+fn coordinate(section: &Section<'_>) -> Dimension {
+    match section.document.on_hinge {
+        true => Dimension::Angle,
+        false => Dimension::Length,
+    }
+}
+
+fn read_slider(section: &Section<'_>, law: &Node<'_>, scene: &Scene) -> Result<Drive, SceneError> {
+    if section.document.on_hinge {
+        return Err(law.error(SLIDERS_ONLY));
+    }
+    if scene.machine.spcmm.is_none() {
+        return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
+    }
+    let slider = section.require("slider")?;
+    match slider.scalar()?.parse::<u8>() {
+        Ok(number @ 1..=3) => Ok(Drive::ClosedForm(number as usize - 1)),
+        _ => Err(slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")),
+    }
+}
+
+fn read_term(section: &Section<'_>) -> Result<Harmonic, SceneError> {
+    Ok(Harmonic {
+        amplitude: section.number("amplitude")?,
+        frequency: section.number("frequency")?,
+        phase: section.number("phase")?,
+    })
+}
+
+fn read_terms(section: &Section<'_>) -> Result<Vec<Harmonic>, SceneError> {
+    let node = section.require("terms")?;
+    let nodes = node.entries()?;
+    if nodes.is_empty() {
+        let like = node.like();
+        return Err(node.error(format!("needs a term; write for example `terms = {like}`")));
+    }
+    nodes.into_iter().map(|node| read_term(&node.section()?)).collect()
+}
+
+fn read_table(section: &Section<'_>) -> Result<Drive, SceneError> {
+    let repeats = section.get("repeat").map_or(Ok(false), |node| node.flag())?;
+    let graph = Graph::motion(coordinate(section), repeats);
+    let points = match (section.get("points"), section.get("file")) {
+        (Some(_), Some(file)) => {
+            return Err(file.error("not allowed here: `points` are given as well"));
+        }
+        (None, Some(file)) => read_file(&file, &graph)?,
+        _ => read_points(&section.require("points")?, &graph)?,
+    };
+    Ok(Drive::Table { points, repeats })
+}
+
+fn read_law_of_formula(section: &Section<'_>) -> Result<Drive, SceneError> {
+    let node = section.require("formula")?;
+    let unit = section.get("unit");
+    let (program, scale) = read_formula(&node, unit.as_ref(), coordinate(section))?;
+    Ok(Drive::Formula { program, scale, resolve: section.number("resolve")? })
+}

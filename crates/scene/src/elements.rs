@@ -1,0 +1,606 @@
+//! Force elements of a scene file: one table per kind, and how its section is read. Their physics is in `mechanism/elements`.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::sync::LazyLock;
+
+use super::copy::Copy;
+use super::document::{Node, Section};
+use super::drives::{DRIVE, FASTEST_DRIVE, read_drive};
+use super::key::{FileKey, FileTable, MAX_SI, Takes, key, many, number};
+use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
+use super::points::{Axis, Graph, MOST_POINTS, read_file, read_points};
+use super::read_joints::read_coordinate;
+use super::*;
+use jointplay_physics::machine::{
+    Bushing, Drive, Elastic, Element, ElementKind, JointCoordinate, JointSpring, Load, LoadAxes, Motor, Quat, Spring,
+    SpringSide, Stop, Tyre, Vec3,
+};
+use jointplay_physics::units::Dimension as D;
+use jointplay_physics::words::Words;
+
+const LARGEST_FORCE: f64 = 1e12;
+
+/// Every kind of force element: its table, and how the rest of its section is read, where it acts being known.
+pub(super) static ELEMENTS: LazyLock<[(&FileTable, ReadKind); 7]> = LazyLock::new(|| {
+    [
+        (&SPRING, read_spring),
+        (&LOAD, read_load),
+        (&JOINT_SPRING, read_joint_spring),
+        (&STOP, read_stop),
+        (&BUSHING, read_bushing),
+        (&MOTOR, read_motor),
+        (&TYRE, read_tyre),
+    ]
+});
+
+/// Whether `table` is that of a force element.
+pub fn is_element(table: &FileTable) -> bool {
+    ELEMENTS.iter().any(|(of, _)| of.name == table.name)
+}
+
+pub(super) type ReadKind = fn(&Place<'_, '_>) -> Result<ElementKind, SceneError>;
+
+const NAME: FileKey = key("name", Takes::Name, "\"s1\"", "its name, that of no joint");
+
+const COORDINATE: FileKey = key(
+    "coordinate",
+    Takes::Word(&["position", "angle", "child_angle"]),
+    "\"angle\"",
+    "which coordinate of a joint that has two: `position` or `angle` of a cylindrical one, `angle` or `child_angle` of a universal one",
+)
+.absent("the only one");
+
+const fn joint(help: &'static str) -> FileKey {
+    key("joint", Takes::Joint, "\"crank\"", help)
+}
+
+const fn point(name: &'static str) -> FileKey {
+    key(name, Takes::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "where it holds")
+}
+
+/// A number of either sign, such as a force, no larger than any element exerts.
+const fn signed(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
+    key(name, Takes::Number(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), like, help)
+}
+
+/// The same, not below 0.
+const fn unsigned(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
+    key(name, Takes::Number(dimension, (0.0, LARGEST_FORCE)), like, help)
+}
+
+/// Stiffness and damping of an element on a joint.
+const fn joint_stiffness(help: &'static str) -> FileKey {
+    unsigned("stiffness", D::Stiffness, "\"10 N/mm\"", help).zero().on_hinge(D::TurningStiffness, "\"5 N m/rad\"")
+}
+
+const fn joint_damping(help: &'static str) -> FileKey {
+    unsigned("damping", D::Damping, "\"20 N s/m\"", help).zero().on_hinge(D::TurningDamping, "\"0.1 N m s/rad\"")
+}
+
+/// A coordinate at which something of an element begins.
+const fn coordinate(name: &'static str, like: [&'static str; 2], help: &'static str) -> FileKey {
+    key(name, number(D::Length), like[0], help).on_hinge(D::Angle, like[1])
+}
+
+/// Stiffnesses or dampings along or about three axes.
+const fn diagonal(name: &'static str, dimension: D, help: &'static str) -> FileKey {
+    key(name, Takes::Vector(dimension, (0.0, LARGEST_FORCE)), "", help)
+        .zero()
+        .frame("its axes: `axes` in the body of `from`")
+}
+
+const fn vector(name: &'static str, dimension: D, help: &'static str) -> FileKey {
+    key(name, Takes::Vector(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), "", help)
+        .zero()
+        .frame("the world's, or the body's with `axes = \"body\"`")
+}
+
+const fn rotation(name: &'static str, help: &'static str) -> FileKey {
+    key(name, Takes::Table(&ROTATION), "{ axis = [0, 1, 0], angle = \"15 deg\" }", help).zero()
+}
+
+fn law(name: &'static str, help: &'static str) -> FileKey {
+    key(name, Takes::Table(&DRIVE), "{ law = \"constant\", velocity = \"10 mm/s\" }", help).absent("none")
+}
+
+const CURVE_LIKE: &str = "[[\"-10 mm\", \"-50 N\"], [0, 0], [\"10 mm\", \"80 N\"]]";
+
+/// Points of a curve in place of `stiffness` and `preload`.
+const fn curve(help: &'static str) -> FileKey {
+    let pairs = Takes::Pairs([D::Length, D::Force], many(MOST_POINTS, "points"));
+    key("characteristic", pairs, CURVE_LIKE, help).absent(WITHOUT_CURVE)
+}
+
+const CURVE_FILE: FileKey = key(
+    "file",
+    Takes::File,
+    "\"coil.csv\"",
+    "instead of the points: a CSV file beside the scene, two columns under a header with units",
+)
+.absent(WITHOUT_CURVE);
+const WITHOUT_CURVE: &str = "`stiffness` and `preload` hold";
+
+static SPRING: FileTable = FileTable::new(
+    "spring",
+    "[[spring]]",
+    "spring with a damper along the line between two points",
+    &[
+        NAME,
+        point("from"),
+        point("to"),
+        key(
+            "length",
+            Takes::Number(D::Length, (0.0, 1e6)),
+            "\"100 mm\"",
+            "distance of the points at which the spring carries `preload`",
+        ),
+        unsigned("stiffness", D::Stiffness, "\"10 N/mm\"", "change of its tension with the distance").zero(),
+        unsigned("damping", D::Damping, "\"20 N s/m\"", "change of its tension with the rate of the distance").zero(),
+        signed("preload", D::Force, "\"5 N\"", "tension at `length`; negative where it pushes").zero(),
+        curve(
+            "tension over the change of the distance from `length`, 2 to 10000 of `[change, tension]`, in place of `stiffness` and \
+             `preload`",
+        ),
+        CURVE_FILE,
+        key(
+            "side",
+            Takes::Word(SpringSide::WORDS),
+            "",
+            "which way it acts: a tyre and a rubber buffer only push, a rope only pulls",
+        )
+        .absent(SpringSide::Both.word()),
+    ],
+);
+
+static LOAD: FileTable = FileTable::new(
+    "load",
+    "[[load]]",
+    "force and torque from outside on a body, constant or times sin(2π frequency t + phase)",
+    &[
+        NAME,
+        point("on"),
+        key("frequency", Takes::Number(D::Frequency, (0.0, FASTEST_DRIVE)), "\"2 Hz\"", "0 for a constant load").zero(),
+        key("phase", number(D::Angle), "\"90 deg\"", "phase at t = 0; not used where the load is constant").zero(),
+        vector("force", D::Force, "force at the point"),
+        vector("torque", D::Torque, "torque"),
+        key(
+            "axes",
+            Takes::Word(LoadAxes::WORDS),
+            "",
+            "whether force and torque keep to the world's axes or turn with the body",
+        )
+        .absent(LoadAxes::World.word()),
+    ],
+);
+
+static JOINT_SPRING: FileTable = FileTable::new(
+    "joint_spring",
+    "[[joint_spring]]",
+    "spring with a damper on a coordinate of a joint, between the two bodies that it connects",
+    &[
+        NAME,
+        joint("the joint on which it acts"),
+        COORDINATE,
+        coordinate("position", ["\"10 mm\"", "\"30 deg\""], "joint coordinate at which it carries `preload`").zero(),
+        joint_stiffness("change of its force or torque with the coordinate"),
+        joint_damping("change of its force or torque with the rate of the coordinate"),
+        signed("preload", D::Force, "\"5 N\"", "force or torque at `position`, towards lower coordinates")
+            .zero()
+            .on_hinge(D::Torque, "\"0.5 N m\""),
+        curve(
+            "force or torque, towards lower coordinates, over the coordinate from `position`, 2 to 10000 of `[coordinate, force]`, in \
+             place of `stiffness` and `preload`",
+        )
+        .on_hinge(D::Torque, "[[\"-10 deg\", \"-5 N m\"], [0, 0], [\"10 deg\", \"8 N m\"]]"),
+        CURVE_FILE,
+    ],
+);
+
+static STOP: FileTable = FileTable::new(
+    "stop",
+    "[[stop]]",
+    "stops at the ends of a coordinate of a joint, which only push",
+    &[
+        NAME,
+        joint("the joint on which it acts"),
+        COORDINATE,
+        coordinate("lower", ["\"-20 mm\"", "\"-30 deg\""], "joint coordinate at which the lower stop begins")
+            .is(f64::NEG_INFINITY),
+        coordinate("upper", ["\"20 mm\"", "\"30 deg\""], "joint coordinate at which the upper stop begins")
+            .is(f64::INFINITY),
+        unsigned(
+            "force",
+            D::Force,
+            "\"500 N\"",
+            "what a stop bears when it is pressed in slowly by `depth`, on a slide",
+        )
+        .or("torque"),
+        unsigned(
+            "torque",
+            D::Torque,
+            "\"20 N m\"",
+            "what a stop bears when it is pressed in slowly by `depth`, on a hinge",
+        )
+        .or("force"),
+        key("depth", Takes::Number(D::Length, (1e-9, 1e3)), "\"1 mm\"", "depth at which it bears that")
+            .on_hinge(D::Angle, "\"1 deg\""),
+        key(
+            "restitution",
+            Takes::Number(D::None, (0.01, 1.0)),
+            "0.5",
+            "speed after over speed before an impact at `speed`",
+        )
+        .is(1.0),
+        key(
+            "speed",
+            Takes::Number(D::Speed, (0.0, 1e6)),
+            "\"0.1 m/s\"",
+            "approach speed at which it rebounds with `restitution`; needed where that is below 1",
+        )
+        .zero()
+        .on_hinge(D::AngularSpeed, "\"1 rad/s\""),
+    ],
+);
+
+static BUSHING: FileTable = FileTable::new(
+    "bushing",
+    "[[bushing]]",
+    "three springs along and three about axes fixed in the body of `from`, each with a damper",
+    &[
+        NAME,
+        point("from"),
+        point("to"),
+        diagonal("stiffness", D::Stiffness, "along its axes"),
+        diagonal("damping", D::Damping, "along its axes"),
+        diagonal("turning_stiffness", D::TurningStiffness, "about its axes"),
+        diagonal("turning_damping", D::TurningDamping, "about its axes"),
+        rotation("axes", "its axes in the body of `from`"),
+        rotation("rotation", "orientation of the body of `to` in that of `from` in which it exerts no torque"),
+    ],
+);
+
+static MOTOR: LazyLock<FileTable> = LazyLock::new(|| {
+    FileTable::new(
+        "motor",
+        "[[motor]]",
+        "force or torque on a coordinate of a joint without a drive, constant or towards a target",
+        vec![
+            NAME,
+            joint("the joint on which it acts, where that has no drive"),
+            COORDINATE,
+            signed("force", D::Force, "\"50 N\"", "constant part, on a slide").zero(),
+            signed("torque", D::Torque, "\"2 N m\"", "constant part, on a hinge").zero(),
+            joint_stiffness("gain on the distance from the target"),
+            joint_damping("gain on the difference from the target's speed"),
+            unsigned("limit", D::Force, "\"100 N\"", "largest force or torque, either way")
+                .is(f64::INFINITY)
+                .on_hinge(D::Torque, "\"10 N m\""),
+            law("target", "motion that it is to follow"),
+        ]
+        .leak(),
+    )
+});
+
+static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
+    FileTable::new(
+        "tyre",
+        "[[tyre]]",
+        "tyre of a wheel on a ground that may move up and down: a spring with a damper along `up`, which only pushes",
+        vec![
+            NAME,
+            point("on"),
+            key(
+                "radius",
+                Takes::Number(D::Length, (1e-6, 1e3)),
+                "\"300 mm\"",
+                "height of the point `on`, the wheel's centre, over the ground at which it begins to push",
+            ),
+            unsigned("stiffness", D::Stiffness, "\"200 kN/m\"", "change of its force with the height"),
+            unsigned("damping", D::Damping, "\"200 N s/m\"", "change of its force with the rate of the height").zero(),
+            key("up", Takes::Direction, "[0, 0, 1]", "which way is up").absent("against the file's gravity"),
+            law("ground", "height of the ground, along `up` from the world's origin; at rest there if left out"),
+        ]
+        .leak(),
+    )
+});
+
+/// Where an element acts, and the section that says what else it is.
+pub(super) struct Place<'s, 'd> {
+    section: &'s Section<'d>,
+    scene: &'s Scene,
+    points: &'s [Attachment],
+    coordinate: Option<JointCoordinate>,
+}
+
+impl Place<'_, '_> {
+    fn on_hinge(&self) -> bool {
+        self.section.document.on_hinge
+    }
+
+    /// The coordinate of an element that acts on a joint.
+    fn on(&self) -> JointCoordinate {
+        self.coordinate.expect("the element's table has a joint")
+    }
+
+    fn number(&self, name: &str) -> Result<f64, SceneError> {
+        self.section.number(name)
+    }
+
+    /// A number with one key on a slide and another on a hinge.
+    fn force_or_torque(&self) -> Result<f64, SceneError> {
+        let (own, other, here, there) = match self.on_hinge() {
+            true => ("torque", "force", "hinge", "slide"),
+            false => ("force", "torque", "slide", "hinge"),
+        };
+        let why = format!("the joint is a {here}, where `{own}` belongs; `{other}` is for a {there}");
+        self.section.refuse(other, &why)?;
+        self.section.number(own)
+    }
+
+    fn word<T: Words + Default>(&self, name: &str) -> Result<T, SceneError> {
+        self.section.get(name).map_or(Ok(T::default()), |node| node.word())
+    }
+
+    fn law(&self, name: &str) -> Result<Option<Drive>, SceneError> {
+        let node = self.section.get(name);
+        node.map(|node| read_drive(&node, self.on_hinge(), self.scene)).transpose()
+    }
+
+    /// The pattern's copy that is read, unless its element holds first (`place` 0) or second (1) at a body of that copy.
+    fn copy_outside(&self, place: usize) -> Option<&Copy> {
+        let copy = self.section.document.copy?;
+        let body = self.points.get(place).and_then(|point| point.body);
+        let own = body.is_some_and(|body| copy.made(&self.scene.machine.bodies[body].name));
+        (!own).then_some(copy)
+    }
+
+    /// What a spring exerts by its stretch: a curve, whose numbers have these names and dimensions, or a line.
+    fn elastic(&self, axes: [(&'static str, D); 2]) -> Result<Elastic, SceneError> {
+        let line = Elastic::Line { stiffness: self.number("stiffness")?, preload: self.number("preload")? };
+        let most = [MAX_SI, LARGEST_FORCE];
+        let axis = |i: usize| Axis { name: axes[i].0, dimension: axes[i].1, most: most[i] };
+        let rise = (1e-9, if self.on_hinge() { "1e-9 rad" } else { "1 nm" });
+        let graph = Graph { axes: [axis(0), axis(1)], rise, repeats: false };
+        let points = match (self.section.get("characteristic"), self.section.get("file")) {
+            (Some(_), Some(node)) => {
+                return Err(node.error("not allowed here: `characteristic` is given as well"));
+            }
+            (Some(node), None) => read_points(&node, &graph)?,
+            (None, Some(node)) => read_file(&node, &graph)?,
+            (None, None) => return Ok(line),
+        };
+        for key in ["stiffness", "preload"] {
+            self.section.refuse(key, "`characteristic`, or its `file`, says what the spring exerts")?;
+        }
+        Ok(Elastic::Curve(points))
+    }
+
+    /// The error for values without any effect, unless one of those under `keys` has one.
+    fn must_act(&self, acts: bool, keys: &str) -> Result<(), SceneError> {
+        if acts {
+            return Ok(());
+        }
+        let kind = self.section.rows.name;
+        Err(self.section.error("", format!("this {kind} does nothing: {keys} are 0; one must not be")))
+    }
+
+    /// An error about a key that may not be there.
+    fn fault<T>(&self, name: &str, why: &str) -> Result<T, SceneError> {
+        Err(match self.section.get(name) {
+            Some(node) => node.error(why),
+            None => self.section.error(name, why),
+        })
+    }
+
+    /// Refuses the closed form of the scene as the law of an element.
+    fn refuse_closed_form(&self, law: Option<&Drive>, name: &str, what: &str) -> Result<(), SceneError> {
+        match law.and_then(Drive::closed_form) {
+            Some(_) => self.fault(name, &format!("a {what} follows a law of its own, not that of the scene's sliders")),
+            None => Ok(()),
+        }
+    }
+}
+
+fn read_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let spring = Spring {
+        length: place.number("length")?,
+        damping: place.number("damping")?,
+        elastic: place.elastic([("length", D::Length), ("tension", D::Force)])?,
+        side: place.word("side")?,
+    };
+    place.must_act(spring.damping != 0.0 || spring.elastic.acts(), "stiffness, damping, preload")?;
+    Ok(ElementKind::Spring(spring))
+}
+
+fn read_load(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let axes = place.word("axes")?;
+    // A vector in axes that do not belong to the pattern turns with its copies.
+    let copy = match axes {
+        LoadAxes::World => place.section.document.copy,
+        LoadAxes::Body => place.copy_outside(0),
+    };
+    let vector = |name: &str| {
+        let vector = place.section.vector(name)?;
+        Ok(copy.map_or(vector, |copy| copy.direction(vector)))
+    };
+    let load = Load {
+        frequency: place.number("frequency")?,
+        phase: place.number("phase")?,
+        force: vector("force")?,
+        torque: vector("torque")?,
+        axes,
+    };
+    place.must_act(load.force != Vec3::zeros() || load.torque != Vec3::zeros(), "force, torque")?;
+    Ok(ElementKind::Load(load))
+}
+
+fn read_joint_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let axes = match place.on_hinge() {
+        true => [("angle", D::Angle), ("torque", D::Torque)],
+        false => [("position", D::Length), ("force", D::Force)],
+    };
+    let spring = JointSpring {
+        on: place.on(),
+        position: place.number("position")?,
+        damping: place.number("damping")?,
+        elastic: place.elastic(axes)?,
+    };
+    place.must_act(spring.damping != 0.0 || spring.elastic.acts(), "stiffness, damping, preload")?;
+    Ok(ElementKind::JointSpring(spring))
+}
+
+fn read_stop(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let stop = Stop {
+        on: place.on(),
+        lower: place.number("lower")?,
+        upper: place.number("upper")?,
+        force: place.force_or_torque()?,
+        depth: place.number("depth")?,
+        restitution: place.number("restitution")?,
+        speed: place.number("speed")?,
+    };
+    let on_hinge = place.on_hinge();
+    let key = if on_hinge { "torque" } else { "force" };
+    place.must_act(stop.force != 0.0, key)?;
+    let Stop { lower, upper, .. } = stop;
+    if lower == f64::NEG_INFINITY && upper == f64::INFINITY {
+        return place.fault("upper", "missing; a stop needs `lower`, `upper` or both");
+    }
+    if lower >= upper {
+        let unit = if on_hinge { "deg" } else { "mm" };
+        return place.fault("upper", &format!("must be above lower, {}", format_quantity(lower, unit)));
+    }
+    if on_hinge && upper - lower >= TAU && upper.is_finite() && lower.is_finite() {
+        let why = "must be less than a turn above lower: a hinge is taken within half a turn of their middle";
+        return place.fault("upper", why);
+    }
+    if stop.restitution < 1.0 && stop.speed == 0.0 {
+        let why = "missing; a restitution below 1 holds at one approach speed, which must be above 0";
+        return place.fault("speed", why);
+    }
+    Ok(ElementKind::Stop(stop))
+}
+
+fn read_bushing(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let vector = |name: &str| place.section.vector(name);
+    let [stiffness, damping] = [vector("stiffness")?, vector("damping")?];
+    let [turning_stiffness, turning_damping] = [vector("turning_stiffness")?, vector("turning_damping")?];
+    // An orientation to a body outside a pattern turns with the pattern's copies; a shifted one needs no turning.
+    let outside = |at| place.copy_outside(at).filter(|copy| !copy.keeps_axes());
+    if outside(0).is_none() && outside(1).is_some() {
+        let why = "a body outside the pattern does not turn with its copies: make it that of `from`";
+        return Err(place.section.error("to", why));
+    }
+    let rotation = |name: &str| -> Result<Quat, SceneError> {
+        let rotation = read_rotation(place.section.get(name))?;
+        Ok(outside(0).map_or(rotation, |copy| copy.rotation(rotation)))
+    };
+    let bushing = Bushing {
+        axes: rotation("axes")?,
+        rotation: rotation("rotation")?,
+        stiffness,
+        damping,
+        turning_stiffness,
+        turning_damping,
+    };
+    let acts = [stiffness, damping, turning_stiffness, turning_damping].iter().any(|vector| *vector != Vec3::zeros());
+    place.must_act(acts, "stiffness, damping, turning_stiffness, turning_damping")?;
+    Ok(ElementKind::Bushing(bushing))
+}
+
+fn read_motor(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let motor = Motor {
+        on: place.on(),
+        force: place.force_or_torque()?,
+        stiffness: place.number("stiffness")?,
+        damping: place.number("damping")?,
+        limit: place.number("limit")?,
+        target: place.law("target")?,
+    };
+    let follows = motor.stiffness > 0.0 || motor.damping > 0.0;
+    let key = if place.on_hinge() { "torque" } else { "force" };
+    place.must_act(motor.force != 0.0 || follows, &format!("{key}, stiffness, damping"))?;
+    match (follows, &motor.target) {
+        (true, None) => return place.fault("target", "missing; stiffness and damping pull towards it"),
+        (false, Some(_)) => {
+            return place.fault("target", "has no effect: stiffness and damping, which pull towards it, are 0");
+        }
+        _ => place.refuse_closed_form(motor.target.as_ref(), "target", "motor")?,
+    }
+    Ok(ElementKind::Motor(motor))
+}
+
+fn read_tyre(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let up = match place.section.get("up") {
+        Some(node) => node.direction()?,
+        None => up_of(place.scene).ok_or_else(|| {
+            let why =
+                "missing; without gravity only the file can say which way is up: write for example `up = [0, 0, 1]`";
+            place.section.error("up", why)
+        })?,
+    };
+    let own = place.section.get("up").and(place.section.document.copy);
+    let tyre = Tyre {
+        radius: place.number("radius")?,
+        stiffness: place.number("stiffness")?,
+        damping: place.number("damping")?,
+        up: own.map_or(up, |copy| copy.direction(up)),
+        ground: place.law("ground")?,
+    };
+    place.must_act(tyre.stiffness != 0.0, "stiffness")?;
+    place.refuse_closed_form(tyre.ground.as_ref(), "ground", "ground")?;
+    Ok(ElementKind::Tyre(tyre))
+}
+
+/// Upwards, against the gravity that the file gives; `None` if it gives none.
+fn up_of(scene: &Scene) -> Option<Vec3> {
+    let gravity = scene.machine.gravity;
+    let size = gravity.amax();
+    (size > 0.0).then(|| -(gravity / size).normalize())
+}
+
+/// One element with this table; `bodies` and `joints` map names to indices in the sorted scene.
+pub(super) fn read_element<'d>(
+    node: &Node<'d>,
+    (table, read_kind): (&'static FileTable, ReadKind),
+    scene: &Scene,
+    bodies: &BTreeMap<String, usize>,
+    joints: &BTreeMap<String, usize>,
+) -> Result<(Element, Section<'d>), SceneError> {
+    let kind = table.name;
+    let mut section = node.section_as(node.title(kind))?;
+    let name = section.require("name")?.name()?.into_owned();
+    let keys = table.keys.iter();
+    let ends: Vec<&str> =
+        keys.filter(|key| key.table().is_some_and(|of| of.name == ATTACHMENT.name)).map(|key| key.name).collect();
+    let point = |key: &&str| read_attachment(&section, key, scene, bodies);
+    let mut points = ends.iter().map(point).collect::<Result<Vec<_>, _>>()?;
+    match points[..] {
+        [first, second] if first.body == second.body => {
+            let [from, to] = [ends[0], ends[1]];
+            return Err(section.error(to, format!("{from} and {to} are on the same body: a {kind} needs two")));
+        }
+        [only] if only.body.is_none() => {
+            return Err(section.error(ends[0], format!("a {kind} acts on a body, not on the world")));
+        }
+        _ => {}
+    }
+    let mut coordinate = None;
+    if table.key("joint", None).is_some() {
+        let (index, freedom) = read_coordinate(&section, scene, joints)?;
+        let mut of = scene.machine.kinematic_joints().skip(index);
+        let of = of.next().expect("a joint of the scene");
+        let driven = of.drives().any(|(driven, _)| driven == freedom);
+        if kind == MOTOR.name && driven {
+            let why = format!("this joint has a drive, which leaves a {kind} nothing to move");
+            return Err(section.require("joint")?.error(why));
+        }
+        points = of.points().to_vec();
+        coordinate = Some(JointCoordinate { joint: index, freedom });
+        section.document.on_hinge = freedom.turns();
+    }
+    let place = Place { section: &section, scene, points: &points, coordinate };
+    let kind = read_kind(&place)?;
+    Ok((Element { name, kind, points }, section))
+}

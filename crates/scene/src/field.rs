@@ -1,0 +1,109 @@
+//! How a row of the parameter table is read from a scene and written to it.
+
+use super::Scene;
+use super::value::Value;
+use jointplay_physics::contact;
+use jointplay_physics::words::Words;
+
+/// Reads and writes one field of a `T`. Values written have already passed the row's range check.
+#[derive(Debug)]
+pub struct Field<T> {
+    pub(super) get: fn(&T) -> Value,
+    pub(super) set: fn(&mut T, &Value),
+}
+
+// Derived, these would require `T: Copy`.
+impl<T> Clone for Field<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Field<T> {}
+
+/// Where the value of a row is stored.
+#[derive(Clone, Copy, Debug)]
+pub enum Access {
+    /// In the contact parameters: of the scene, and of each ball joint.
+    Contact(Field<contact::Parameters>),
+    /// In the scene itself.
+    Scene(Field<Scene>),
+    /// In the scene's text: changing it reads the scene again.
+    Number,
+}
+
+/// A type that a field can hold.
+pub(super) trait FieldValue: Sized {
+    fn to_value(self) -> Value;
+    fn of_value(value: &Value) -> Self;
+}
+
+impl FieldValue for f64 {
+    fn to_value(self) -> Value {
+        Value::Number(self)
+    }
+
+    fn of_value(value: &Value) -> Self {
+        match value {
+            Value::Number(number) => *number,
+            _ => unreachable!("the table has checked the kind"),
+        }
+    }
+}
+
+/// Words of a switch.
+pub(super) const SWITCH: [&str; 2] = ["on", "off"];
+
+impl FieldValue for bool {
+    fn to_value(self) -> Value {
+        Value::Choice(if self { SWITCH[0] } else { SWITCH[1] })
+    }
+
+    fn of_value(value: &Value) -> Self {
+        *value == Value::Choice(SWITCH[0])
+    }
+}
+
+/// The variant that `value` names.
+pub(super) fn word_of<T: Words>(value: &Value) -> T {
+    match value {
+        Value::Choice(word) => T::of_word(word).expect("the table has checked the word"),
+        _ => unreachable!("the table has checked the kind"),
+    }
+}
+
+/// A field by its path: `field!(solver.step)` of a scene.
+macro_rules! field {
+    ($($path:ident).+) => {
+        Field {
+            get: |it| FieldValue::to_value(it.$($path).+),
+            set: |it, value| it.$($path).+ = FieldValue::of_value(value),
+        }
+    };
+}
+
+/// A field that holds one of the words of an enum, by its path.
+macro_rules! word_field {
+    ($($path:ident).+) => {
+        Field {
+            get: |it| Value::Choice(Words::word(it.$($path).+)),
+            set: |it, value| it.$($path).+ = word_of(value),
+        }
+    };
+}
+
+/// A field of an optional part of a scene's machine: `optional_field!(spcmm.frequency)`.
+macro_rules! optional_field {
+    ($part:ident.$name:ident) => {
+        Field {
+            get: |scene: &Scene| scene.machine.$part.as_ref().map_or(Value::Unset, |it| it.$name.to_value()),
+            set: |scene, value| {
+                if let Some(it) = &mut scene.machine.$part {
+                    it.$name = FieldValue::of_value(value);
+                }
+            },
+        }
+    };
+}
+
+pub(super) use {field, optional_field, word_field};

@@ -1,0 +1,725 @@
+//! The sections of a scene file and the tables within them, key by key: what reads a key asks for it by its name, and its value
+//! is taken as its row says. Parameters have their rows in `table.rs`, force elements in `elements.rs`, laws of drives in
+//! `drives.rs`.
+
+use std::sync::LazyLock;
+
+use super::drives::DRIVE;
+use super::elements::ELEMENTS;
+use super::key::{FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector};
+use super::placement::{ATTACHMENT, ROTATION};
+use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
+use super::table::{contact_rows, find};
+use super::*;
+use jointplay_physics::simulate::PLOT_WORDS;
+use jointplay_physics::units::Dimension as D;
+use jointplay_physics::words::Words;
+
+/// Most parameters that a file may define.
+const MOST_OWN: usize = 1000;
+/// Time scales that a window may begin with.
+const SLOWEST_TO_REAL: (f64, f64) = (1e-4, 1.0);
+/// Most files that a scene may include.
+const MOST_FILES: usize = 100;
+/// Largest length of a shape, and of the paper's machine, m.
+const LARGEST: f64 = 1000.0;
+const LARGEST_SPCMM: f64 = 100.0;
+
+const WORLD: &str = "the world's";
+const PARENT: &str = "the parent's: the world's where there is no `parent`";
+const BODY_FRAME: &str = "the body's; of a fixed shape, the world's";
+
+/// Rows one after the other.
+fn joined(rows: &[&[FileKey]]) -> &'static [FileKey] {
+    rows.concat().leak()
+}
+
+/// The row of a parameter, as the key `name`.
+fn of_parameter(name: &'static str, parameter: &'static str) -> FileKey {
+    let help = find(parameter).map_or("", |parameter| parameter.help);
+    key(name, Takes::Parameter(parameter), "", help).absent("as parameters")
+}
+
+/// Rows of the parameters in `section`.
+fn parameters(section: &str) -> Vec<FileKey> {
+    let own = |parameter: &'static Parameter| {
+        let name = parameter.key.strip_prefix(section)?.strip_prefix('.')?;
+        Some(of_parameter(name, parameter.key))
+    };
+    table().iter().filter_map(own).collect()
+}
+
+/// Rows of the parameters that a ball joint may have of its own.
+fn contact_keys() -> Vec<FileKey> {
+    let all = parameters("contact");
+    let own = |key: &FileKey| contact_rows().any(|(part, _)| part == key.name);
+    all.into_iter().filter(own).collect()
+}
+
+/// The whole file.
+pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
+    let names = [
+        key("name", Takes::Name, "\"press\"", "short name, for outputs").absent("the file's").fixed(),
+        key("title", Takes::Text, "\"A press\"", "a line, for lists").absent("`name`").fixed(),
+        key("description", Takes::Text, "\"It jumps.\"", "a paragraph").absent("none").fixed(),
+        of_parameter("start", "start"),
+        of_parameter("formulation", "formulation"),
+    ];
+    let sections = [
+        key("gravity", Takes::Table(&GRAVITY), "{ z = \"-9.81 m/s^2\" }", GRAVITY.help),
+        key("contact", Takes::Table(&CONTACT), "{ clearance = \"0.2 mm\" }", CONTACT.help),
+        key("solver", Takes::Table(&SOLVER), "{ method = \"automatic\" }", SOLVER.help),
+        key("view", Takes::Table(&VIEW), "{ down = \"-z\" }", VIEW.help),
+        key("output", Takes::Table(&OUTPUT), "{ body = \"rod\" }", OUTPUT.help),
+    ]
+    .map(|key| key.absent("the defaults"));
+    let others = [
+        key(
+            "spcmm",
+            Takes::Table(&SPCMM),
+            "{ mean_x = \"203 mm\", gamma = \"15 deg\", hinge_radius = \"52 mm\", driving_rod = \"28 mm\", driven_rod = \"200 mm\" }",
+            SPCMM.help,
+        ),
+        key(
+            "chain",
+            Takes::Table(&CHAIN),
+            "{ link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }",
+            CHAIN.help,
+        ),
+        key(
+            "include",
+            Takes::Files(many(MOST_FILES, "files")),
+            "[\"leg.toml\"]",
+            "files beside this one, whose lists belong to the scene, too",
+        ),
+    ]
+    .map(|key| key.absent("none"));
+    FileTable::new(
+        "scene",
+        "the file",
+        "a machine, and how it is simulated and shown",
+        joined(&[&names, &sections, &others, &lists()]),
+    )
+});
+
+/// An included file.
+pub(super) static INCLUDED: LazyLock<FileTable> = LazyLock::new(|| {
+    let help = "lists that belong to the scene that includes it";
+    FileTable::new("included", "an included file", help, lists().leak())
+});
+
+/// Lists that a file may have.
+fn lists() -> Vec<FileKey> {
+    let own = [
+        list_of(&PARAMETER, many(MOST_OWN, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
+        list_of(&PATTERN, many(MOST_BODIES, "patterns"), "{ name = \"leg\", count = 6, along = \"100 0 0 mm\" }"),
+    ];
+    own.into_iter().chain(parts()).collect()
+}
+
+/// Lists that a file and a pattern may have.
+fn parts() -> Vec<FileKey> {
+    let parts = [
+        list_of(
+            &BODY,
+            many(MOST_BODIES, "bodies"),
+            "{ name = \"rod\", mass = \"0.384 kg\", inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\" }",
+        ),
+        list_of(
+            &JOINT,
+            many(MOST_BODIES, "joints"),
+            "{ name = \"crank\", kind = \"revolute\", child = \"rod\", axis = [0, 1, 0] }",
+        ),
+        list_of(
+            &BALL_JOINT,
+            many(MOST_BALL_JOINTS, "ball joints"),
+            "{ name = \"S1\", socket = { body = \"world\" }, ball = { body = \"rod\" } }",
+        ),
+        list_of(
+            &FIXED_SHAPE,
+            many(MOST_SHAPES, "shapes"),
+            "{ form = \"sphere\", role = \"frame\", centre = \"0 0 0 mm\", radius = \"4 mm\" }",
+        ),
+    ];
+    let element = |table| list_of(table, many(MOST_ELEMENTS, "force elements"), "");
+    let elements = ELEMENTS.iter().map(|(table, _)| element(*table));
+    parts.into_iter().chain(elements).collect()
+}
+
+/// A list of tables, each like the one in `like` if that is not empty, under the name of the table.
+fn list_of(table: &'static FileTable, many: Many, like: &'static str) -> FileKey {
+    let like = match like {
+        "" => "",
+        like => format!("[{like}]").leak(),
+    };
+    key(table.name, Takes::List(table, many), like, table.help).absent("none")
+}
+
+static GRAVITY: LazyLock<FileTable> = LazyLock::new(|| {
+    let help = "gravity; where one component is given, the others are 0";
+    FileTable::new("gravity", "[gravity]", help, parameters("gravity").leak())
+});
+
+static CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
+    let help = "play, material and friction of every ball joint that gives none of its own";
+    FileTable::new("contact", "[contact]", help, parameters("contact").leak())
+});
+
+static SOLVER: LazyLock<FileTable> = LazyLock::new(|| {
+    let help = "how the equations are solved";
+    FileTable::new("solver", "[solver]", help, parameters("solver").leak())
+});
+
+static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
+        key("floor", number(D::Length), "\"340 mm\"", "where the floor lies along `down`").absent("chosen by the view"),
+        key("yaw", number(D::Angle), "\"-35 deg\"", "azimuth of the isometric view, with `pitch`")
+            .absent("the usual one"),
+        key("pitch", number(D::Angle), "\"12 deg\"", "elevation of the isometric view, with `yaw`")
+            .absent("the usual one"),
+        key(
+            "time_scale",
+            Takes::Number(D::None, SLOWEST_TO_REAL),
+            "0.05",
+            "simulated seconds per second that a window begins with",
+        )
+        .absent("a period of the drives takes about 4 s; without drives 0.1")
+        .fixed(),
+        key(
+            "plots",
+            Takes::Words(&PLOT_WORDS, many(MOST_PLOTS, "plots")),
+            "[\"normal-force\", \"acceleration\"]",
+            "plots that a window begins with",
+        )
+        .absent("normal force and eccentricity")
+        .fixed(),
+    ];
+    let keys = joined(&[&parameters("view"), &own]);
+    FileTable::new("view", "[view]", "how the machine is looked at", keys)
+});
+
+static OUTPUT: FileTable = FileTable::new(
+    "output",
+    "[output]",
+    "what is reported",
+    &[
+        key("body", Takes::Body, "\"rod\"", "whose pose is reported").absent("the last one").fixed(),
+        key("probe", vector(D::Length), "\"60 0 0 mm\"", "a point of that body, reported as well")
+            .absent("none")
+            .frame("the body's"),
+    ],
+);
+
+static SPCMM: LazyLock<FileTable> = LazyLock::new(|| {
+    let length = |name, help| {
+        let takes = positive(D::Length, LARGEST_SPCMM);
+        key(name, takes, "\"52 mm\"", help).fixed()
+    };
+    let own = [
+        key("mean_x", number(D::Length), "\"203 mm\"", "mean of the platform's x").fixed(),
+        key("gamma", number(D::Angle), "\"15 deg\"", "the platform's constant angle").fixed(),
+        length("hinge_radius", "from the platform's middle to a hinge, b"),
+        length("driving_rod", "from a slider to its socket, L1"),
+        length("driven_rod", "from ball to hinge, L2"),
+    ];
+    FileTable::new(
+        "spcmm",
+        "[spcmm]",
+        "the paper's machine: the motion that its sliders follow, and the dimensions to which the file's bodies are built",
+        joined(&[&parameters("spcmm"), &own]),
+    )
+});
+
+static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
+        key("hang", vector(D::Length), "\"0 0 500 mm\"", "the socket from which the first link hangs")
+            .zero()
+            .frame(WORLD),
+        key(
+            "rotation",
+            Takes::Table(&ROTATION),
+            "{ axis = [0, 1, 0], angle = \"-30 deg\" }",
+            "orientation of every link at the start",
+        )
+        .zero()
+        .frame(WORLD),
+        key(
+            "link",
+            Takes::Table(&LINK),
+            "{ mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" }",
+            "what each of them is",
+        ),
+        key(
+            "joint",
+            Takes::List(&CHAIN_JOINT, many(MOST_BALL_JOINTS, "ball joints")),
+            "[{ name = \"J1\", clearance = \"0.1 mm\" }]",
+            "joints with contact parameters of their own",
+        )
+        .absent("none"),
+    ];
+    FileTable::new(
+        "chain",
+        "[chain]",
+        "a row of equal links, each hung on the one before by a ball joint",
+        joined(&[&parameters("chain"), &own]),
+    )
+});
+
+static LINK: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
+        key("ball", vector(D::Length), "\"0 0 100 mm\"", "its ball, in the socket of the link before")
+            .frame("the link's"),
+        key("socket", vector(D::Length), "\"0 0 -100 mm\"", "its socket, for the ball of the next link")
+            .frame("the link's"),
+        opening().frame("the link's"),
+    ];
+    let keys = joined(&[&own, &mass()]);
+    FileTable::new("link", "[chain.link]", "a link of a chain", keys)
+});
+
+static CHAIN_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
+    let name = [key("name", Takes::Joint, "\"J1\"", "which one: `J1`, `J2`, …, from the top")];
+    FileTable::new(
+        "chain_joint",
+        "[[chain.joint]]",
+        "a ball joint of the chain that differs from the others",
+        joined(&[&name, &contact_keys()]),
+    )
+    .also(&CONTACT)
+});
+
+fn opening() -> FileKey {
+    let help = "side on which the socket is drawn open; no effect on the motion";
+    key("opening", Takes::Direction, "[0, 0, 1]", help).absent("`view.down`")
+}
+
+static BODY: LazyLock<FileTable> = LazyLock::new(|| {
+    let name = [key("name", Takes::Name, "\"rod\"", "its name, not `world`")];
+    FileTable::new("body", "[[body]]", "a rigid body", joined(&[&name, &mass()]))
+});
+
+/// What a body weighs and looks like.
+fn mass() -> [FileKey; 6] {
+    [
+        key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "its mass").or("density"),
+        key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid")
+            .zero()
+            .frame("the body's"),
+        key(
+            "inertia",
+            vector(D::Inertia),
+            "\"1.58e-5 1.92e-3 1.93e-3 kg m^2\"",
+            "Ixx, Iyy and Izz about the centroid, along these axes",
+        )
+        .or("density")
+        .frame("the body's"),
+        key(
+            "products",
+            vector(D::Inertia),
+            "\"0 1e-5 0 kg m^2\"",
+            "integrals of xy, xz and yz over the mass, about the centroid",
+        )
+        .zero()
+        .frame("the body's"),
+        key(
+            "shapes",
+            Takes::List(&SHAPE, many(MOST_SHAPES, "shapes")),
+            "[{ form = \"sphere\", role = \"pin\", centre = \"0 0 0 mm\", radius = \"4 mm\" }]",
+            "what it looks like",
+        )
+        .absent("none"),
+        key(
+            "density",
+            positive(D::Density, MAX_DENSITY),
+            "\"7.85 g/cm^3\"",
+            "density of its shapes, of which mass, centroid and inertia then follow; volumes in which shapes overlap count twice; \
+             `check` prints what follows",
+        )
+        .absent("`mass` and `inertia` are given"),
+    ]
+}
+
+static SHAPE: LazyLock<FileTable> = LazyLock::new(|| of_shape("shape", "a shape", &[]));
+
+static FIXED_SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [key("at_slider_plane", Takes::Flag, "true", "whether it is moved along X by `spcmm.slider_plane`")
+        .absent("false")];
+    of_shape("fixed_shape", "[[fixed_shape]]", &own).also(&SHAPE)
+});
+
+fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTable {
+    const LONG: &[&str] = &["capsule", "cylinder", "cone"];
+    let point = |name, of, help| {
+        let takes = vector(D::Length);
+        let row = key(name, takes, "\"0 0 10 mm\"", help);
+        row.of(of).frame(BODY_FRAME)
+    };
+    let length = |name, of, help| {
+        let takes = positive(D::Length, LARGEST);
+        key(name, takes, "\"4 mm\"", help).of(of)
+    };
+    let own = [
+        key("form", Takes::Word(Form::WORDS), "\"capsule\"", "what form it has"),
+        key("role", Takes::Word(Role::WORDS), "\"frame\"", "what it is part of, which decides its colour")
+            .absent("that of what its body does"),
+        key("colour", Takes::Text, "\"#c2255c\"", "red, green and blue in place of the role's colour")
+            .absent("the role's"),
+        point("from", LONG, "one end of the axis; of a cone, its base"),
+        point("to", LONG, "the other end; of a cone, its tip"),
+        point("centre", &["box", "sphere"], "its middle"),
+        length("radius", &["capsule", "cylinder", "cone", "sphere"], "radius; of a cone, that of its base"),
+        key("size", vector(D::Length), "\"10 20 30 mm\"", "edge lengths along x, y and z").of(&["box"]),
+        key(
+            "corners",
+            Takes::Vectors(D::Length, many(MOST_CORNERS, "corners")),
+            "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]",
+            "corners of a polygon in one plane, in its order",
+        )
+        .of(&["plate"])
+        .frame(BODY_FRAME),
+        length("thickness", &["plate"], "half to each side of the corners"),
+        key("file", Takes::File, "\"arm.stl\"", "its triangles: STL, OBJ or glTF, beside the scene").of(&["mesh"]),
+        key(
+            "unit",
+            positive(D::Length, LARGEST),
+            "\"1 mm\"",
+            "length of the file's unit, or that unit alone, `\"mm\"`",
+        )
+        .of(&["mesh"])
+        .absent("1 m for glTF; must be given for STL and OBJ"),
+        point("position", &["mesh"], "where the file's frame lies").zero(),
+        key(
+            "rotation",
+            Takes::Table(&ROTATION),
+            "{ axis = [1, 0, 0], angle = \"90 deg\" }",
+            "orientation of the file's frame",
+        )
+        .of(&["mesh"])
+        .zero()
+        .frame(BODY_FRAME),
+    ];
+    let keys = joined(&[&own, more]);
+    let help = match more.is_empty() {
+        true => "a shape of a body: what it looks like, and weighs where the body has a `density`",
+        false => "a shape that stands still",
+    };
+    FileTable::new(name, head, help, keys).by(Variants::Word("form", "{}"))
+}
+
+static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
+    const MOVES: &[&str] = &["prismatic", "revolute"];
+    const TURNS: &[&str] = &["prismatic", "revolute", "cylindrical", "universal"];
+    const PLACED: &[&str] = &["fixed", "prismatic", "revolute", "cylindrical", "universal"];
+    let keys = [
+        key(
+            "name",
+            Takes::Name,
+            "\"P1\"",
+            "its name, not that of a force element",
+        ),
+        key(
+            "kind",
+            Takes::Word(JointKind::WORDS),
+            "\"revolute\"",
+            "how it moves: not, along `axis`, about it, both, about two axes, or in every way",
+        ),
+        key(
+            "parent",
+            Takes::Body,
+            "\"world\"",
+            "the body that carries it",
+        )
+        .absent("the world"),
+        key(
+            "child",
+            Takes::Body,
+            "\"rod\"",
+            "the body that hangs on it: each hangs on exactly one joint",
+        ),
+        key(
+            "axis",
+            Takes::Direction,
+            "[0, 0, 1]",
+            "along which it slides or about which it turns, by the right-hand rule",
+        )
+        .of(TURNS)
+        .absent("must be given, except with the law `spcmm`")
+        .frame(PARENT),
+        key(
+            "child_axis",
+            Takes::Direction,
+            "[0, 1, 0]",
+            "its second axis, perpendicular to `axis` where both angles are 0",
+        )
+        .of(&["universal"])
+        .frame("the child's"),
+        key(
+            "parent_point",
+            vector(D::Length),
+            "\"0 0 100 mm\"",
+            "where it is on the parent",
+        )
+        .of(PLACED)
+        .zero()
+        .frame(PARENT),
+        key(
+            "child_point",
+            vector(D::Length),
+            "\"0 0 -100 mm\"",
+            "where it is on the child",
+        )
+        .zero()
+        .frame("the child's"),
+        key(
+            "rotation",
+            Takes::Table(&ROTATION),
+            "{ axis = [0, 1, 0], angle = \"90 deg\" }",
+            "orientation of the child where the joint's coordinate is 0",
+        )
+        .of(PLACED)
+        .zero()
+        .frame(PARENT),
+        key(
+            "drive",
+            Takes::Table(&DRIVE),
+            "{ law = \"harmonic\", amplitude = \"10 mm\", frequency = \"1 Hz\" }",
+            "the motion that it is forced to make",
+        )
+        .of(MOVES)
+        .absent("it is free to move"),
+        key(
+            "drive",
+            Takes::Table(&CYLINDRICAL_DRIVE),
+            "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
+            "the motions that it is forced to make",
+        )
+        .of(&["cylindrical"])
+        .absent("it is free to move"),
+        key(
+            "drive",
+            Takes::Table(&UNIVERSAL_DRIVE),
+            "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
+            "the motions that it is forced to make",
+        )
+        .of(&["universal"])
+        .absent("it is free to move"),
+        key(
+            "start",
+            Takes::Table(&START),
+            "{ position = \"10 mm\" }",
+            "where it starts, and how fast; not with a drive",
+        )
+        .of(MOVES)
+        .absent("0, at rest")
+        .on_hinge(D::Angle, "{ position = \"10 deg\" }"),
+        key(
+            "start",
+            Takes::Table(&FREE_START),
+            "{ position = \"0 0 100 mm\" }",
+            "where the child starts, and how it moves",
+        )
+        .of(&["free"]),
+        key(
+            "start",
+            Takes::Table(&CYLINDRICAL_START),
+            "{ position = \"10 mm\", angle = \"30 deg\" }",
+            "where it starts, and how fast; not what a drive moves",
+        )
+        .of(&["cylindrical"])
+        .absent("0, at rest"),
+        key(
+            "start",
+            Takes::Table(&UNIVERSAL_START),
+            "{ angle = \"10 deg\", child_angle = \"30 deg\" }",
+            "where it starts, and how fast; not what a drive moves",
+        )
+        .of(&["universal"])
+        .absent("0, at rest"),
+        key(
+            "drawn",
+            Takes::Flag,
+            "false",
+            "whether a pin, a rail or a cross is drawn for it, where the scene's shapes show none",
+        )
+        .of(TURNS)
+        .absent("true"),
+        key(
+            "closes_loop",
+            Takes::Flag,
+            "true",
+            "whether its child hangs on another joint, so that this one closes a loop; it then has neither `drive` nor `start`",
+        )
+        .absent("false"),
+    ];
+    FileTable::new("joint", "[[joint]]", "a joint on which a body hangs", keys.to_vec().leak())
+        .by(Variants::Word("kind", "{} joint"))
+});
+
+static START: FileTable = FileTable::new(
+    "start",
+    "`start` of a slide or a hinge",
+    "where it starts",
+    &[
+        key("position", number(D::Length), "\"10 mm\"", "its coordinate").on_hinge(D::Angle, "\"10 deg\"").zero(),
+        key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate").on_hinge(D::AngularSpeed, "\"6 rad/s\"").zero(),
+    ],
+);
+
+static CYLINDRICAL_START: FileTable = FileTable::new(
+    "cylindrical_start",
+    "start of a cylindrical joint",
+    "where it starts, along its axis and about it",
+    &[
+        key("position", number(D::Length), "\"10 mm\"", "along it").zero(),
+        key("angle", number(D::Angle), "\"30 deg\"", "about it").zero(),
+        key("velocity", number(D::Speed), "\"10 mm/s\"", "along it").zero(),
+        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about it").zero(),
+    ],
+);
+
+/// A motion of one of two coordinates.
+fn motion(freedom: Freedom, like: &'static str, help: &'static str) -> FileKey {
+    key(freedom.word(), Takes::Table(&DRIVE), like, help).absent("it is free to move")
+}
+
+const TURNING: &str = "{ law = \"constant\", velocity = \"6 rad/s\" }";
+
+static CYLINDRICAL_DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
+    let sliding = "{ law = \"harmonic\", amplitude = \"10 mm\", frequency = \"1 Hz\" }";
+    let keys = [
+        motion(Freedom::Slide, sliding, "its motion along it"),
+        motion(Freedom::TurnOfSlide, TURNING, "its motion about it"),
+    ];
+    FileTable::new(
+        "cylindrical_drive",
+        "`drive` of a cylindrical joint",
+        "motions along its axis and about it, one or both",
+        keys.to_vec().leak(),
+    )
+});
+
+static UNIVERSAL_DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
+    let keys = [
+        motion(Freedom::FirstTurn, TURNING, "its motion about `axis`"),
+        motion(Freedom::SecondTurn, TURNING, "its motion about `child_axis`"),
+    ];
+    FileTable::new(
+        "universal_drive",
+        "`drive` of a universal joint",
+        "motions about its axes, one or both",
+        keys.to_vec().leak(),
+    )
+});
+
+static UNIVERSAL_START: FileTable = FileTable::new(
+    "universal_start",
+    "start of a universal joint",
+    "where it starts, about its axes",
+    &[
+        key("angle", number(D::Angle), "\"10 deg\"", "about `axis`").zero(),
+        key("child_angle", number(D::Angle), "\"30 deg\"", "about `child_axis`").zero(),
+        key("angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `axis`").zero(),
+        key("child_angular_velocity", number(D::AngularSpeed), "\"6 rad/s\"", "about `child_axis`").zero(),
+    ],
+);
+
+static FREE_START: FileTable = FileTable::new(
+    "free_start",
+    "`start` of a free joint",
+    "where a free body starts",
+    &[
+        key("position", vector(D::Length), "\"0 0 100 mm\"", "where `child_point` is").frame(WORLD),
+        key(
+            "rotation",
+            Takes::Table(&ROTATION),
+            "{ axis = [0, 1, 0], angle = \"15 deg\" }",
+            "orientation of the child",
+        )
+        .zero()
+        .frame(WORLD),
+        key("velocity", vector(D::Speed), "\"1 0 0 m/s\"", "velocity of `child_point`").zero().frame(WORLD),
+        key("angular_velocity", vector(D::AngularSpeed), "\"0 0 6 rad/s\"", "angular velocity of the child")
+            .zero()
+            .frame(WORLD),
+    ],
+);
+
+static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
+    let end = |name, help| {
+        let like = "{ body = \"rod\", at = \"0 0 100 mm\" }";
+        key(name, Takes::Table(&ATTACHMENT), like, help)
+    };
+    let own = [
+        key("name", Takes::Name, "\"S1\"", "its name, that of no other joint"),
+        end("socket", "the socket's centre"),
+        end("ball", "the ball's centre, on another body"),
+        opening().frame("that of the socket's body"),
+    ];
+    FileTable::new(
+        "ball_joint",
+        "[[ball_joint]]",
+        "a ball joint, which closes a loop: with play, or ideal where its `clearance` is 0",
+        joined(&[&own, &contact_keys()]),
+    )
+    .also(&CONTACT)
+});
+
+static PARAMETER: FileTable = FileTable::new(
+    "parameter",
+    "[[parameter]]",
+    "a parameter of the scene's own, for expressions, sliders and `--set`",
+    &[
+        key("name", Takes::Name, "\"stroke\"", "its name in expressions: letters, digits and `_`"),
+        key("value", Takes::Quantity, "\"20 mm\"", "its value"),
+        key("label", Takes::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
+        key("unit", Takes::Text, "\"mm\"", "unit in which it is shown")
+            .absent("that of `value`; must be given where that is an expression"),
+        key("range", Takes::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
+        key("help", Takes::Text, "\"How far it goes.\"", "what it is").absent("none"),
+    ],
+);
+
+static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
+        key("name", Takes::Name, "\"leg\"", "its name"),
+        key("count", Takes::Whole(1, MOST_BODIES as u32), "6", "number of copies"),
+        key(
+            "about",
+            Takes::Table(&ABOUT),
+            "{ axis = [0, 0, 1] }",
+            "the axis about which each copy is turned from the one before",
+        )
+        .or("along"),
+        key("along", vector(D::Length), "\"100 0 0 mm\"", "by which each copy is shifted from the one before")
+            .or("about")
+            .frame(WORLD),
+    ];
+    let keys = joined(&[&own, &parts()]);
+    FileTable::new("pattern", "[[pattern]]", "a group that is repeated", keys)
+});
+
+static ABOUT: FileTable = FileTable::new(
+    "about",
+    "`about` of a pattern",
+    "about which copies are turned",
+    &[
+        key("point", vector(D::Length), "\"0 0 100 mm\"", "a point on it").zero().frame(WORLD),
+        key("axis", Takes::Direction, "[0, 0, 1]", "its direction").frame(WORLD),
+        key("angle", number(D::Angle), "\"60 deg\"", "from copy to copy").absent("a turn over `count`"),
+    ],
+);
+
+/// Every table of a scene file: the whole file, then the tables that its keys take, each after the one that names it first.
+pub fn file_tables() -> Vec<&'static FileTable> {
+    fn add(table: &'static FileTable, all: &mut Vec<&'static FileTable>) {
+        if all.iter().all(|other| other.name != table.name) {
+            all.push(table);
+            for inner in table.keys.iter().filter_map(FileKey::table) {
+                add(inner, all);
+            }
+        }
+    }
+    let mut all = Vec::new();
+    add(&FILE, &mut all);
+    all
+}

@@ -1,0 +1,60 @@
+//! Formulas of time that prescribe a motion.
+
+use super::document::Node;
+use super::{Dimension, SceneError, parse_quantity};
+use jointplay_physics::expression::Program;
+use jointplay_physics::jet::Jet;
+
+/// The expression under a key that prescribes a coordinate of `dimension`, with `t` as its only variable, and one `unit` of
+/// it in SI.
+pub(super) fn read_formula(
+    node: &Node<'_>,
+    unit: Option<&Node<'_>>,
+    dimension: Dimension,
+) -> Result<(Program, f64), SceneError> {
+    let text = node.text()?;
+    let document = node.document;
+    let (program, of_quantities) = document
+        .reading
+        .formula(text, dimension, document.copy)
+        .map_err(|error| within(node, text, error.at(), &error.to_string()))?;
+    if let Some(function) = program.kink() {
+        let at = text.find(function).unwrap_or(0);
+        let message = format!(
+            "`{function}` has no second derivative where it turns: a drive would need an infinite force there; \
+             smoothstep(x) rises smoothly from 0 to 1"
+        );
+        return Err(within(node, text, at, &message));
+    }
+    let scale = match unit {
+        None => 1.0,
+        Some(unit) if of_quantities => {
+            let why =
+                "not allowed here: a formula with quantities has its own unit; a parameter without one is a number";
+            return Err(unit.error(why));
+        }
+        Some(unit) => {
+            let one = format!("1 {}", unit.text()?);
+            parse_quantity(&one, dimension).map_err(|error| unit.error(error.to_string()))?
+        }
+    };
+    let start = program.eval(&[Jet::new(0.0, 1.0, 0.0)]);
+    let finite = [start.value, start.rate, start.acceleration].map(f64::is_finite);
+    if finite != [true; 3] {
+        let what = ["position", "speed", "acceleration"];
+        let lacks = finite.iter().position(|fine| !fine).unwrap_or(0);
+        return Err(node.error(format!("has no finite {} at t = 0", what[lacks])));
+    }
+    Ok((program, scale))
+}
+
+/// An error at byte `at` of a text value.
+fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
+    let span = node.value.span();
+    let inner = span.start + 1;
+    // With escapes, or in three quotes, the value as a whole is marked.
+    let plain = node.document.text.get(inner..).is_some_and(|rest| rest.starts_with(text));
+    let start = if plain { inner + at } else { span.start };
+    let excerpt = node.document.excerpt(span.clone());
+    node.document.error(start..span.end, &node.key, Some(&excerpt), message)
+}

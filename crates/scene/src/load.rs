@@ -1,0 +1,124 @@
+//! Where scenes come from: the built-in ones, and files.
+
+use super::beside::{Beside, LARGEST_FILE};
+use super::error::line_and_column;
+use super::{Scene, SceneError, visible_line};
+use jointplay_physics::suggest::{brief, nearest};
+use std::ffi::OsStr;
+use std::io::Read;
+use std::path::Path;
+
+/// Scenes that are embedded in the program: lists of their names, each with the folder of `assets/` in which they lie, and their texts.
+macro_rules! embedded {
+    ($($(#[$about:meta])* $list:ident in $folder:literal: $($name:literal),+;)+) => {
+        $($(#[$about])* pub const $list: [&str; [$($name),+].len()] = [$($name),+];)+
+
+        /// TOML text of a built-in scene or of a benchmark.
+        pub fn built_in_text(name: &str) -> Option<&'static str> {
+            Some(match name {
+                $($($name => include_str!(concat!("../../../assets/", $folder, "/", $name, ".toml")),)+)+
+                _ => return None,
+            })
+        }
+    };
+}
+
+embedded! {
+    /// Names of the built-in scenes, which the window lists.
+    BUILT_IN in "scenes":
+        "spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain", "hexapod", "delta", "four-bar", "suspension", "press";
+    /// Names of the benchmarks, with which `jointplay validate` compares the program: known by name alone.
+    BENCHMARKS in "benchmarks":
+        "simple-pendulum", "n-four-bar", "squeezer", "bricard", "governor", "flores", "flip", "cardan", "backlash", "ball",
+        "scott-russell", "trammel";
+}
+
+/// The scene that opens if none is named.
+pub const DEFAULT_SCENE: &str = BUILT_IN[0];
+
+/// Most bodies of a scene, including a chain's links.
+pub const MOST_BODIES: usize = 10_000;
+/// Most ball joints of a scene, including a chain's.
+pub const MOST_BALL_JOINTS: usize = 10_000;
+/// Most shapes of a scene, on bodies and fixed.
+pub const MOST_SHAPES: usize = 50_000;
+/// Most force elements of each kind.
+pub const MOST_ELEMENTS: usize = 10_000;
+/// Most corners of a plate.
+pub const MOST_CORNERS: usize = 100;
+/// Most changes of a scene.
+pub const MOST_CHANGES: usize = 4096;
+
+/// The message for a larger one.
+pub fn too_large() -> String {
+    format!("too large for a scene file: more than {} MiB", LARGEST_FILE >> 20)
+}
+
+/// The name of a built-in scene or a benchmark that is nearest to `name`, as a question, and both lists.
+fn known_names(name: &str) -> (String, String) {
+    let near = nearest(name, BUILT_IN.into_iter().chain(BENCHMARKS));
+    (near, format!("{}; benchmarks: {}", BUILT_IN.join(", "), BENCHMARKS.join(", ")))
+}
+
+impl Scene {
+    /// A built-in scene or a benchmark by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; the last
+    /// change of a key wins.
+    ///
+    /// # Errors
+    /// Unreadable file, anything wrong in it, or a bad change.
+    pub fn load(argument: impl AsRef<OsStr>, changes: &[(String, String)]) -> Result<Self, SceneError> {
+        let path = argument.as_ref();
+        // A file name need not be valid UTF-8; messages about it must be.
+        let argument = &*path.to_string_lossy();
+        if argument.contains('/') || argument.ends_with(".toml") {
+            let text = read_file(Path::new(path), argument)?;
+            let folder = Path::new(path).parent().unwrap_or(Path::new(""));
+            return Self::parse_beside(&text, Some(argument), Beside::in_folder(folder), changes);
+        }
+        match built_in_text(argument) {
+            Some(text) => Self::parse(text, None, changes),
+            None => {
+                let (near, known) = known_names(argument);
+                let message = format!(
+                    "no built-in scene `{}`{near}; built in: {known}; the name of a file contains `/` or ends in `.toml`",
+                    visible_line(&brief(argument))
+                );
+                Err(SceneError { message, ..SceneError::default() })
+            }
+        }
+    }
+}
+
+fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
+    let error = |message: String| SceneError {
+        file: Some(name.to_owned()),
+        message,
+        unreadable: true,
+        ..SceneError::default()
+    };
+    let metadata = std::fs::metadata(path).map_err(|cause| {
+        let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
+        let (near, known) = known_names(stem);
+        error(format!("cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {known}{near}"))
+    })?;
+    if metadata.is_dir() {
+        return Err(error("this is a directory, not a scene file".to_owned()));
+    }
+    let mut bytes = Vec::new();
+    // One byte more than allowed: a pipe or a device does not report its size.
+    std::fs::File::open(path)
+        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(SceneError { unreadable: false, ..error(too_large()) });
+    }
+    String::from_utf8(bytes).map_err(|cause| {
+        let good = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
+        let good = std::str::from_utf8(good).unwrap_or("");
+        SceneError {
+            position: Some(line_and_column(good)),
+            unreadable: false,
+            ..error("not a text file: this byte is not valid UTF-8, so it is no scene file".to_owned())
+        }
+    })
+}

@@ -1,0 +1,65 @@
+//! Meshes in the making: triangles with common corners.
+
+use std::collections::BTreeMap;
+
+use super::{Mesh, MeshFault};
+
+/// Most triangles of a file.
+pub const MOST_TRIANGLES: usize = 200_000;
+/// Most corners that a file lists.
+const MOST_CORNERS: usize = 1_000_000;
+/// Largest coordinate, in the unit of the file.
+const LARGEST: f64 = 1e9;
+
+/// A mesh in the making.
+#[derive(Default)]
+pub(super) struct Builder {
+    places: BTreeMap<[u32; 3], u32>,
+    vertices: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// Corners and triangles that were asked for: those that are left out take their time, too.
+    asked: [usize; 2],
+}
+
+impl Builder {
+    /// Index of the corner at a place.
+    pub fn vertex(&mut self, place: [f64; 3]) -> Result<u32, MeshFault> {
+        self.asked[0] += 1;
+        if self.asked[0] > MOST_CORNERS {
+            let (what, most) = ("vertices", MOST_CORNERS);
+            return Err(MeshFault::TooMany { what, most });
+        }
+        if !place.iter().all(|x| x.abs() <= LARGEST) {
+            return Err(MeshFault::OutOfRange { most: LARGEST });
+        }
+        // 0 and -0 are one place.
+        let place = place.map(|x| x as f32 + 0.0);
+        let next = self.vertices.len() as u32;
+        let index = *self.places.entry(place.map(f32::to_bits)).or_insert(next);
+        if index == next {
+            self.vertices.push(place);
+        }
+        Ok(index)
+    }
+
+    /// Adds a triangle, unless two of its corners are one.
+    pub fn triangle(&mut self, [a, b, c]: [u32; 3]) -> Result<(), MeshFault> {
+        self.asked[1] += 1;
+        if self.asked[1] > MOST_TRIANGLES {
+            let (what, most) = ("triangles", MOST_TRIANGLES);
+            return Err(MeshFault::TooMany { what, most });
+        }
+        if a != b && b != c && c != a {
+            self.triangles.push([a, b, c]);
+        }
+        Ok(())
+    }
+
+    /// The mesh, its outside outside.
+    pub fn finish(self) -> Result<Mesh, MeshFault> {
+        if self.triangles.is_empty() {
+            return Err(MeshFault::NoTriangles);
+        }
+        Ok(Mesh::new(self.vertices, self.triangles))
+    }
+}

@@ -1,0 +1,99 @@
+//! Rows, like those of the table, of the numbers and parameters that a scene file gives.
+
+use std::collections::BTreeMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use super::field::Access;
+use super::given::{FileNumber, OwnParameter};
+use super::parameters::{Kind, Parameter, Scope};
+use super::value::Value;
+use jointplay_physics::units::Dimension;
+
+/// Row of a number of the file. What the reader allows is checked when the scene is read again.
+pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {
+    interned(Row {
+        key,
+        label: key,
+        help: "A number of the scene file.",
+        dimension: number.dimension,
+        unit: number.unit,
+        range: (-LARGEST, LARGEST),
+        slider: (-1.0, 1.0),
+        default: None,
+    })
+}
+
+/// Row of a parameter that the file defines.
+pub(super) fn row_of_own(own: &OwnParameter) -> &'static Parameter {
+    let default = own.default.unwrap_or_default();
+    let around = match default {
+        0.0 => (-1.0, 1.0),
+        _ => ((2.0 * default).min(0.0), (2.0 * default).max(0.0)),
+    };
+    interned(Row {
+        key: &own.key,
+        label: &own.label,
+        help: &own.help,
+        dimension: own.dimension,
+        unit: own.unit,
+        range: own.range.unwrap_or((-LARGEST, LARGEST)),
+        slider: own.range.unwrap_or(around),
+        default: own.default,
+    })
+}
+
+/// Beyond any number of a scene file: limits are the reader's.
+const LARGEST: f64 = 1e13;
+
+/// What distinguishes one such row from others.
+struct Row<'a> {
+    key: &'a str,
+    label: &'a str,
+    help: &'a str,
+    dimension: Dimension,
+    unit: &'static str,
+    range: (f64, f64),
+    slider: (f64, f64),
+    default: Option<f64>,
+}
+
+/// Rows live as long as the program, like those of the table: one for each
+/// key that was asked for, whatever values it takes.
+fn interned(row: Row<'_>) -> &'static Parameter {
+    static ROWS: LazyLock<Mutex<BTreeMap<String, &'static Parameter>>> = LazyLock::new(Mutex::default);
+    let bits = |(a, b): (f64, f64)| (a.to_bits(), b.to_bits());
+    let identity = format!(
+        "{} {} {} {:?} {} {:?} {:?} {}",
+        row.key,
+        row.label,
+        row.help,
+        row.dimension,
+        row.unit,
+        bits(row.range),
+        bits(row.slider),
+        row.default.unwrap_or(f64::NAN).to_bits(),
+    );
+    let mut rows = ROWS.lock().unwrap_or_else(PoisonError::into_inner);
+    rows.entry(identity).or_insert_with(|| {
+        let text = |text: &str| -> &'static str { Box::leak(text.into()) };
+        Box::leak(Box::new(Parameter {
+            key: text(row.key),
+            access: Access::Number,
+            label: text(row.label),
+            group: "Machine",
+            kind: Kind::Number {
+                dimension: row.dimension,
+                min: row.range.0,
+                max: row.range.1,
+                display: row.unit,
+                slider: row.slider,
+                logarithmic: false,
+            },
+            default: row.default.map_or(Value::Unset, Value::Number),
+            scope: Scope::Own,
+            at_reset: true,
+            help: text(row.help),
+            equation: "Wherever the scene file uses it",
+        }))
+    })
+}

@@ -1,0 +1,105 @@
+//! Parameters that a scene file defines.
+
+use super::document::{Node, Section, lists};
+use super::given::OwnParameter;
+use super::numbers::row_of_own;
+use super::*;
+use jointplay_physics::units::{all_units, same_unit, split_unit};
+
+/// Reads `[[parameter]]`: the scene's own parameters, in the order of the files, in which one may be made of those before it.
+///
+/// # Errors
+/// Anything wrong in one.
+pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, SceneError> {
+    let mut all: Vec<OwnParameter> = Vec::new();
+    let nodes = lists(files, "parameter", Vec::new())?;
+    for (i, node) in nodes.iter().enumerate() {
+        let own = read_parameter(node).map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
+        if let Some(first) = all.iter().position(|other| other.key == own.key) {
+            let [name, first] =
+                [node, &nodes[first]].map(|node| node.section_as(node.title("parameter"))?.require("name"));
+            let name = name?;
+            return Err(name.repeats(&first?, "parameter", &name.name()?));
+        }
+        all.push(own);
+    }
+    // What follows from others, in no range of its own, is a number like any other.
+    all.retain(|own| own.default.is_some() || own.range.is_some());
+    Ok(all)
+}
+
+/// The error that the value of a parameter uses one of those defined after it, if it does.
+fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
+    let named = |node: &Node<'_>| Some(node.section().ok()?.require("name").ok()?.name().ok()?.to_string());
+    let value = node.section_as(node.title("parameter")).ok()?.require("value").ok()?;
+    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let words: Vec<&str> = value.scalar().ok()?.split(|c| !letters(c)).collect();
+    let name = later.iter().filter_map(named).find(|name| words.contains(&&**name))?;
+    Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
+}
+
+fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
+    let title = node.title("parameter");
+    let section = node.section_as(title.clone())?;
+    let name_node = section.require("name")?;
+    let name = name_node.name()?;
+    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let reserved = ["i", "pi", "e", "t"].contains(&&*name)
+        || all_units().any(|(unit, ..)| unit == name)
+        || name.starts_with(|c: char| c.is_ascii_digit());
+    if reserved || !name.chars().all(letters) {
+        return Err(name_node.error(
+            "cannot name a parameter, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, \
+             pi, e, t or a unit",
+        ));
+    }
+    let value_node = section.require("value")?;
+    let text = value_node.scalar()?;
+    let unit = section.get("unit").map(|node| node.text()).transpose()?;
+    // The unit's dimension; without one, that of the value as it is written.
+    let wanted = unit.unwrap_or_else(|| split_unit(text));
+    let found = all_units().find(|(of, ..)| same_unit(of, wanted));
+    let (unit, dimension) = match found {
+        Some((unit, dimension, _)) => (unit, dimension),
+        None if wanted.is_empty() => ("", Dimension::None),
+        None => {
+            let (at, key) = match section.get("unit") {
+                Some(node) => (node, "unknown unit"),
+                None => (
+                    value_node,
+                    "its unit cannot be told from an expression: give it with `unit`, for example `unit = \"mm\"`",
+                ),
+            };
+            return Err(at.error(key));
+        }
+    };
+    let value_node = value_node.retitled(title);
+    let value = value_node.quantity(dimension)?;
+    let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
+    let label = words("label")?.unwrap_or(&name);
+    let help = words("help")?.unwrap_or("A parameter of this scene.");
+    let range = match section.get("range") {
+        None => None,
+        Some(node) => {
+            let [least, most] = node.quantities::<2>(dimension)?;
+            if least >= most {
+                return Err(node.error("the first value must be below the second"));
+            }
+            Some((least, most))
+        }
+    };
+    let own = OwnParameter {
+        key: format!("parameter.{name}"),
+        label: visible_line(label).into_owned(),
+        help: visible_line(help).into_owned(),
+        dimension,
+        unit,
+        range,
+        default: parse_quantity(text, dimension).ok(),
+    };
+    let row = row_of_own(&own);
+    let checked = row.check(&Value::Number(value));
+    checked.map_err(|error| value_node.error(error.to_string()))?;
+    section.document.reading.own(&name, value, dimension);
+    Ok(own)
+}

@@ -1,0 +1,239 @@
+//! What a row of the parameter table says, and the values it takes.
+
+use super::field::Access;
+use super::value::Value;
+use jointplay_physics::suggest::{did_you_mean, nearest_name};
+use jointplay_physics::units::{Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
+
+/// What kind of value a parameter takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A number with its dimension and closed range in SI units; `display` is the unit shown to the user.
+    Number {
+        /// Dimension.
+        dimension: Dimension,
+        /// Least value, SI.
+        min: f64,
+        /// Greatest value, SI.
+        max: f64,
+        /// Unit for display and sliders, e.g. "mm".
+        display: &'static str,
+        /// Ends of the slider's travel, SI (inside min..=max; typed entry reaches the rest).
+        slider: (f64, f64),
+        /// Whether the slider is logarithmic.
+        logarithmic: bool,
+    },
+    /// A whole number in a closed range.
+    Count {
+        /// Least.
+        min: u64,
+        /// Greatest.
+        max: u64,
+    },
+    /// One of a list of words.
+    Choice(&'static [&'static str]),
+}
+
+/// Where a key exists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// In every scene.
+    Every,
+    /// In every scene, and as `joint.<name>.<last part>` for one joint.
+    Contact,
+    /// Only in scenes with the paper's inverse kinematics.
+    Spcmm,
+    /// Only in chains.
+    Chain,
+    /// In the scene whose file gives it.
+    Own,
+}
+
+impl Scope {
+    /// Where the scope's keys exist, in words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Every => "every scene",
+            Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
+            Self::Spcmm => "scenes with the paper's inverse kinematics",
+            Self::Chain => "chains",
+            Self::Own => "scenes whose file gives it",
+        }
+    }
+}
+
+/// One row of the table.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// Key, e.g. `contact.clearance`.
+    pub key: &'static str,
+    /// Where its value is stored in a scene.
+    pub(super) access: Access,
+    /// Sentence-case name for the interface, e.g. "Clearance".
+    pub label: &'static str,
+    /// Heading it is listed under, e.g. "Contact".
+    pub group: &'static str,
+    /// Values it takes.
+    pub kind: Kind,
+    /// Value if neither the file nor a change gives one.
+    pub default: Value,
+    /// Where it exists.
+    pub scope: Scope,
+    /// Takes effect only at the next reset (it would move a drive mid-run, or change the equations).
+    pub at_reset: bool,
+    /// What the quantity is, in a sentence or two, and the effect of extreme values.
+    pub help: &'static str,
+    /// Which equation it enters, e.g. "paper eqs. (9), (10)".
+    pub equation: &'static str,
+}
+
+/// Why a text or a value is not valid for a parameter.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{fault}; {allowed}")]
+pub struct ValueError {
+    /// What is wrong.
+    pub fault: ValueFault,
+    /// What is allowed, in words.
+    pub allowed: String,
+}
+
+/// What is wrong with a value.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ValueFault {
+    /// Not a quantity of the right dimension.
+    #[error("{0}")]
+    Quantity(#[from] QuantityError),
+    /// Out of range.
+    #[error("out of range")]
+    OutOfRange,
+    /// Not a whole number.
+    #[error("is not a whole number")]
+    NotWhole,
+    /// Not one of the choices.
+    #[error("is not one of the choices{}", did_you_mean(*.nearest))]
+    NoChoice {
+        /// The nearest of them, if one is near.
+        nearest: Option<&'static str>,
+    },
+    /// A number where a choice is expected, or the like.
+    #[error("is of the wrong kind")]
+    WrongKind,
+}
+
+impl Parameter {
+    /// Unit in which values are shown; "" for pure numbers, counts and choices.
+    pub fn display_unit(&self) -> &'static str {
+        match self.kind {
+            Kind::Number { display, .. } => display,
+            _ => "",
+        }
+    }
+
+    /// A value for display, with its unit: `0.3 mm`.
+    pub fn show(&self, value: &Value) -> String {
+        match value {
+            Value::Number(si) => format_quantity(*si, self.display_unit()),
+            Value::Count(count) => count.to_string(),
+            Value::Choice(word) => (*word).to_owned(),
+            Value::Unset => "none".to_owned(),
+        }
+    }
+
+    /// The range or the choices, in words: `0 Hz to 50 Hz`.
+    pub fn range(&self) -> String {
+        match self.kind {
+            // The table's upper end is the largest ball radius; what counts is this joint's.
+            Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
+                format!("{} to below the ball radius", format_quantity(min, display))
+            }
+            Kind::Number { min, max, display, .. } => {
+                format!("{} to {}", format_quantity(min, display), format_quantity(max, display))
+            }
+            Kind::Count { min, max } => format!("{min} to {max}"),
+            Kind::Choice(words) => words.join(", "),
+        }
+    }
+
+    /// The units it may be written in, in words; "" for a choice.
+    pub fn units(&self) -> String {
+        match self.kind {
+            Kind::Number { dimension, .. } => match unit_names(dimension).as_slice() {
+                [] => "a pure number, no unit".to_owned(),
+                names => format!("units {}", names.join(", ")),
+            },
+            Kind::Count { .. } => "a whole number, no unit".to_owned(),
+            Kind::Choice(_) => String::new(),
+        }
+    }
+
+    /// The allowed values in words, with the units they may be written in.
+    pub fn allowed(&self) -> String {
+        let units = self.units();
+        let separator = if units.is_empty() { "" } else { "; " };
+        format!("allowed {}{separator}{units}", self.range())
+    }
+
+    /// Reads a value as users write it, and checks its range.
+    ///
+    /// # Errors
+    /// What is wrong and what is allowed, without the key.
+    pub fn read(&self, text: &str) -> Result<Value, ValueError> {
+        let text = text.trim();
+        let value = match self.kind {
+            Kind::Number { dimension, .. } => {
+                let number = parse_quantity(text, dimension).map_err(|error| ValueError {
+                    fault: error.into(),
+                    // The error already lists the units.
+                    allowed: format!("allowed {}", self.range()),
+                })?;
+                Value::Number(number)
+            }
+            Kind::Count { .. } => match text.parse::<u64>() {
+                Ok(count) => Value::Count(count),
+                Err(_) if text.parse::<i128>().is_ok() => {
+                    return Err(self.refuse(ValueFault::OutOfRange));
+                }
+                Err(_) => return Err(self.refuse(ValueFault::NotWhole)),
+            },
+            Kind::Choice(words) => {
+                // "x" means "+x".
+                let word = text.to_lowercase();
+                let found =
+                    words.iter().find(|choice| **choice == word || choice.strip_prefix('+') == Some(word.as_str()));
+                let Some(choice) = found else {
+                    let nearest = nearest_name(text, words.iter().copied());
+                    return Err(self.refuse(ValueFault::NoChoice { nearest }));
+                };
+                Value::Choice(choice)
+            }
+        };
+        self.check(&value)?;
+        Ok(value)
+    }
+
+    /// Whether a value is of this parameter's kind and in its range.
+    ///
+    /// # Errors
+    /// What is wrong and what is allowed, without the key.
+    pub fn check(&self, value: &Value) -> Result<(), ValueError> {
+        let fine = match (self.kind, value) {
+            (Kind::Number { min, max, .. }, Value::Number(number)) => (min..=max).contains(number),
+            (Kind::Count { min, max }, Value::Count(count)) => (min..=max).contains(count),
+            (Kind::Choice(words), Value::Choice(word)) => words.contains(word),
+            _ => return Err(self.refuse(ValueFault::WrongKind)),
+        };
+        if fine { Ok(()) } else { Err(self.refuse(ValueFault::OutOfRange)) }
+    }
+
+    fn refuse(&self, fault: ValueFault) -> ValueError {
+        ValueError { fault, allowed: self.allowed() }
+    }
+
+    /// A text that [`Self::read`] turns back into exactly this value.
+    pub fn write(&self, value: &Value) -> String {
+        match (self.kind, value) {
+            (Kind::Number { dimension, display, .. }, Value::Number(si)) => exact_quantity(*si, display, dimension),
+            _ => self.show(value),
+        }
+    }
+}

@@ -1,0 +1,462 @@
+//! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
+
+use super::field::{Access, Field, FieldValue, SWITCH, field, optional_field, word_field, word_of};
+use super::{Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value};
+use jointplay_physics::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
+use jointplay_physics::integrate::Method;
+use jointplay_physics::units::Dimension as D;
+use jointplay_physics::words::Words;
+
+const DEFAULT: contact::Parameters = contact::Parameters::DEFAULT;
+
+/// Every parameter, in the order in which the interface lists them.
+pub fn table() -> &'static [Parameter] {
+    &TABLE
+}
+
+/// A row that takes effect at once; the functions below modify that where needed.
+const fn row(
+    key: &'static str,
+    access: Access,
+    label: &'static str,
+    group: &'static str,
+    kind: Kind,
+    default: Value,
+    scope: Scope,
+    help: &'static str,
+    equation: &'static str,
+) -> Parameter {
+    Parameter { key, access, label, group, kind, default, scope, at_reset: false, help, equation }
+}
+
+const fn contact(
+    key: &'static str,
+    field: Field<contact::Parameters>,
+    label: &'static str,
+    kind: Kind,
+    default: Value,
+    help: &'static str,
+    equation: &'static str,
+) -> Parameter {
+    row(key, Access::Contact(field), label, "Contact", kind, default, Scope::Contact, help, equation)
+}
+
+const fn drive(
+    key: &'static str,
+    field: Field<Scene>,
+    label: &'static str,
+    kind: Kind,
+    default: Value,
+    help: &'static str,
+    equation: &'static str,
+) -> Parameter {
+    at_reset(row(key, Access::Scene(field), label, "Drive", kind, default, Scope::Spcmm, help, equation))
+}
+
+const fn at_reset(mut parameter: Parameter) -> Parameter {
+    parameter.at_reset = true;
+    parameter
+}
+
+const fn number(dimension: D, min: f64, max: f64, display: &'static str, slider: (f64, f64)) -> Kind {
+    Kind::Number { dimension, min, max, display, slider, logarithmic: false }
+}
+
+const fn logarithmic(dimension: D, min: f64, max: f64, display: &'static str, slider: (f64, f64)) -> Kind {
+    Kind::Number { dimension, min, max, display, slider, logarithmic: true }
+}
+
+const fn gravity(
+    key: &'static str,
+    field: Field<Scene>,
+    label: &'static str,
+    default: f64,
+    help: &'static str,
+) -> Parameter {
+    let kind = number(D::Acceleration, -1000.0, 1000.0, "m/s^2", (-20.0, 20.0));
+    row(
+        key,
+        Access::Scene(field),
+        label,
+        "Gravity",
+        kind,
+        Value::Number(default),
+        Scope::Every,
+        help,
+        "Weight in the force vector of paper eqs. (52), (53)",
+    )
+}
+
+static TABLE: [Parameter; 29] = [
+    contact(
+        "contact.clearance",
+        field!(clearance),
+        "Clearance",
+        number(D::Length, 0.0, 1.0, "mm", (0.0, 1e-3)),
+        Value::Number(DEFAULT.clearance),
+        "Radial gap c = R - r between socket and ball. With 0 the joint is ideal: a constraint instead of a contact. \
+         It must stay below the ball radius. Larger gaps give longer free flights and harder impacts; at 0.01 mm and \
+         below, the contact patch is no longer small against the ball, which Hertz's theory assumes.",
+        "Paper eqs. (9), (10); stiffness in (19)",
+    ),
+    contact(
+        "contact.friction",
+        field!(friction),
+        "Friction coefficient",
+        number(D::None, 0.0, 10.0, "", (0.0, 1.0)),
+        Value::Number(DEFAULT.friction),
+        "Coulomb coefficient cf of ball on socket. Steel on steel lies between 0.1 (oiled) and 0.8 (dry). With 0 \
+         the rattling lasts much longer.",
+        "Paper eq. (20)",
+    ),
+    contact(
+        "contact.restitution",
+        field!(restitution),
+        "Restitution",
+        number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
+        Value::Number(DEFAULT.restitution),
+        "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The Lankarani–Nikravesh \
+         law is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
+         asked for, flores within 0.05; both divide by this number and refuse 0.",
+        "Paper eq. (19)",
+    ),
+    contact(
+        "contact.youngs_modulus",
+        field!(youngs_modulus),
+        "Young's modulus",
+        logarithmic(D::Stress, 1e6, 1e12, "GPa", (1e9, 1e12)),
+        Value::Number(DEFAULT.youngs_modulus),
+        "Stiffness E of the material of ball and socket. Steel has 206 GPa. A softer material gives longer, gentler \
+         impacts and deeper penetration, and lets the solver take larger steps.",
+        "Paper eq. (19), stiffness K",
+    ),
+    contact(
+        "contact.poisson_ratio",
+        field!(poisson_ratio),
+        "Poisson's ratio",
+        number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
+        Value::Number(DEFAULT.poisson_ratio),
+        "Sideways shrinking of the material when stretched, nu. Metals have about 0.3. It changes the contact \
+         stiffness by at most a third.",
+        "Paper eq. (19), stiffness K",
+    ),
+    contact(
+        "contact.ball_radius",
+        field!(ball_radius),
+        "Ball radius",
+        logarithmic(D::Length, 1e-4, 1.0, "mm", (1e-3, 0.1)),
+        Value::Number(DEFAULT.ball_radius),
+        "Radius r of the ball; the socket has R = r + c. A larger ball in the same gap fits more closely, so the \
+         contact is stiffer.",
+        "Paper eqs. (9), (12), (19)",
+    ),
+    contact(
+        "contact.friction_velocity",
+        word_field!(friction_velocity),
+        "Friction velocity",
+        Kind::Choice(FrictionVelocity::WORDS),
+        Value::Choice(DEFAULT.friction_velocity.word()),
+        "Which sliding velocity friction reads. centres is the paper's: the relative velocity of the two centres, \
+         which leaves out the turning of the ball. surface is what the contact feels: the relative velocity of the \
+         two touching points. printed takes the points of (13) as printed, which do not turn with their bodies: \
+         (1 - c/e) times centres, next to nothing in a gap that is large against the penetration. It is there to compare \
+         with the paper.",
+        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface; (13) alone for printed",
+    ),
+    contact(
+        "contact.slip_speed_low",
+        field!(slip_speed_low),
+        "Low slip speed",
+        logarithmic(D::Speed, 0.0, 1.0, "mm/s", (1e-7, 1e-3)),
+        Value::Number(DEFAULT.slip_speed_low),
+        "v_a: below this sliding speed there is no friction, so that its direction never jumps at rest. It must stay \
+         below the high slip speed.",
+        "Paper eq. (21)",
+    ),
+    contact(
+        "contact.slip_speed_high",
+        field!(slip_speed_high),
+        "High slip speed",
+        logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
+        Value::Number(DEFAULT.slip_speed_high),
+        "v_theta: above this sliding speed friction is full; below it a ball creeps where dry friction would hold \
+         it. A smaller value creeps less and is stiffer to compute.",
+        "Paper eq. (21)",
+    ),
+    contact(
+        "contact.impact_speed_floor",
+        field!(impact_speed_floor),
+        "Impact speed floor",
+        logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
+        Value::Number(DEFAULT.impact_speed_floor),
+        "Least approach speed that the damping term divides by. Without a floor the last, softest touches would be \
+         infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
+        "Paper eq. (19), the speed at the start of contact",
+    ),
+    contact(
+        "contact.approach_speed",
+        word_field!(approach_speed),
+        "Approach speed",
+        Kind::Choice(ApproachSpeed::WORDS),
+        Value::Choice(DEFAULT.approach_speed.word()),
+        "Which speed the damping term divides by. start is the paper's: the penetration rate at which the contact began. A \
+         joint that touches softly and is then hit by its neighbour is damped many times too strongly by it. largest is \
+         the largest rate of the contact so far, which keeps damping within what the law gives an undisturbed impact; \
+         such an impact is the same with both.",
+        "Paper eq. (19), the speed at the start of contact",
+    ),
+    contact(
+        "contact.normal_law",
+        word_field!(normal_law),
+        "Normal law",
+        Kind::Choice(NormalLaw::WORDS),
+        Value::Choice(DEFAULT.normal_law.word()),
+        "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
+         elastic; hunt-crossley, flores and gonthier differ in their damping, and gonthier alone gives the restitution \
+         asked for.",
+        "Paper eq. (19) for lankarani-nikravesh",
+    ),
+    contact(
+        "contact.friction_law",
+        word_field!(friction_law),
+        "Friction law",
+        Kind::Choice(FrictionLaw::WORDS),
+        Value::Choice(DEFAULT.friction_law.word()),
+        "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
+         the two slip speeds; none leaves friction out.",
+        "Paper eqs. (20), (21)",
+    ),
+    gravity(
+        "gravity.x",
+        field!(machine.gravity.x),
+        "Gravity along X",
+        0.0,
+        "World X component of gravity. In the paper's machine X points down: +9.81 m/s^2. A file that gives any component has 0 for the others.",
+    ),
+    gravity(
+        "gravity.y",
+        field!(machine.gravity.y),
+        "Gravity along Y",
+        0.0,
+        "World Y component of gravity. A file that gives any component has 0 for the others.",
+    ),
+    gravity(
+        "gravity.z",
+        field!(machine.gravity.z),
+        "Gravity along Z",
+        -9.81,
+        "World Z component of gravity: -9.81 m/s^2 where Z points up. A file that gives any component has 0 for the others.",
+    ),
+    drive(
+        "spcmm.slider_plane",
+        optional_field!(spcmm.slider_plane),
+        "Slider plane",
+        number(D::Length, -1.0, 1.0, "mm", (0.0, 0.1)),
+        Value::Number(0.032),
+        "a1: distance along +X from the origin to the plane in which the sliders move. The paper does not print it; \
+         32 mm keeps the trajectory feasible all period long. Much larger values bring the rods near a singular \
+         position, where reactions grow without bound.",
+        "Paper eqs. (37) to (39), in x - (a1 + L1)",
+    ),
+    drive(
+        "spcmm.amplitude_x",
+        optional_field!(spcmm.amplitude_x),
+        "Amplitude of x",
+        number(D::Length, 0.0, 1.0, "mm", (0.0, 0.05)),
+        Value::Number(0.025),
+        "Amplitude of the platform's commanded travel along X. With 0 and no beta amplitude the sliders rest.",
+        "Paper eq. (59)",
+    ),
+    drive(
+        "spcmm.amplitude_beta",
+        optional_field!(spcmm.amplitude_beta),
+        "Amplitude of beta",
+        number(D::Angle, 0.0, 1.0, "rad", (0.0, 0.1)),
+        Value::Number(0.025),
+        "Amplitude of the platform's commanded swing in beta.",
+        "Paper eq. (59)",
+    ),
+    drive(
+        "spcmm.frequency",
+        optional_field!(spcmm.frequency),
+        "Drive frequency",
+        number(D::Frequency, 0.0, 50.0, "Hz", (0.0, 5.0)),
+        Value::Number(0.5),
+        "How many times a second the trajectory repeats: 0.5 Hz is the paper's period of 2 s. Accelerations grow \
+         with its square. With 0 the sliders rest.",
+        "Paper eq. (59)",
+    ),
+    at_reset(row(
+        "chain.links",
+        Access::Scene(Field {
+            get: |scene| {
+                let links = scene.chain.map(|chain| Value::Count(chain.links as u64));
+                links.unwrap_or(Value::Unset)
+            },
+            set: |scene, value| {
+                if let (Some(chain), Value::Count(links)) = (&mut scene.chain, value) {
+                    chain.links = usize::try_from(*links).expect("the table allows a few thousand");
+                }
+            },
+        }),
+        "Links",
+        "Chain",
+        Kind::Count { min: 1, max: 4096 },
+        Value::Count(8),
+        Scope::Chain,
+        "Number of equal links, each hung on the one above by a ball joint with clearance. The cost of a step grows \
+         in proportion.",
+        "Newton-Euler equations of each link; the mass matrix is block diagonal",
+    )),
+    at_reset(row(
+        "formulation",
+        Access::Scene(word_field!(machine.formulation)),
+        "Formulation",
+        "Solver",
+        Kind::Choice(Formulation::WORDS),
+        Value::Choice("tree"),
+        Scope::Every,
+        "Equations of motion. tree uses as few coordinates as there are freedoms once the ball joints are cut. \
+         lagrange is the paper's: all bodies free, every joint a constraint with a multiplier, stabilised after \
+         Baumgarte. Both give the same motion; tree is faster.",
+        "Paper eqs. (44) to (58) for lagrange",
+    )),
+    at_reset(row(
+        "start",
+        Access::Scene(word_field!(machine.start)),
+        "Start",
+        "Solver",
+        Kind::Choice(StartRule::WORDS),
+        Value::Choice("as-given"),
+        Scope::Every,
+        "Where a run begins. as-given takes the start values of the joints. ideal takes them as guesses and closes every ball \
+         joint, with the balls in the middle of their sockets: they drop first. settled lays each ball on the wall of its \
+         socket where the mechanism without play presses it, as deep as that force needs.",
+        "Constraints of paper eq. (45); (19) at rest for settled",
+    )),
+    row(
+        "solver.method",
+        Access::Scene(word_field!(machine.solver.method)),
+        "Method",
+        "Solver",
+        Kind::Choice(Method::WORDS),
+        Value::Choice("automatic"),
+        Scope::Every,
+        "Time stepper. semi-implicit-euler (order 1), imex-euler (order 1, implicit in the contacts, so \
+         that settled ones stay still at steps that resolve no impact) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
+         order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
+         rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and takes longer steps where contacts \
+         have settled; radau5 (Radau IIA, implicit, order 5) takes the longest there; automatic changes between \
+         dopri5, radau5 and, while friction limits the step, a rosenbrock that knows friction alone.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "solver.step",
+        Access::Scene(field!(machine.solver.step)),
+        "Step",
+        "Solver",
+        logarithmic(D::Time, 1e-7, 1e-2, "us", (1e-6, 1e-3)),
+        Value::Number(10e-6),
+        Scope::Every,
+        "Step of a fixed-step method, first step of an adaptive one. An impact lasts about 0.1 ms: a fixed step \
+         above 20 us no longer resolves it.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "solver.tolerance",
+        Access::Scene(field!(machine.solver.tolerance)),
+        "Tolerance",
+        "Solver",
+        logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
+        Value::Number(1e-6),
+        Scope::Every,
+        "Relative error that an adaptive method allows itself in one step; where it is above 1e-5, automatic takes its explicit \
+         steps, those through impacts, with 1e-5. The motion between impacts is sensitive: use 1e-9 or less to compare single \
+         impacts.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "solver.preset",
+        Access::Scene(Field {
+            get: |scene| scene.machine.solver.preset.map_or(Value::Unset, |preset| Value::Choice(preset.word())),
+            set: |scene, value| scene.apply_preset(word_of(value)),
+        }),
+        "Preset",
+        "Solver",
+        Kind::Choice(Preset::WORDS),
+        Value::Unset,
+        Scope::Every,
+        "Method, step and tolerance by name: preview (automatic, 1e-4), real-time (automatic, 1e-6), \
+         accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    at_reset(row(
+        "solver.energy_ledger",
+        Access::Scene(field!(machine.solver.energy_ledger)),
+        "Energy ledger",
+        "Solver",
+        Kind::Choice(&SWITCH),
+        Value::Choice("on"),
+        Scope::Every,
+        "Keeps count of where the energy comes from and where it goes: drives, gravity, contacts, losses, and the \
+         residual, which is the error of the integration. It changes no step; without it a run is a little faster.",
+        "Integrals of force times velocity; power of friction from (20) at the points of (24)",
+    )),
+    row(
+        "view.down",
+        Access::Scene(word_field!(view.down)),
+        "Down on screen",
+        "View",
+        Kind::Choice(SignedAxis::WORDS),
+        Value::Choice("-z"),
+        Scope::Every,
+        "World axis that points down on the screen. It moves the camera only; gravity has its own keys.",
+        "No equation: display only",
+    ),
+];
+
+/// The parameter table as a Markdown page.
+pub fn reference_page() -> String {
+    let mut page = String::from(
+        "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
+         A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
+         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for parameter in table() {
+        let effect = if parameter.at_reset { "at reset" } else { "at once" };
+        let cells = [
+            format!("`{}`", parameter.key),
+            parameter.label.to_owned(),
+            parameter.show(&parameter.default),
+            parameter.range(),
+            parameter.units(),
+            parameter.scope.describe().to_owned(),
+            effect.to_owned(),
+            parameter.help.to_owned(),
+            parameter.equation.to_owned(),
+        ];
+        page.push_str(&format!("| {} |\n", cells.join(" | ")));
+    }
+    page
+}
+
+/// The row of a key (without a joint's name).
+pub fn find(key: &str) -> Option<&'static Parameter> {
+    TABLE.iter().find(|parameter| parameter.key == key)
+}
+
+/// Last part of a contact key: `clearance` of `contact.clearance`.
+pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
+    match parameter.access {
+        Access::Contact(_) => parameter.key.strip_prefix("contact."),
+        Access::Scene(_) | Access::Number => None,
+    }
+}
+
+/// Rows of `[contact]`, which a joint may override: last part of the key, and the field.
+pub(super) fn contact_rows() -> impl Iterator<Item = (&'static str, Field<contact::Parameters>)> {
+    TABLE.iter().filter_map(|parameter| match parameter.access {
+        Access::Contact(field) => Some((parameter.key.strip_prefix("contact.")?, field)),
+        Access::Scene(_) | Access::Number => None,
+    })
+}

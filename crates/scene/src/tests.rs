@@ -1,0 +1,796 @@
+//! The built-in scenes as a whole: they load, and their loops close.
+
+use std::sync::Arc;
+
+use super::*;
+use jointplay_physics::machine::ElementKind;
+
+/// World poses of all bodies at the file's start; slider coordinates of the spcmm law as derived by `physics`.
+fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
+    // Roots of the paper's eq. (39) at t = 0 for a1 = 32 mm.
+    let sliders = [0.136_493_548_0, 0.240_922_773_5, 0.186_472_405_6];
+    let mut poses: Vec<(Vec3, Quat)> = Vec::new();
+    for joint in &scene.machine.joints {
+        let (origin, frame) = joint.parent.map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
+        let slider = joint.drive.as_ref().and_then(Drive::closed_form);
+        let q = match (slider, joint.start) {
+            (Some(coordinate), _) => sliders[coordinate],
+            (_, JointStart::Scalar { position, .. }) => position,
+            (_, JointStart::Pair { .. }) => panic!("no built-in scene has one"),
+            (_, JointStart::Pose { position, rotation, .. }) => {
+                poses.push((position, rotation));
+                continue;
+            }
+        };
+        let (rotation, slide) = match joint.kind {
+            JointKind::Revolute => {
+                let turn = Quat::from_axis_angle(&nalgebra::Unit::new_normalize(joint.axis), q);
+                (frame * turn * joint.rotation, Vec3::zeros())
+            }
+            _ => (frame * joint.rotation, joint.axis * q),
+        };
+        poses.push((origin + frame * (joint.parent_point + slide) - rotation * joint.child_point, rotation));
+    }
+    poses
+}
+
+#[test]
+fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
+    for name in BUILT_IN {
+        let scene = Scene::load(name, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(scene.name, name);
+        assert!(!scene.machine.ball_joints.is_empty(), "{name}");
+        if scene.machine.start == StartRule::Ideal {
+            // Put together when it starts: `tests/physics/machines.rs`.
+            continue;
+        }
+        let poses = start_poses(&scene);
+        let point = |end: Attachment| end.body.map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point);
+        for joint in &scene.machine.ball_joints {
+            let e = point(joint.ball) - point(joint.socket);
+            // The slider coordinates are given to ten digits.
+            assert!(e.norm() < 1e-9, "{name}: {} starts {:e} m off its socket's centre", joint.name, e.norm());
+        }
+    }
+}
+
+#[test]
+fn joints_follow_their_bodies_and_parents_come_first() {
+    for name in BUILT_IN {
+        let scene = Scene::load(name, &[]).unwrap();
+        for (index, joint) in scene.machine.joints.iter().enumerate() {
+            assert_eq!(joint.child, index, "{name}");
+            assert!(joint.parent.is_none_or(|parent| parent < index), "{name}");
+        }
+    }
+}
+
+fn changed(name: &str, changes: &[(&str, &str)]) -> Scene {
+    let changes: Vec<_> = changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
+    Scene::load(name, &changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn every_row_of_the_table_reads_writes_and_shows_its_default() {
+    for parameter in table() {
+        if parameter.default != Value::Unset {
+            let text = parameter.write(&parameter.default);
+            assert_eq!(parameter.read(&text), Ok(parameter.default.clone()), "{}", parameter.key);
+        }
+        assert!(parameter.help.ends_with('.'), "{}", parameter.key);
+        if let Kind::Number { min, max, slider: (low, high), dimension, display, logarithmic, .. } = parameter.kind {
+            assert!(min <= low && low < high && high <= max, "{}", parameter.key);
+            assert!(!logarithmic || low > 0.0, "{}", parameter.key);
+            let units = unit_names(dimension);
+            assert!(units.contains(&display) || units.is_empty() && display.is_empty());
+        }
+        assert_eq!(table().iter().filter(|other| other.key == parameter.key).count(), 1);
+        assert!(reference_page().contains(&format!("| `{}` |", parameter.key)));
+    }
+}
+
+#[test]
+fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
+    for name in BUILT_IN {
+        let original = Scene::load(name, &[]).unwrap();
+        for parameter in original.parameters() {
+            let mut scene = original.clone();
+            let value = scene.get(parameter.key).unwrap();
+            if value == Value::Unset {
+                continue;
+            }
+            scene.set_value(parameter.key, &value).unwrap();
+            assert_eq!(scene.get(parameter.key).unwrap(), value, "{name}: {}", parameter.key);
+            assert_eq!(scene.changes.len(), 1);
+            assert_eq!(scene.machine.bodies, original.machine.bodies);
+            assert_eq!(scene.machine.solver.method, original.machine.solver.method);
+        }
+    }
+}
+
+#[test]
+fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
+    let orders = [["joint.S1.clearance", "contact.clearance"], ["contact.clearance", "joint.S1.clearance"]];
+    for [first, second] in orders {
+        let value = |key: &str| {
+            if key.starts_with("joint") { "0.7 mm" } else { "0.1 mm" }
+        };
+        let scene = changed("spcmm", &[(first, value(first)), (second, value(second))]);
+        let clearances: Vec<f64> = scene.machine.ball_joints.iter().map(|joint| joint.contact.clearance).collect();
+        assert_eq!(clearances, [0.7e-3, 0.1e-3, 0.1e-3]);
+        assert_eq!(scene.get("contact.clearance"), Ok(Value::Number(0.1e-3)));
+        assert_eq!(scene.get("joint.S2.clearance"), Ok(Value::Number(0.1e-3)));
+        assert_eq!(scene.overrides[0], ["clearance"]);
+    }
+    // The file's own override at B stays.
+    let scene = changed("slider-crank", &[("contact.clearance", "0.5 mm")]);
+    assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.0);
+    assert_eq!(scene.machine.ball_joints[1].contact.clearance, 0.5e-3);
+}
+
+#[test]
+fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
+    let scene = changed("spcmm", &[("contact.friction", "0.2"), ("contact.friction", "0.3")]);
+    assert_eq!(scene.machine.contact.friction, 0.3);
+    assert_eq!(scene.changes, [("contact.friction".to_owned(), "0.3".to_owned())]);
+    // A gap wider than the file's ball is fine with the larger ball that comes with it.
+    let scene = changed("spcmm", &[("contact.clearance", "12 mm"), ("contact.ball_radius", "20 mm")]);
+    assert_eq!(scene.machine.ball_joints[2].contact.clearance, 0.012);
+}
+
+#[test]
+fn explicit_solver_settings_beat_a_preset_in_either_order() {
+    let preset = ("solver.preset", "reference");
+    let method = ("solver.method", "rk4");
+    for changes in [[preset, method], [method, preset]] {
+        let solver = changed("spcmm", &changes).machine.solver;
+        assert_eq!(solver.method, jointplay_physics::integrate::Method::RungeKutta4);
+        assert_eq!(solver.tolerance, 1e-11);
+        assert_eq!(solver.preset, Some(Preset::Reference));
+    }
+    let text = |solver: &str| format!("{}\n{solver}", built_in_text("pendulum").unwrap());
+    let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
+    assert_eq!(Scene::parse(&file, None, &[]).unwrap().machine.solver.tolerance, 1e-5);
+    // Nor does a preset requested later replace what the file gives by name.
+    let ask = [("solver.preset".to_owned(), "reference".to_owned())];
+    let solver = Scene::parse(&file, None, &ask).unwrap().machine.solver;
+    assert_eq!(solver.tolerance, 1e-5);
+    assert_eq!(solver.method, jointplay_physics::integrate::Method::DormandPrince5);
+}
+
+#[test]
+fn a_key_of_the_file_alone_says_so() {
+    for key in ["spcmm.gamma", "output.body", "name", "title"] {
+        let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
+        assert!(error.message.starts_with("only in the scene file"), "{error}");
+    }
+}
+
+#[test]
+fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
+    for (kind, like) in [("revolute", "10 deg"), ("prismatic", "10 mm")] {
+        let text = format!(
+            "[[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+             [[joint]]\nname = \"P\"\nkind = \"{kind}\"\nchild = \"rod\"\naxis = [0, 0, 1]\n\
+             drive = {{ law = \"harmonic\", frequency = \"1 Hz\" }}"
+        );
+        let error = Scene::parse(&text, None, &[]).unwrap_err();
+        assert!(error.message.contains(&format!("\"{like}\"")), "{error}");
+    }
+}
+
+#[test]
+fn presets_say_in_their_help_what_they_are() {
+    let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
+    for preset in Preset::ALL {
+        assert!(help.contains(&format!("{:e}", preset.point().2)), "{preset:?}");
+    }
+}
+
+#[test]
+fn a_change_can_be_taken_back() {
+    let mut scene = changed("spcmm", &[("joint.S1.friction", "0"), ("contact.friction", "0.4")]);
+    scene.undo_change("joint.S1.friction").unwrap();
+    assert_eq!(scene.get("joint.S1.friction"), Ok(Value::Number(0.4)));
+    scene.undo_change("contact.friction").unwrap();
+    assert_eq!(scene.get("contact.friction"), Ok(Value::Number(0.15)));
+    assert!(scene.changes.is_empty());
+}
+
+#[test]
+fn a_chain_is_rebuilt_with_its_links() {
+    let mut scene = changed("chain", &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")]);
+    assert_eq!((scene.machine.bodies.len(), scene.machine.ball_joints.len()), (8, 8));
+    scene.set("chain.links", "3").unwrap();
+    assert_eq!((scene.machine.bodies.len(), scene.machine.joints.len(), scene.machine.ball_joints.len()), (3, 3, 3));
+    assert_eq!(scene.machine.ball_joints[1].contact.friction, 0.4);
+    assert_eq!(scene.machine.output.body, 2);
+    assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
+    // A change of a joint that no longer exists is dropped with it.
+    assert!(scene.get("joint.J7.friction").is_err());
+    assert_eq!(scene.changes.len(), 2);
+    assert_eq!(changed("chain", &[("chain.links", "256")]).machine.bodies.len(), 256);
+}
+
+#[test]
+fn the_slider_plane_moves_sliders_and_rails() {
+    let mut scene = changed("spcmm", &[]);
+    scene.set("spcmm.slider_plane", "40mm").unwrap();
+    assert_eq!(scene.machine.joints[0].parent_point, Vec3::new(0.040, 0.0, 0.0));
+    let Geometry::Box { centre, .. } = scene.machine.fixed_shapes[0].geometry else { panic!("a rail is a box") };
+    assert!((centre.x - 0.018).abs() < 1e-15);
+    assert_eq!(scene.machine.spcmm.map(|spcmm| spcmm.slider_plane), Some(0.040));
+}
+
+#[test]
+fn doubtful_choices_are_warned_of() {
+    assert!(changed("spcmm", &[]).machine.warnings().is_empty());
+    let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).machine.warnings();
+    assert!(warnings.len() == 1 && warnings[0].to_string().contains("S1, S2, S3: restitution 0.3"), "{warnings:?}");
+    for (law, asked, given) in [
+        ("lankarani-nikravesh", "0.9", None),
+        ("lankarani-nikravesh", "0.8", Some("0.847")),
+        ("hunt-crossley", "0.8", Some("0.833")),
+        ("hertz", "0.9", Some("1.000")),
+        ("hertz", "1", None),
+        ("flores", "0.7", None),
+        ("flores", "0.1", Some("0.069")),
+        ("gonthier", "0.1", None),
+    ] {
+        let warnings =
+            changed("spcmm", &[("contact.restitution", asked), ("contact.normal_law", law)]).machine.warnings();
+        let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        match given {
+            None => assert_eq!(said, [""; 0], "{law} {asked}"),
+            Some(given) => assert!(
+                said.len() == 1 && said[0].contains(&format!("restitution {asked} with {law} gives {given} ")),
+                "{law} {asked}: {said:?}"
+            ),
+        }
+    }
+    let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).machine.warnings();
+    assert!(warnings.len() == 1 && warnings[0].to_string().starts_with("S2: clearance 0.01 mm"), "{warnings:?}");
+    assert!(changed("spcmm", &[("contact.clearance", "0")]).machine.warnings().is_empty());
+    let coarse = [("solver.method", "rk4"), ("solver.step", "50 us")];
+    assert!(changed("spcmm", &coarse).machine.warnings()[0].to_string().contains("50 us"));
+}
+
+#[test]
+fn the_built_in_scenes_carry_the_published_numbers() {
+    let scene = changed("spcmm", &[]);
+    let find = |name: &str| scene.machine.bodies.iter().find(|body| body.name == name).unwrap();
+    assert_eq!(find("platform").inertia.diagonal(), Vec3::new(4.44e-4, 3.31e-4, 1.35e-4));
+    // 1.92e-3 about the hinge axis: y for rods 1 and 2, z for rod 3.
+    for (rod, hinge) in [("rod1", Vec3::y()), ("rod2", Vec3::y()), ("rod3", Vec3::z())] {
+        let body = find(rod);
+        assert_eq!(hinge.dot(&(body.inertia * hinge)), 1.92e-3);
+        let child = scene.machine.bodies.iter().position(|other| other.name == rod).unwrap();
+        assert_eq!(scene.machine.joints[child].axis, hinge);
+    }
+    let mass: f64 = scene.machine.bodies.iter().map(|body| body.mass).sum();
+    assert!((mass - (3.0 * 0.168 + 3.0 * 0.384 + 0.490)).abs() < 1e-15);
+    assert_eq!(scene.machine.gravity, Vec3::new(9.81, 0.0, 0.0));
+    assert_eq!(scene.machine.start, StartRule::Ideal);
+    assert_eq!(scene.machine.bodies[scene.machine.output.body].name, "platform");
+    assert_eq!(scene.machine.contact.friction_velocity, jointplay_physics::contact::FrictionVelocity::Centres);
+}
+
+#[test]
+fn the_slider_crank_starts_with_velocities_that_fit_together() {
+    let scene = changed("slider-crank", &[]);
+    let rod = scene.machine.bodies.iter().position(|body| body.name == "rod").unwrap();
+    let JointStart::Pose { rotation, velocity, angular_velocity, .. } = scene.machine.joints[rod].start else {
+        panic!("the rod is free")
+    };
+    let end = |x: f64| velocity + angular_velocity.cross(&(rotation * Vec3::new(x, 0.0, 0.0)));
+    // Crank pin: 6 rad/s times 0.08 m against Y; slider: 0.24 m/s along X.
+    assert!((end(-0.15) - Vec3::new(0.0, -0.48, 0.0)).norm() < 1e-15);
+    assert!((end(0.15) - Vec3::new(0.24, 0.0, 0.0)).norm() < 1e-15);
+    assert!(angular_velocity.dot(&(rotation * Vec3::x())).abs() < 1e-15);
+    let driven = changed("slider-crank-driven", &[]);
+    let crank = driven.machine.joints.iter().find(|joint| joint.name == "crank");
+    let law = crank.and_then(|joint| joint.drive.as_ref()).expect("driven");
+    assert_eq!(*law, Drive::Constant { position: 0.0, velocity: 6.0 });
+    // Otherwise they are the same mechanism.
+    assert_eq!(driven.machine.bodies, scene.machine.bodies);
+    assert_eq!(driven.machine.ball_joints, scene.machine.ball_joints);
+}
+
+#[test]
+fn all_forms_of_a_rotation_agree() {
+    let rotation = |form: &str| {
+        let text = format!(
+            "[[body]]\nname = \"a\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"a\"\nkind = \"free\"\n\
+             child = \"a\"\nchild_point = \"1 0 0 m\"\nstart = {{ position = \"0 0 0 m\", rotation = {form}, \
+             angular_velocity = \"0 0 2 rad/s\" }}"
+        );
+        let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let JointStart::Pose { position, rotation, velocity, .. } = scene.machine.joints[0].start else { panic!() };
+        // The joint point, 1 m out on the body's x axis, is at the origin and at rest.
+        assert!((position + rotation * Vec3::x()).norm() < 1e-15);
+        assert!((velocity - Vec3::new(0.0, 0.0, 2.0).cross(&position)).norm() < 1e-15);
+        rotation.to_rotation_matrix().into_inner()
+    };
+    let expected = Mat3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0);
+    for form in [
+        "{ axis = [0, 2, 0], angle = \"90 deg\" }",
+        "{ sequence = \"xzy\", angles = [0, 0, \"90 deg\"] }",
+        "{ x = [0, 0, -3], y = [0, 1, -1] }",
+        "{ quaternion = [1, 0, 1, 0] }",
+    ] {
+        assert!((rotation(form) - expected).norm() < 1e-15, "{form}");
+    }
+    // R = Rx Rz Ry, paper eq. (2): R12 = -sin beta.
+    let r = rotation("{ sequence = \"xzy\", angles = \"10 20 30 deg\" }");
+    assert!((r[(0, 1)] + libm::sin(20.0_f64.to_radians())).abs() < 1e-15);
+    assert!((r[(1, 1)] - libm::cos(10.0_f64.to_radians()) * libm::cos(20.0_f64.to_radians())).abs() < 1e-15);
+}
+
+/// A rod on a slide, with a parameter of its own.
+const OWN: &str = "
+[[parameter]]
+name = \"stroke\"
+label = \"Stroke\"
+value = \"20 mm\"
+range = [\"10 mm\", \"50 mm\"]
+
+[[parameter]]
+name = \"speed\"
+value = \"2 * stroke / 1 s\"
+unit = \"mm/s\"
+
+[[body]]
+name = \"rod\"
+mass = \"1 kg\" # a comment
+centre = \"1 2 3 mm\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"slide\"
+kind = \"prismatic\"
+child = \"rod\"
+axis = [0, 0, 1]
+parent_point = [\"stroke / 2\", 0, \"-(stroke + 1 cm)\"]
+start = { position = \"0.5 * stroke\", velocity = \"speed\" }
+";
+
+#[test]
+fn every_number_of_a_file_is_a_key() {
+    let scene = Scene::parse(OWN, None, &[]).expect("reads");
+    let joint = |scene: &Scene| (scene.machine.joints[0].parent_point, scene.machine.joints[0].start);
+    let start = |position, velocity| JointStart::Scalar { position, velocity };
+    assert_eq!(joint(&scene), (Vec3::new(0.01, 0.0, -0.03), start(0.01, 0.04)));
+    let mut changed = scene.clone();
+    for (key, value) in [
+        ("parameter.stroke", "40 mm"),
+        ("body.rod.mass", "3 kg"),
+        ("body.rod.centre.y", "7 mm"),
+        ("joint.slide.parent_point.x", "1 mm"),
+        ("joint.slide.start.velocity", "5 mm/s"),
+    ] {
+        changed.set(key, value).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(
+            changed.get(key),
+            Ok(Value::Number(parse_quantity(value, changed.source.numbers[key].dimension).unwrap()))
+        );
+    }
+    assert_eq!(joint(&changed), (Vec3::new(0.001, 0.0, -0.05), start(0.02, 0.005)));
+    assert_eq!((changed.machine.bodies[0].mass, changed.machine.bodies[0].centre.y), (3.0, 0.007));
+    assert_eq!(changed.get("parameter.speed"), Ok(Value::Number(0.08)));
+    // Written to the places where the text has them, and nowhere else.
+    let text = changed.to_toml().expect("has its places");
+    for line in [
+        "value = \"40 mm\"",
+        "mass = \"3 kg\" # a comment",
+        "centre = [\"1 mm\", \"7 mm\", \"3 mm\"]",
+        "parent_point = [\"1 mm\", 0, \"-(stroke + 1 cm)\"]",
+        "velocity = \"5 mm/s\"",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    let read = Scene::parse(&text, None, &[]).expect("reads");
+    assert_eq!(joint(&read), joint(&changed));
+    changed.undo_change("parameter.stroke").expect("was changed");
+    assert_eq!(changed.machine.joints[0].parent_point.z, -0.03);
+}
+
+#[test]
+fn a_parameter_of_the_file_is_a_row_like_the_others() {
+    let scene = Scene::parse(OWN, None, &[]).expect("reads");
+    let rows = scene.parameters();
+    let row = rows.iter().find(|row| row.key == "parameter.stroke");
+    let row = row.expect("listed");
+    assert_eq!((row.label, row.display_unit(), row.at_reset), ("Stroke", "mm", true));
+    assert_eq!(row.range(), "10 mm to 50 mm");
+    let speed = scene.parameter("parameter.speed").expect("known");
+    // What follows from others is a number like any other.
+    assert_eq!((speed.label, speed.display_unit()), ("parameter.speed", "m/s"));
+}
+
+#[test]
+fn wrong_numbers_and_expressions_say_what_is_wrong() {
+    let error = |from: &str, to: &str| {
+        let text = OWN.replace(from, to);
+        assert_ne!(text, OWN);
+        Scene::parse(&text, Some("own.toml"), &[]).expect_err(to).to_string()
+    };
+    for (from, to, wanted) in [
+        ("\"stroke / 2\"", "\"strok / 2\"", "no variable `strok` (did you mean `stroke`?)"),
+        ("\"stroke / 2\"", "\"stroke * stroke\"", "gives 0.0004 m^2, which is not in m; units m, cm"),
+        ("\"stroke / 2\"", "\"stroke + speed\"", "adds or compares quantities of different dimensions"),
+        ("\"stroke / 2\"", "\"sin(stroke) * 1 m\"", "takes a function of a quantity that is not a pure number"),
+        ("\"stroke / 2\"", "\"10\"", "needs a unit"),
+        ("\"stroke / 2\"", "\"2 * 5\"", "gives 10, which is not in m"),
+        ("\"1 kg\"", "\"stroke * 1 kg\"", "gives 0.02 kg m, which is not in kg"),
+        (
+            "value = \"20 mm\"",
+            "value = \"60 mm\"",
+            "parameter.stroke = \"60 mm\": out of range; allowed 10 mm to 50 mm",
+        ),
+        ("[\"10 mm\", \"50 mm\"]", "[\"60 mm\", \"50 mm\"]", "the first value must be below the second"),
+        ("\"stroke\"\n", "\"i\"\n", "cannot name a parameter"),
+        ("\"speed\"\nvalue", "\"stroke\"\nvalue", "there is already a parameter of this name"),
+        ("unit = \"mm/s\"", "unit = \"mph\"", "unknown unit"),
+        ("unit = \"mm/s\"\n", "", "its unit cannot be told from an expression"),
+    ] {
+        let error = error(from, to);
+        assert!(error.contains(wanted) && error.starts_with("own.toml:"), "{error}");
+    }
+    let change = |key: &str, value: &str| {
+        let change = (key.to_owned(), value.to_owned());
+        Scene::parse(OWN, None, &[change]).expect_err(key).to_string()
+    };
+    for (key, value, wanted) in [
+        ("parameter.stroke", "5 mm", "parameter.stroke = 5 mm: out of range; allowed 10 mm to 50 mm"),
+        ("body.rod.mass", "-1 kg", "body.rod.mass = -1 kg: out of range; allowed above 0"),
+        ("body.rod.mass", "1", "body.rod.mass = 1: needs a unit"),
+        ("body.rod.maas", "1 kg", "unknown key (did you mean `body.rod.mass`?)"),
+        ("joint.slide.start.velocit", "1 m/s", "did you mean `joint.slide.start.velocity`?"),
+        ("body.rod.centre", "0 0 0 mm", "body.rod.centre = 0 0 0 mm: unknown key"),
+    ] {
+        let error = change(key, value);
+        assert!(error.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn a_pattern_repeats_about_an_axis_and_along_a_line() {
+    let text = "
+[[body]]
+name = \"table\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"table\"
+kind = \"fixed\"
+child = \"table\"
+
+[[pattern]]
+name = \"leg\"
+count = 3
+about = { point = \"10 0 0 mm\", axis = [0, 0, 1] }
+along = \"0 0 5 mm\"
+
+[[pattern.body]]
+name = \"rod\"
+mass = \"i * 2 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[pattern.joint]]
+name = \"free\"
+kind = \"free\"
+child = \"rod\"
+start = { position = \"20 0 0 mm\", velocity = \"1 0 0 m/s\" }
+
+[[pattern.ball_joint]]
+name = \"S\"
+socket = { body = \"table\", at = \"20 0 0 mm\" }
+ball = { body = \"rod\", at = \"0 0 1 mm\" }
+opening = [1, 0, 0]
+
+[[pattern.load]]
+name = \"push\"
+on = { body = \"rod\" }
+force = \"1 0 0 N\"
+
+[[pattern.fixed_shape]]
+form = \"sphere\"
+centre = \"20 0 0 mm\"
+radius = \"1 mm\"
+role = \"frame\"
+";
+    let scene = Scene::parse(text, None, &[]).expect("reads");
+    let names: Vec<&str> = scene.machine.bodies.iter().map(|body| body.name.as_str()).collect();
+    assert_eq!(names, ["table", "rod1", "rod2", "rod3"]);
+    let near = |a: Vec3, b: Vec3| assert!((a - b).norm() < 1e-15, "{a} {b}");
+    for copy in 0..3 {
+        let angle = std::f64::consts::TAU / 3.0 * copy as f64;
+        let radial = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
+        let place = Vec3::new(0.01, 0.0, 0.005 * copy as f64) + 0.01 * radial;
+        let joint = &scene.machine.ball_joints[copy];
+        assert_eq!(joint.name, format!("S{}", copy + 1));
+        near(joint.socket.point, place);
+        // In the rod's own frame nothing moves.
+        near(joint.ball.point, Vec3::new(0.0, 0.0, 0.001));
+        near(joint.opening, radial);
+        assert_eq!(joint.ball.body, Some(copy + 1));
+        let JointStart::Pose { position, velocity, rotation, .. } = scene.machine.joints[copy + 1].start else {
+            panic!("free");
+        };
+        near(position, place);
+        near(velocity, radial);
+        near(rotation * Vec3::x(), radial);
+        let ElementKind::Load(load) = &scene.machine.elements[copy].kind else {
+            panic!("a load");
+        };
+        near(load.force, radial);
+        assert_eq!(scene.machine.bodies[copy + 1].mass, 2.0 * (copy + 1) as f64);
+        let Geometry::Sphere { centre, .. } = scene.machine.fixed_shapes[copy].geometry else {
+            panic!("sphere");
+        };
+        near(centre, place);
+    }
+    // One copy alone can be changed, but not written back.
+    let mut changed = scene.clone();
+    changed.set("body.rod2.mass", "9 kg").expect("a key");
+    assert_eq!(changed.machine.bodies[2].mass, 9.0);
+    let error = changed.to_toml().expect_err("has no place of its own");
+    assert!(error.message.contains("every copy of a pattern has it"), "{error}");
+    for (from, to, wanted) in [
+        ("count = 3", "count = 0", "out of range; allowed 1 to 10000"),
+        (
+            "about = { point = \"10 0 0 mm\", axis = [0, 0, 1] }\nalong = \"0 0 5 mm\"\n",
+            "",
+            "missing `about` or `along`",
+        ),
+        (
+            "form = \"sphere\"\ncentre = \"20 0 0 mm\"\nradius = \"1 mm\"",
+            "form = \"box\"\ncentre = \"20 0 0 mm\"\nsize = \"1 1 1 mm\"",
+            "a fixed box keeps to the world's axes",
+        ),
+        ("child = \"rod\"", "child = \"rot\"", "no body `rot`"),
+        ("count = 3", "count = 3\nsize = 2", "unknown key"),
+    ] {
+        let error = Scene::parse(&text.replace(from, to), None, &[]).expect_err(to);
+        assert!(error.message.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn a_file_takes_its_parts_from_others() {
+    let leg = "
+[[parameter]]
+name = \"reach\"
+value = \"30 mm\"
+
+[[body]]
+name = \"leg\"
+mass = \"2 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"leg\"
+kind = \"free\"
+child = \"leg\"
+start = { position = [\"reach\", 0, 0] }
+";
+    let text = "
+include = [\"leg.toml\"]
+
+[[ball_joint]]
+name = \"S\"
+socket = { body = \"world\", at = [\"reach\", 0, 0] }
+ball = { body = \"leg\" }
+";
+    let with = |leg: &str, text: &str, changes: &[(&str, &str)]| {
+        let beside = Texts::from([("leg.toml".to_owned(), Arc::from(leg))]);
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        Scene::parse_with(text, Some("scene.toml"), &beside, &changes)
+    };
+    let mut scene = with(leg, text, &[("body.leg.mass", "3 kg")]).expect("reads");
+    assert_eq!(scene.machine.bodies[0].mass, 3.0);
+    assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.03);
+    // Read again from what was read before.
+    scene.set("parameter.reach", "40 mm").expect("a key");
+    assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.04);
+    assert_eq!(scene.machine.bodies[0].mass, 3.0);
+    let error = scene.to_toml().expect_err("two files").to_string();
+    assert!(error.contains("another file, which this one includes"), "{error}");
+    for (leg, text, place, wanted) in [
+        (leg.replace("2 kg", "2"), text.to_owned(), "leg.toml:8:8: body.leg.mass", "needs a unit"),
+        (leg.replace("[[body]]", "[[body"), text.to_owned(), "leg.toml:6:7: ", "not valid TOML"),
+        (
+            format!("start = \"ideal\"\n{leg}"),
+            text.to_owned(),
+            "leg.toml:1:1: start",
+            "move it to the scene's own file",
+        ),
+        (
+            format!("include = [\"foot.toml\"]\n{leg}"),
+            text.to_owned(),
+            "leg.toml:1:1: include: ",
+            "name them in `include` of the scene's own file",
+        ),
+        (text.to_owned(), text.to_owned(), "scene.toml:2:12: include[0]", "cannot include itself"),
+        (
+            leg.to_owned(),
+            text.replace("[[ball", "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[ball"),
+            "leg.toml:7:8: body.leg.name = \"leg\"",
+            "in line 5 of scene.toml; names must differ, for example `leg2`",
+        ),
+        (
+            leg.to_owned(),
+            text.replace("[[ball", "[[parameter]]\nname = \"reach\"\nvalue = \"1 mm\"\n[[ball"),
+            "leg.toml:3:8: parameter.reach.name = \"reach\"",
+            "in line 5 of scene.toml; names must differ",
+        ),
+        (leg.to_owned(), text.replace("leg.toml", "arm.toml"), "scene.toml:2:12: include[0]", "has no folder"),
+        (
+            leg.to_owned(),
+            text.replace("\"leg.toml\"", "\"leg.toml\", \"leg.toml\""),
+            "scene.toml:2:24: include[1]",
+            "included already",
+        ),
+        (
+            leg.to_owned(),
+            text.replace("name = \"S\"", "name = \"leg\""),
+            "scene.toml:5:8: joint.leg.name",
+            "in line 12 of leg.toml",
+        ),
+    ] {
+        let error = with(&leg, &text, &[]).expect_err(wanted).to_string();
+        assert!(error.starts_with(place) && error.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn a_body_of_a_density_weighs_what_its_shapes_do() {
+    let text = |body: &str| {
+        format!(
+            "[[body]]\nname = \"bar\"\n{body}\n[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"bar\"\nstart = {{ position = [0, 0, 0] }}\n"
+        )
+    };
+    let bar = "shapes = [{ form = \"box\", centre = \"50 0 0 mm\", size = \"100 20 10 mm\", role = \"frame\" }]";
+    let read = |body: String| Scene::parse(&text(&body), Some("bar.toml"), &[]);
+    let scene = read(format!("density = \"7.85 g/cm^3\"\n{bar}")).expect("reads");
+    let body = &scene.machine.bodies[0];
+    assert!((body.mass - 0.157).abs() < 1e-15 && (body.centre - Vec3::new(0.05, 0.0, 0.0)).norm() < 1e-17);
+    let moments = Vec3::new(0.01 * 0.01 + 0.02 * 0.02, 0.1 * 0.1 + 0.01 * 0.01, 0.1 * 0.1 + 0.02 * 0.02);
+    let expected = Mat3::from_diagonal(&(moments * (0.157 / 12.0)));
+    assert!((body.inertia - expected).amax() < 1e-18);
+    for (body, wanted) in [
+        (
+            format!("density = \"7850 kg/m^3\"\nmass = \"1 kg\"\n{bar}"),
+            "bar.toml:4:8: body.bar.mass = \"1 kg\": not allowed here: it follows",
+        ),
+        ("density = \"7850 kg/m^3\"".to_owned(), "needs `shapes` with a volume"),
+        (
+            format!("density = \"0 kg/m^3\"\n{bar}"),
+            "out of range; allowed above 0 up to 100000 kg/m^3; units kg/m^3, g/cm^3",
+        ),
+    ] {
+        let error = read(body).expect_err(wanted).to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
+    let text = |value: &str, more: &str| {
+        format!(
+            "[contact]\n{more}\n[[parameter]]\nname = \"radius\"\nvalue = \"50 mm\"\n[[parameter]]\nname = \"rate\"\nvalue = \"60 rpm\"\n\
+             [[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+             [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"rod\"\naxis = [0, 0, 1]\n{value}\n"
+        )
+    };
+    let read = |value: &str, more: &str| Scene::parse(&text(value, more), Some("own.toml"), &[]);
+    let start = |value: &str| {
+        let scene = read(&format!("start = {{ position = \"{value}\" }}"), "");
+        let JointStart::Scalar { position, .. } =
+            scene.unwrap_or_else(|error| panic!("{error}")).machine.joints[0].start
+        else {
+            panic!("a hinge");
+        };
+        position
+    };
+    assert_eq!(start("asin(0.5)"), libm::asin(0.5));
+    assert_eq!(start("atan2(1, 2) + 0 deg"), libm::atan2(1.0, 2.0));
+    assert!((start("2 * 15°") - 0.5235987755982988).abs() < 1e-15);
+    let scene = read("", "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"").expect("reads");
+    assert!((scene.machine.contact.clearance - 0.21e-3).abs() < 1e-18);
+    assert_eq!(scene.machine.contact.friction, 1.0 / 3.0);
+    // A power at a unit is one of the unit.
+    let scene = read("", "clearance = \"3 mm^2 / (2 mm)^2 * 0.4 mm\"").expect("reads");
+    assert!((scene.machine.contact.clearance - 0.3e-3).abs() < 1e-18);
+    for inertia in ["0.3 kg * 1.0001 m^2 / 12", "0.3 kg * 1.0001 m² / 12", "0.3 kg * (1 m)^2 * 1.0001 / 12"] {
+        let components = format!("[\"1e-3 kg m^2\", \"{inertia}\", \"{inertia}\"]");
+        let text = text("", "").replace("\"1 1 1 kg m^2\"", &components);
+        let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!((scene.machine.bodies[0].inertia[(1, 1)] - 0.0250025).abs() < 1e-15);
+    }
+    let drive = |law: &str| format!("drive = {{ law = {law} }}");
+    let spin = "\"constant\", velocity = \"rate\"";
+    assert!(read(&drive(spin), "").is_ok());
+    for (value, more, wanted) in [
+        (
+            drive("\"harmonic\", amplitude = \"1 deg\", frequency = \"rate\""),
+            "",
+            "gives 6.28319 s^-1 rad, which is not in Hz",
+        ),
+        (
+            drive("\"constant\", velocity = \"radius**2 * 3 mm**2\""),
+            "",
+            "`*` where an operator other than a power should stand",
+        ),
+        // Of a unit with a stroke it could be meant for either part.
+        (String::new(), "clearance = \"3 m/s^3 * radius\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"radius * 3 mm ^2\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"radius * 3 mm^2.5\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"radius * 3 mm^2\"", "m^3, which is not in m"),
+        (String::new(), "clearance = \"radius\"", "clearance 50 mm must be below the ball radius"),
+        (String::new(), "friction = \"2 * radius\"", "gives 0.1 m, but must be a pure number; allowed 0 to 10"),
+        (String::new(), "friction = \"2 * radiu\"", "no variable `radiu` (did you mean `radius`?)"),
+    ] {
+        let error = read(&value, more).expect_err(wanted).to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+    let unit = text("", "").replace("\"radius\"", "\"mm\"");
+    let error = Scene::parse(&unit, None, &[]).expect_err("a unit").to_string();
+    assert!(error.contains("or a unit"), "{error}");
+}
+
+#[test]
+fn names_of_bodies_and_joints_in_a_pattern_are_apart() {
+    let text = "
+[[body]]
+name = \"hub\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"axle\"
+kind = \"fixed\"
+child = \"hub\"
+
+[[pattern]]
+name = \"blades\"
+count = 3
+about = { axis = [0, 0, 1] }
+
+[[pattern.body]]
+name = \"blade\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[pattern.joint]]
+name = \"hub\"
+kind = \"revolute\"
+parent = \"hub\"
+child = \"blade\"
+parent_point = \"1 0 0 m\"
+axis = [1, 0, 0]
+
+[[pattern.joint_spring]]
+name = \"s\"
+joint = \"hub\"
+stiffness = \"1 N m/rad\"
+";
+    let scene = Scene::parse(text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.machine.joints[2].name, "hub2");
+    assert_eq!(scene.machine.joints[2].parent, Some(0));
+    let angle = std::f64::consts::TAU / 3.0;
+    let turned = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
+    assert!((scene.machine.joints[2].parent_point - turned).norm() < 1e-15);
+    let shapes = format!("shapes = [{}]\n\n[[pattern.joint]]", "0, ".repeat(9999));
+    let many = text.replace("count = 3", "count = 10000");
+    let many = many.replacen("[[pattern.joint]]", &shapes, 1);
+    let error = Scene::parse(&many, None, &[]).expect_err("a lot");
+    assert!(error.message.contains("copies of"), "{error}");
+    let twice = format!(
+        "{text}[[pattern]]\nname = \"blades\"\ncount = 1\nalong = [0, 0, 0]\nfixed_shape = [{{ form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", role = \"pin\" }}]\n"
+    );
+    let error = Scene::parse(&twice, None, &[]).expect_err("twice").to_string();
+    assert!(error.contains("already a pattern of this name"), "{error}");
+}

@@ -1,0 +1,378 @@
+//! A scene back to TOML: its source text with the changed values in place; comments and order are kept.
+
+use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value};
+
+use std::collections::BTreeMap;
+
+use super::given::{FileNumber, Place};
+use super::{Kind, Scene, SceneError, Value};
+use jointplay_physics::units::exact_quantity;
+
+/// Most numbers in one vector.
+const MOST_PARTS: usize = 4;
+
+impl Scene {
+    /// The text of a scene file that reads back to this scene, changes included.
+    ///
+    /// # Errors
+    /// A change that the format cannot express.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        let lost =
+            |key: &str, message: String| SceneError { key: Some(key.to_owned()), message, ..SceneError::default() };
+        let mut document: DocumentMut = self
+            .numbers_in_place()?
+            .parse()
+            .map_err(|error: toml_edit::TomlError| lost("", error.message().to_owned()))?;
+        for (key, _) in &self.changes {
+            if !self.source.numbers.contains_key(key) {
+                self.write_change(&mut document, key)?;
+            }
+        }
+        let text = document.to_string();
+        // Return the text only if it reads back as intended.
+        let source = &self.source;
+        let read = Self::parse_with(&text, source.file.as_deref(), &source.beside, &[])?;
+        for (key, _) in &self.changes {
+            if read.get(key)? != self.get(key)? {
+                return Err(lost(key, "cannot be written to a scene file".to_owned()));
+            }
+        }
+        Ok(text)
+    }
+
+    /// The scene's text with the changed numbers in the places of the old ones.
+    fn numbers_in_place(&self) -> Result<String, SceneError> {
+        let numbers = &self.source.numbers;
+        let mut edits: BTreeMap<usize, (usize, String)> = BTreeMap::new();
+        for (key, value) in &self.changes {
+            let Some(number) = numbers.get(key) else {
+                continue;
+            };
+            let refuse = |why: &str| {
+                let message = format!("cannot be written to a scene file: {why}");
+                SceneError::about(key, Some(value), message)
+            };
+            let text = |number: &FileNumber| {
+                let text = exact_quantity(number.value, number.unit, number.dimension);
+                format!("\"{text}\"")
+            };
+            let here = |other: &&FileNumber| other.place == number.place;
+            let same: Vec<&FileNumber> = numbers.values().filter(here).collect();
+            let (span, text) = match &number.place {
+                Place::Included => {
+                    return Err(refuse("it stands in another file, which this one includes"));
+                }
+                Place::Absent => {
+                    return Err(refuse("the text does not give it; write it there first"));
+                }
+                Place::Value(span) if same.len() == 1 => (span, text(number)),
+                // In the order of their keys, x, y, z.
+                Place::Part(span) if same.len() <= MOST_PARTS => {
+                    let parts: Vec<String> = same.into_iter().map(text).collect();
+                    (span, format!("[{}]", parts.join(", ")))
+                }
+                _ => return Err(refuse("every copy of a pattern has it")),
+            };
+            edits.insert(span.start, (span.end, text));
+        }
+        let mut written = self.source.text.clone();
+        for (start, (end, text)) in edits.into_iter().rev() {
+            written.replace_range(start..end, &text);
+        }
+        Ok(written)
+    }
+
+    fn write_change(&self, document: &mut DocumentMut, key: &str) -> Result<(), SceneError> {
+        let parameter = self.parameter(key)?;
+        let item = self.item(key)?;
+        if let Some((name, part)) = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
+            let placed = put_joint(document.get_mut("ball_joint"), name, part, &item)
+                || put_chain_joint(document.get_mut("chain"), name, part, item);
+            return placed.then_some(()).ok_or_else(|| SceneError {
+                key: Some(key.to_owned()),
+                message: "cannot be written to a scene file: every copy of a pattern has it".to_owned(),
+                ..SceneError::default()
+            });
+        }
+        match parameter.key.split_once('.') {
+            None => put(document.as_table_mut(), parameter.key, item),
+            Some((section, part)) => {
+                let fresh = !document.contains_key(section);
+                let table = document.entry(section).or_insert_with(|| Item::Table(Table::new()));
+                // If a section gives one component of gravity, the others are 0.
+                if fresh && section == "gravity" {
+                    for part in ["x", "y", "z"] {
+                        place(table, part, self.item(&format!("gravity.{part}"))?);
+                    }
+                } else {
+                    place(table, part, item);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Current value of `key` as a file gives it: pure numbers and counts bare, everything else as text.
+    fn item(&self, key: &str) -> Result<Item, SceneError> {
+        let parameter = self.parameter(key)?;
+        let now = self.get(key)?;
+        let text = parameter.write(&now);
+        let bare =
+            matches!(parameter.kind, Kind::Number { display: "", .. }) || matches!(parameter.kind, Kind::Count { .. });
+        Ok(match (&now, text.parse::<Toml>()) {
+            (Value::Number(_) | Value::Count(_), Ok(number)) if bare => value(number),
+            _ => value(text),
+        })
+    }
+}
+
+/// Writes `item` to the entry named `name` in a list of joints, if there is one.
+fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
+    match joints {
+        Some(Item::ArrayOfTables(tables)) => tables
+            .iter_mut()
+            .find(|table| text_of(table.get("name")) == Some(name))
+            .map(|table| put(table, part, item.clone())),
+        Some(Item::Value(Toml::Array(array))) => array
+            .iter_mut()
+            .filter_map(Toml::as_inline_table_mut)
+            .find(|table| table.get("name").and_then(Toml::as_str) == Some(name))
+            .zip(item.as_value())
+            .map(|(table, item)| drop(table.insert(part, item.clone()))),
+        _ => None,
+    }
+    .is_some()
+}
+
+/// Writes `item` to the `[[chain.joint]]` named `name`, adding it if needed; returns whether there is a chain.
+fn put_chain_joint(chain: Option<&mut Item>, name: &str, part: &str, item: Item) -> bool {
+    match chain {
+        Some(Item::Table(chain)) => {
+            if put_joint(chain.get_mut("joint"), name, part, &item) {
+                return true;
+            }
+            let mut own = Table::new();
+            own.insert("name", value(name));
+            own.insert(part, item);
+            match chain.entry("joint").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())) {
+                Item::ArrayOfTables(tables) => tables.push(own),
+                Item::Value(Toml::Array(array)) => array.push(own.into_inline_table()),
+                _ => return false,
+            }
+            true
+        }
+        Some(Item::Value(Toml::InlineTable(chain))) => {
+            let joints = chain.entry("joint").or_insert_with(|| Array::new().into());
+            let (Some(joints), Item::Value(item)) = (joints.as_array_mut(), item) else {
+                return false;
+            };
+            let at = joints.iter().position(|joint| {
+                let own = joint.as_inline_table().and_then(|own| own.get("name"));
+                own.and_then(Toml::as_str) == Some(name)
+            });
+            let there = at.and_then(|at| joints.get_mut(at));
+            if let Some(own) = there.and_then(Toml::as_inline_table_mut) {
+                own.insert(part, item);
+            } else {
+                let mut own = InlineTable::new();
+                own.insert("name", name.into());
+                own.insert(part, item);
+                joints.push(own);
+            }
+            true
+        }
+        _ => false,
+    }
+}
+
+/// Writes `item` to a section, which is a table or an inline table.
+fn place(section: &mut Item, name: &str, item: Item) {
+    match (section, item) {
+        (Item::Table(table), item) => put(table, name, item),
+        (Item::Value(Toml::InlineTable(table)), Item::Value(item)) => {
+            table.insert(name, item);
+        }
+        // Unreachable: the scene was read from this text, so a section is a table.
+        _ => {}
+    }
+}
+
+/// Writes `item` to `table`; comments above and after the old value are kept.
+fn put(table: &mut Table, name: &str, mut item: Item) {
+    let Some(old) = table.get_mut(name) else {
+        table.insert(name, item);
+        return;
+    };
+    if let (Some(old), Some(new)) = (old.as_value(), item.as_value_mut()) {
+        *new.decor_mut() = old.decor().clone();
+    }
+    // Inserting would reformat the key and drop the comments above it.
+    *old = item;
+}
+
+fn text_of(item: Option<&Item>) -> Option<&str> {
+    item.and_then(Item::as_str)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::{contact_part, find};
+    use super::super::{BUILT_IN, Scope, table};
+    use super::*;
+
+    fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        Scene::load(name, &changes).expect("in range")
+    }
+
+    /// Everything that the simulation reads.
+    fn bits(scene: &Scene) -> String {
+        let mut plain = scene.clone();
+        plain.changes.clear();
+        plain.source = Default::default();
+        for overrides in &mut plain.overrides {
+            overrides.sort_unstable();
+        }
+        format!("{plain:?}")
+    }
+
+    #[test]
+    fn a_scene_without_changes_is_its_own_text() {
+        for name in BUILT_IN {
+            let scene = scene(name, &[]);
+            assert_eq!(scene.to_toml().as_deref(), Ok(scene.source.text.as_str()));
+        }
+    }
+
+    #[test]
+    fn every_parameter_is_written_so_that_it_reads_back_to_the_same_scene() {
+        for (turn, name) in BUILT_IN.into_iter().enumerate() {
+            let plain = scene(name, &[]);
+            // Those that every scene has take turns.
+            let rows = plain.parameters().into_iter().enumerate();
+            for (_, parameter) in rows.filter(|(place, row)| row.scope == Scope::Own || (place + turn) % 3 == 0) {
+                let other = match parameter.kind {
+                    // Inside every range, and not a round number.
+                    Kind::Number { slider, .. } => Value::Number(slider.0 + 0.377_123_456_789 * (slider.1 - slider.0)),
+                    Kind::Count { .. } => Value::Count(3),
+                    Kind::Choice(words) => Value::Choice(words[words.len() - 1]),
+                };
+                let mut keys = vec![parameter.key.to_owned()];
+                if let Some(part) = contact_part(parameter) {
+                    keys.push(format!("joint.{}.{part}", plain.machine.ball_joints[0].name));
+                }
+                for key in keys {
+                    let mut changed = plain.clone();
+                    if let Err(error) = changed.set_value(&key, &other) {
+                        // A law may reject the scene's restitution, for example.
+                        assert!(matches!(parameter.scope, Scope::Contact), "{error}");
+                        continue;
+                    }
+                    let text = match changed.to_toml() {
+                        Ok(text) => text,
+                        // The text has no place for the joint of one copy alone.
+                        Err(error) if error.message.contains("every copy of a pattern") => {
+                            assert!(key.starts_with("joint.") && key.contains("1."), "{key}");
+                            assert!(plain.source.text.contains("[[pattern]]"), "{name}");
+                            continue;
+                        }
+                        Err(error) => panic!("{name} {key}: {error}"),
+                    };
+                    let read = Scene::parse(&text, None, &[]).expect("reads");
+                    assert_eq!(bits(&read), bits(&changed), "{name} {key}\n{text}");
+                    assert!(read.changes.is_empty());
+                    let comments = |text: &str| text.matches('#').count();
+                    assert_eq!(comments(&text), comments(&plain.source.text), "{key}");
+                }
+            }
+        }
+        assert!(find("contact.clearance").is_some() && table().len() > 20);
+    }
+
+    #[test]
+    fn changes_that_depend_on_each_other_come_out_as_they_are() {
+        let changes = [
+            ("contact.clearance", "0.5 mm"),
+            ("joint.S1.clearance", "0.2 mm"),
+            ("joint.S1.friction", "0.4"),
+            ("solver.method", "rk4"),
+            ("solver.preset", "preview"),
+            ("gravity.x", "3 m/s^2"),
+            ("formulation", "lagrange"),
+        ];
+        for name in ["spcmm", "pendulum"] {
+            let changed = scene(name, &changes);
+            let text = changed.to_toml().expect("has its places");
+            let read = Scene::parse(&text, None, &[]).expect("reads");
+            assert_eq!(bits(&read), bits(&changed), "{text}");
+        }
+    }
+
+    #[test]
+    fn gravity_that_the_file_leaves_out_is_written_whole() {
+        let text = scene("pendulum", &[]).source.text.replace("[gravity]\nz = \"-9.81 m/s^2\"\n", "");
+        let mut bare = Scene::parse(&text, None, &[]).expect("reads");
+        assert_eq!(bare.machine.gravity.z, -9.81);
+        bare.set("gravity.x", "1 m/s^2").expect("in range");
+        let read = Scene::parse(&bare.to_toml().expect("written"), None, &[]).expect("reads");
+        assert_eq!(read.machine.gravity, bare.machine.gravity);
+    }
+
+    #[test]
+    fn inline_sections_and_lists_keep_their_form() {
+        let text = scene("pendulum", &[]).source.text.replace(
+            "[[ball_joint]]\nname = \"S1\"\nsocket = { body = \"world\", at = [0, 0, 0] }\nball = { body = \"rod\", at = \"0 0 100 mm\" }\nopening = [0, -1, 0]\n",
+            "",
+        );
+        let inline = "ball_joint = [{ name = \"S1\", socket = { body = \"world\" }, ball = { body = \"rod\", at = \"0 0 100 mm\" } }]\nsolver = { step = \"5 us\" } # short\n";
+        let text = format!("{inline}{text}");
+        let mut changed = Scene::parse(&text, None, &[]).expect("reads");
+        changed.set("joint.S1.clearance", "0.2 mm").expect("ok");
+        changed.set("solver.step", "7 us").expect("ok");
+        let written = changed.to_toml().expect("written");
+        let read = Scene::parse(&written, None, &[]).expect("reads");
+        assert_eq!(bits(&read), bits(&changed), "{written}");
+        assert!(written.contains("# short"));
+    }
+
+    #[test]
+    fn joints_of_a_chain_have_values_of_their_own_in_every_form_of_the_file() {
+        let changes = [("joint.J2.clearance", "0.5 mm"), ("joint.J8.friction", "0.4"), ("joint.J2.friction", "0.1")];
+        let plain = scene("chain", &[]).source.text;
+        let inline = plain.replacen("[chain]\n", "[chain]\njoint = [{ name = \"J3\" }]\n", 1);
+        let there = format!("{plain}\n[[chain.joint]]\nname = \"J2\" # the second\nrestitution = 0.7\n");
+        for text in [plain, inline, there] {
+            let mut changed = Scene::parse(&text, None, &[]).expect("reads");
+            for (key, value) in changes {
+                changed.set(key, value).expect("in range");
+            }
+            let written = changed.to_toml().expect("has its places");
+            let read = Scene::parse(&written, None, &[]).expect("reads");
+            assert_eq!(bits(&read), bits(&changed), "{written}");
+            assert_eq!(read.machine.ball_joints[1].contact.clearance, 0.5e-3);
+            assert_eq!(written.contains("# the second"), text.contains("# the second"));
+            // A second time: the entries exist now.
+            let mut again = read;
+            again.set("joint.J8.friction", "0.3").expect("in range");
+            let written = again.to_toml().expect("has its places");
+            assert_eq!(written.matches("\"J8\"").count(), 1, "{written}");
+        }
+        let bad = format!("{}\n[[chain.joint]]\nname = \"J9\"\n", scene("chain", &[]).source.text);
+        let error = Scene::parse(&bad, None, &[]).expect_err("eight links").to_string();
+        assert!(error.contains("no ball joint `J9`; it has 8 links: J1 to J8"), "{error}");
+    }
+
+    #[test]
+    fn an_inline_chain_keeps_its_form() {
+        let text = "chain = { links = 3, link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }\n";
+        let mut changed = Scene::parse(text, None, &[]).expect("reads");
+        changed.set("joint.J3.clearance", "0.2 mm").expect("in range");
+        changed.set("joint.J3.friction", "0.2").expect("in range");
+        changed.set("joint.J1.friction", "0.1").expect("in range");
+        let written = changed.to_toml().expect("written");
+        let read = Scene::parse(&written, None, &[]).expect("reads");
+        assert_eq!(bits(&read), bits(&changed), "{written}");
+        assert_eq!(written.lines().filter(|line| line.starts_with("chain = {")).count(), 1);
+    }
+}
