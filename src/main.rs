@@ -17,7 +17,7 @@ fn main() -> std::process::ExitCode {
             .init();
     }
     explain_panics();
-    // Unwinding first lets scratch files be removed.
+    // Unwinding first lets temporary files be removed.
     let code = std::panic::catch_unwind(jointplay::cli::main).unwrap_or(jointplay::cli::Failure::INPUT_OUTPUT);
     std::process::ExitCode::from(code)
 }

@@ -11,7 +11,7 @@ use super::files::SCENE_TYPE;
 use super::host::SaveFile;
 use super::share::THEMES;
 use super::{App, AppOptions, layout, opening};
-use crate::files::{FileError, OutputFile, create_folders};
+use crate::files::{FileError, OutputFile, create_dir_all};
 use crate::scene::{DEFAULT_SCENE, Scene, built_in_text};
 use crate::simulate::Simulation;
 
@@ -138,7 +138,7 @@ impl Store {
         let written = || -> Result<(), FileError> {
             let text = serde_json::to_string_pretty(&self.now).map_err(|error| FileError::cannot(&self.path, error))?;
             if let Some(folder) = self.path.parent() {
-                create_folders(folder).map_err(|error| FileError::cannot(folder, error))?;
+                create_dir_all(folder).map_err(|error| FileError::cannot(folder, error))?;
             }
             OutputFile::claim(&self.path, true)?.write(|out| std::io::Write::write_all(out, text.as_bytes()))
         };

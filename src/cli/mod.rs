@@ -28,8 +28,6 @@ mod run;
 pub mod schema;
 mod state;
 mod summary;
-#[cfg(test)]
-mod survival;
 mod sweep;
 mod tables;
 pub mod tradeoff;

@@ -1,24 +1,18 @@
-//! Files and folders that appear whole or not at all: written beside their final name, then renamed. The next run removes
-//! what a killed run left beside them.
+//! Output files and folders. Each is written under a temporary name beside its final one, then renamed: it appears complete or
+//! not at all. Reading needs nothing of this.
 
-mod call;
-mod disk;
-#[cfg(test)]
-pub mod faults;
 mod folder;
-mod journal;
 mod names;
-mod scratch;
-mod target;
+mod output;
+mod temporary;
 #[cfg(test)]
 mod tests;
 
-pub use call::Call;
-pub use disk::File;
 pub use folder::{Folder, MANIFEST};
-pub use journal::{create_folders, open_or_create, remove_empty_folder, remove_file};
 pub use names::same_file;
-pub use target::{OutputFile, PendingFile, Sink, Spool, publish};
+pub use output::{Content, OutputFile, PendingFile, open_or_create, publish};
+// The rest of the program changes nothing on the disk except through this module.
+pub use std::fs::{create_dir_all, remove_dir, remove_file};
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -13,5 +13,6 @@ mod peaks;
 mod program;
 mod reproduce;
 mod states;
+mod survival;
 mod sweep;
 mod tradeoff;

@@ -12,7 +12,7 @@ use jointplay::cli::output::significant;
 use crate::program::{Outcome, command, jointplay};
 
 /// Every file under `folder` with its content.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     fn walk(root: &Path, folder: &Path, out: &mut BTreeMap<String, Vec<u8>>) {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

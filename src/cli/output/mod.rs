@@ -9,7 +9,7 @@ mod table;
 pub use csv::significant;
 #[cfg(feature = "gui")]
 pub use json::write_meta;
-pub use npz::as_io;
+pub use npz::{as_io, write_archive};
 pub use table::{NoRow, Table};
 
 use std::path::{Path, PathBuf};

@@ -1,30 +1,29 @@
-//! Rows as a NumPy archive: one float64 array per column, and `meta` as the bytes of a JSON text.
+//! NumPy archives. The rows of a run: one float64 array per column, and `meta` as the bytes of a JSON text.
 
-use std::io;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 
 use ndarray::Array1;
 use ndarray_npy::{NpzWriter, WriteNpzError};
 use serde_json::{Map, Value as Json};
 
 use super::Table;
-use crate::files::Sink;
+use crate::files::Content;
 
 /// Writes the columns and `meta` (in Python: `json.loads(bytes(archive["meta"]))`).
-pub(super) fn write(out: &mut Sink, table: &Table, meta: &Map<String, Json>) -> io::Result<()> {
-    let mut archive = NpzWriter::new(out);
-    for (column, name) in table.names().iter().enumerate() {
-        let mut values = Vec::with_capacity(table.len());
-        table.column(column, |value| {
-            values.push(value);
-            Ok(())
-        })?;
-        let values = Array1::from(values);
-        archive.add_array(name.as_str(), &values).map_err(as_io)?;
-    }
-    let meta = Array1::from(serde_json::to_vec(meta)?);
-    archive.add_array("meta", &meta).map_err(as_io)?;
-    archive.finish().map_err(as_io)?;
-    Ok(())
+pub(super) fn write(out: &mut Content, table: &Table, meta: &Map<String, Json>) -> io::Result<()> {
+    write_archive(*out.get_ref(), |archive| {
+        for (column, name) in table.names().iter().enumerate() {
+            let mut values = Vec::with_capacity(table.len());
+            table.column(column, |value| {
+                values.push(value);
+                Ok(())
+            })?;
+            let values = Array1::from(values);
+            archive.add_array(name.as_str(), &values).map_err(as_io)?;
+        }
+        let meta = Array1::from(serde_json::to_vec(meta)?);
+        archive.add_array("meta", &meta).map_err(as_io)
+    })
 }
 
 /// An archive's error, as that of the file.
@@ -36,38 +35,104 @@ pub fn as_io(error: WriteNpzError) -> io::Error {
     }
 }
 
+/// Writes the archive that `fill` fills to `file`.
+///
+/// # Errors
+/// The first failure of the file; otherwise that of `fill`.
+pub fn write_archive<W: Write + Seek>(
+    file: W,
+    fill: impl FnOnce(&mut NpzWriter<&mut BufWriter<Sink<W>>>) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(Sink { file, failure: None });
+    let mut archive = NpzWriter::new(&mut out);
+    let filled = fill(&mut archive);
+    let ended = archive.finish().map_err(as_io).map(|_| ());
+    let outcome = filled.and(ended).and_then(|()| out.flush());
+    out.get_mut().failure.take().map_or(outcome, Err)
+}
+
+/// Takes the bytes of an archive. After its first failure it accepts everything and writes nothing: an archive always ends
+/// itself in good order, and complains to standard error where it cannot.
+#[derive(Debug)]
+pub struct Sink<W> {
+    file: W,
+    failure: Option<io::Error>,
+}
+
+impl<W: Write + Seek> Write for Sink<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.failure.is_none() {
+            match self.file.write(bytes) {
+                Err(error) if error.kind() != io::ErrorKind::Interrupted => self.failure = Some(error),
+                written => return written,
+            }
+        }
+        // Positions continue as if the bytes were written.
+        self.file.seek(SeekFrom::Current(bytes.len() as i64))?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl<W: Seek> Seek for Sink<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::*;
-    use crate::files::Call;
-    use crate::files::OutputFile;
-    use crate::files::faults::{Fault, Kind, with};
+
+    /// A disk that is full after some writes.
+    struct Disk {
+        content: Cursor<Vec<u8>>,
+        writes_left: usize,
+    }
+
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.writes_left = self.writes_left.checked_sub(1).ok_or(io::ErrorKind::StorageFull)?;
+            self.content.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Disk {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.content.seek(to)
+        }
+    }
 
     #[test]
     fn an_archive_on_a_full_disk_ends_without_a_word_of_its_own() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
         let values = Array1::from(vec![1.0; 10_000]);
-        for n in 1.. {
-            let mut failed = false;
-            let work = || {
-                OutputFile::claim(&path, true)?.write(|file| {
-                    let mut archive = NpzWriter::new(file);
-                    let added = archive.add_array("a", &values).and_then(|()| archive.add_array("b", &values));
-                    failed = added.is_err();
-                    // As the archive does when dropped, complaining about any error.
-                    let ended = archive.finish().map(|_| ());
-                    assert!(ended.is_ok() || !failed, "{ended:?}");
-                    // Whatever is returned here, the disk error takes precedence.
-                    Ok(())
-                })
-            };
-            let written = with(Fault::Fails(Call::Write, n), Kind::default(), work).0;
-            if written.is_ok() {
-                assert!(n > 4 && !failed, "{n}");
+        for writes in 0.. {
+            let disk = || Disk { content: Cursor::default(), writes_left: writes };
+            let mut out = BufWriter::new(Sink { file: disk(), failure: None });
+            let mut archive = NpzWriter::new(&mut out);
+            archive.add_array("a", &values).and_then(|()| archive.add_array("b", &values)).unwrap();
+            archive.finish().unwrap();
+            out.flush().unwrap();
+            let written = write_archive(disk(), |archive| {
+                archive.add_array("a", &values).and_then(|()| archive.add_array("b", &values)).unwrap();
+                // Whatever is returned here, the disk error takes precedence.
+                Err(io::Error::other("not this"))
+            });
+            let kind = written.unwrap_err().kind();
+            if out.get_ref().failure.is_none() {
+                assert!(writes > 4 && kind == io::ErrorKind::Other, "{writes}: {kind}");
                 break;
             }
-            assert!(!path.exists());
+            assert_eq!(kind, io::ErrorKind::StorageFull, "{writes}");
         }
     }
 }

@@ -1,8 +1,7 @@
 //! Rows of equal width, as many as fit on the disk: full blocks in memory are moved to a nameless file.
 
-use std::io;
-
-use crate::files::Spool;
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 
 /// Values per block, 8 MiB.
 const BLOCK: usize = 1 << 20;
@@ -16,7 +15,7 @@ pub struct Rows {
     /// The latest rows, row-major.
     block: Vec<f64>,
     /// Full blocks, each column-major.
-    spool: Option<Spool>,
+    spool: Option<File>,
     spooled: usize,
 }
 
@@ -27,7 +26,7 @@ impl Rows {
     }
 
     /// From now on full blocks go to `spool`; without it all rows stay in memory.
-    pub fn spool_to(&mut self, spool: Spool) {
+    pub fn spool_to(&mut self, spool: File) {
         self.spool = Some(spool);
     }
 
@@ -49,7 +48,8 @@ impl Rows {
             let values = self.block[column..].iter().step_by(self.width);
             values.for_each(|value| bytes.extend(value.to_le_bytes()));
         }
-        spool.append(&bytes)?;
+        spool.seek(SeekFrom::End(0))?;
+        spool.write_all(&bytes)?;
         self.spooled += 1;
         self.block.clear();
         Ok(())
@@ -96,8 +96,9 @@ impl Rows {
     fn read(&self, block: usize, from: usize, count: usize) -> io::Result<Vec<f64>> {
         let mut bytes = vec![0; 8 * count];
         let at = 8 * (block * self.rows_per_block * self.width + from) as u64;
-        if let Some(spool) = &self.spool {
-            spool.read(at, &mut bytes)?;
+        if let Some(mut spool) = self.spool.as_ref() {
+            spool.seek(SeekFrom::Start(at))?;
+            spool.read_exact(&mut bytes)?;
         }
         let words = bytes.as_chunks().0.iter();
         Ok(words.map(|word| f64::from_le_bytes(*word)).collect())

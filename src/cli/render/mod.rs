@@ -6,9 +6,8 @@ mod studio;
 
 use serde_json::{Map, Value as Json, json};
 
-pub(super) use self::destination::Destination;
-pub(super) use self::studio::Studio;
-use self::studio::{ApplicationStudio, SceneStudio};
+use self::destination::Destination;
+use self::studio::{ApplicationStudio, SceneStudio, Studio};
 use super::args::RenderArguments;
 use super::summary::{Status, count as count_of, hash_text};
 use super::{Failure, interrupt, load, progress, provenance, quantity, start, warn};
@@ -21,7 +20,7 @@ const MOST_FRAMES: f64 = 100_000.0;
 
 /// When to draw, and how much viewing time passes between two pictures.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Times {
+struct Times {
     /// Instants, s, in the order of the frame numbers.
     instants: Vec<f64>,
     /// Simulated seconds per second of film; `None` for single pictures.
@@ -29,7 +28,7 @@ pub(super) struct Times {
 }
 
 impl Times {
-    pub(super) fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
+    fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
         let (Some(duration), Some(fps)) = (&arguments.duration, arguments.fps) else {
             let instants = arguments.at.iter().map(|at| quantity::duration("--at", at)).collect::<Result<_, _>>()?;
             return Ok(Self { instants, time_scale: None });
@@ -74,7 +73,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     } else {
         Box::new(SceneStudio::new(&scene, view.clone(), arguments)?)
     };
-    // From here on there is a scratch folder, which an interrupted run removes.
+    // From here on there is a temporary folder, which an interrupted run removes.
     interrupt::listen();
     let destination = Destination::claim(arguments)?;
     if !arguments.quiet {
@@ -89,7 +88,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
 }
 
 /// Draws all frames and gives the folder or the film its final name; an interrupted film leaves nothing.
-pub(super) fn fill(
+fn fill(
     mut destination: Destination,
     studio: &mut dyn Studio,
     scene: &Scene,

@@ -7,7 +7,7 @@ use crate::analysis::reproduction::{Agenda, Outcome};
 use crate::cli::Failure;
 use crate::cli::sweep::{Partial, meta};
 use crate::cli::warn;
-use crate::files::{create_folders, remove_empty_folder};
+use crate::files::{create_dir_all, remove_dir};
 
 /// One file per sweep, in a folder of their own.
 pub(super) struct Kept {
@@ -25,7 +25,7 @@ impl Kept {
         let mut name = out.components().as_path().as_os_str().to_owned();
         name.push(".partial");
         let folder = PathBuf::from(name);
-        create_folders(&folder).map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
+        create_dir_all(&folder).map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
         let part = |data: &crate::analysis::reproduction::SweepData| {
             let blocks: Vec<usize> = (0..data.sweep.grid().blocks()).collect();
             let settings = meta(&data.sweep);
@@ -76,7 +76,7 @@ impl Kept {
     /// Removes the folder: its content is in the report.
     pub(super) fn remove(self) {
         self.parts.into_iter().for_each(Partial::remove);
-        if let Err(error) = remove_empty_folder(&self.folder) {
+        if let Err(error) = remove_dir(&self.folder) {
             warn(&format!("{} is no longer needed and could not be removed: {error}", self.folder.display()));
         }
     }

@@ -26,7 +26,7 @@ use crate::files::Folder;
 /// # Errors
 /// A folder that cannot be written, before anything is computed; Ctrl-C, the file system.
 pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
-    // From here on there is a scratch folder, which an interrupted run removes.
+    // From here on there is a temporary folder, which an interrupted run removes.
     interrupt::listen();
     let extent = if arguments.quick { Extent::QUICK } else { Extent::FULL };
     let threads = threads(arguments.threads);

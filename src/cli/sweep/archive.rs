@@ -11,7 +11,7 @@ use super::options::Shard;
 use crate::analysis::layout::Column;
 use crate::analysis::sweep::Sweep;
 use crate::cli::Failure;
-use crate::cli::output::as_io;
+use crate::cli::output::{as_io, write_archive};
 use crate::files::OutputFile;
 
 /// Source of an archive's numbers.
@@ -130,40 +130,39 @@ impl Archive {
     pub fn write(&self, target: OutputFile, source: &mut impl Source) -> Result<(), Failure> {
         let mut failure = None;
         let written = target.write(|file| {
-            let mut archive = NpzWriter::new(file);
-            for (key, values) in &self.axes {
-                let values = Array1::from(values.clone());
-                archive.add_array(key.as_str(), &values).map_err(as_io)?;
-            }
-            if let Some(points) = &self.points {
-                let points: Array1<i64> = points.iter().map(|&point| point as i64).collect();
-                archive.add_array("point", &points).map_err(as_io)?;
-            }
-            for column in &self.columns {
-                let values = self.values(&column.name, source).map_err(|error| {
-                    let text = error.message.clone();
-                    failure = Some(error);
-                    io::Error::other(text)
-                })?;
-                let mut shape = match &self.points {
-                    Some(points) => vec![points.len()],
-                    None => self.axes.iter().map(|(_, values)| values.len()).collect(),
-                };
-                if column.per_section {
-                    shape.push(self.kept);
+            write_archive(*file.get_ref(), |archive| {
+                for (key, values) in &self.axes {
+                    let values = Array1::from(values.clone());
+                    archive.add_array(key.as_str(), &values).map_err(as_io)?;
                 }
-                if column.whole {
-                    let whole = values.iter().map(|value| *value as i64).collect();
-                    add(&mut archive, &column.name, shape, whole)?;
-                } else {
-                    add(&mut archive, &column.name, shape, values)?;
+                if let Some(points) = &self.points {
+                    let points: Array1<i64> = points.iter().map(|&point| point as i64).collect();
+                    archive.add_array("point", &points).map_err(as_io)?;
                 }
-            }
-            let meta = Json::Object(self.meta.clone()).to_string();
-            let meta = Array1::from(meta.into_bytes());
-            archive.add_array("meta", &meta).map_err(as_io)?;
-            archive.finish().map_err(as_io)?;
-            Ok(())
+                for column in &self.columns {
+                    let values = self.values(&column.name, source).map_err(|error| {
+                        let text = error.message.clone();
+                        failure = Some(error);
+                        io::Error::other(text)
+                    })?;
+                    let mut shape = match &self.points {
+                        Some(points) => vec![points.len()],
+                        None => self.axes.iter().map(|(_, values)| values.len()).collect(),
+                    };
+                    if column.per_section {
+                        shape.push(self.kept);
+                    }
+                    if column.whole {
+                        let whole = values.iter().map(|value| *value as i64).collect();
+                        add(archive, &column.name, shape, whole)?;
+                    } else {
+                        add(archive, &column.name, shape, values)?;
+                    }
+                }
+                let meta = Json::Object(self.meta.clone()).to_string();
+                let meta = Array1::from(meta.into_bytes());
+                archive.add_array("meta", &meta).map_err(as_io)
+            })
         });
         match failure {
             Some(failure) => Err(failure),

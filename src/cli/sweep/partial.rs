@@ -7,7 +7,7 @@
 //! rejects the whole file: a half-read result would look like a whole one.
 
 use std::collections::BTreeMap;
-use std::fs::TryLockError;
+use std::fs::{File, TryLockError};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use serde_json::{Map, Value as Json};
 use super::archive::Source;
 use crate::analysis::sweep::Sweep;
 use crate::cli::{Failure, warn};
-use crate::files::{File, open_or_create, remove_file};
+use crate::files::{open_or_create, remove_file};
 
 /// Magic number; its last character is the format version.
 const MAGIC: &[u8; 8] = b"JPSWEEP1";
@@ -50,9 +50,8 @@ impl Partial {
     /// Input/output: unreadable, damaged, in use; usage: begun with other settings.
     pub fn open(out: &Path, settings: &Map<String, Json>, sweep: &Sweep, blocks: &[usize]) -> Result<Self, Failure> {
         let path = Self::path_of(out);
-        let failed = |error: std::io::Error| Failure::io(format!("cannot use {}: {error}", path.display()));
         let settings = Json::Object(settings.clone());
-        let file = open_or_create(&path, &beginning(&settings)).map_err(failed)?;
+        let file = open_or_create(&path, &beginning(&settings))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -133,10 +132,10 @@ impl Partial {
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
         let mut file = &self.file;
         file.seek(SeekFrom::Start(self.end)).map_err(self.failed())?;
-        let written = file.write_all(&bytes).and_then(|()| file.sync());
+        let written = file.write_all(&bytes).and_then(|()| file.sync_all());
         if let Err(error) = written {
             // Best effort: a torn block is recognised as such.
-            let _ = self.file.set_length(self.end);
+            let _ = self.file.set_len(self.end);
             return Err(self.failed()(error));
         }
         self.end += bytes.len() as u64;
@@ -161,7 +160,7 @@ impl Partial {
     }
 
     fn length(&self) -> Result<u64, Failure> {
-        self.file.length().map_err(self.failed())
+        Ok(self.file.metadata().map_err(self.failed())?.len())
     }
 
     /// Reads and checks the whole file.
@@ -214,7 +213,7 @@ impl Partial {
         }
         if cut {
             // The remains would stand before the next block.
-            self.file.set_length(end).map_err(self.failed())?;
+            self.file.set_len(end).map_err(self.failed())?;
         }
         (self.start, self.end, self.done) = (start, end, done);
         Ok(())

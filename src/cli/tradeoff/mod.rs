@@ -33,7 +33,7 @@ pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
 
 fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Result<(), Failure> {
     let scene = load(&SceneArguments { scene: Some(name.to_owned()), changes: arguments.changes.clone(), link: None })?;
-    // From here on there is a scratch folder, which an interrupted run removes.
+    // From here on there is a temporary folder, which an interrupted run removes.
     interrupt::listen();
     let folder = match &arguments.out {
         Some(path) => Some((path, Folder::claim(path, arguments.force)?)),

@@ -1,0 +1,133 @@
+//! Output files.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use super::FileError;
+use super::names::{parent, place};
+use super::temporary;
+
+/// Takes the content of a file.
+pub type Content<'a> = BufWriter<&'a File>;
+
+/// A file to be written.
+#[derive(Debug)]
+pub struct OutputFile {
+    /// The path as requested.
+    pub(super) path: PathBuf,
+    /// Where it is written: the path with links resolved.
+    pub(super) place: PathBuf,
+    pub(super) replace: bool,
+}
+
+impl OutputFile {
+    /// Checks that `path` can be written, by writing and removing an empty file beside it; removes what killed runs left
+    /// there. `replace` permits an existing file.
+    ///
+    /// # Errors
+    /// It exists and `replace` is not given, it is not a file, or its folder is missing or read-only.
+    pub fn claim(path: &Path, replace: bool) -> Result<Self, FileError> {
+        if path.file_name().is_none() || path.is_dir() {
+            return Err(FileError::cannot(path, "it names a folder"));
+        }
+        let failed = |error: io::Error| FileError::of(path, &error);
+        let place = place(path).map_err(failed)?;
+        temporary::clear(&place);
+        if !replace && is_taken(path) {
+            return Err(FileError::Exists(path.to_owned()));
+        }
+        if path.metadata().is_ok_and(|it| !it.is_file()) {
+            return Err(FileError::cannot(path, "it exists and is not a regular file"));
+        }
+        temporary::file(&place).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), place, replace })
+    }
+
+    /// The requested name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Lets `fill` write the content; nothing has the final name yet.
+    ///
+    /// # Errors
+    /// Input/output.
+    pub fn fill(self, fill: impl FnOnce(&mut Content) -> io::Result<()>) -> Result<PendingFile, FileError> {
+        let content = || {
+            let file = temporary::file(&self.place)?;
+            {
+                let mut content = BufWriter::new(file.as_file());
+                fill(&mut content)?;
+                content.flush()?;
+            }
+            file.as_file().sync_all()?;
+            Ok(file)
+        };
+        match content() {
+            Ok(file) => Ok(PendingFile { target: self, file }),
+            Err(error) => Err(FileError::of(&self.path, &error)),
+        }
+    }
+
+    /// Lets `fill` write the content, then gives it its final name.
+    ///
+    /// # Errors
+    /// Input/output; the final name is then as it was.
+    pub fn write(self, fill: impl FnOnce(&mut Content) -> io::Result<()>) -> Result<(), FileError> {
+        publish(vec![self.fill(fill)?])
+    }
+
+    /// A nameless file beside it for what does not fit in memory.
+    ///
+    /// # Errors
+    /// Input/output.
+    pub fn spool(&self) -> Result<File, FileError> {
+        tempfile::tempfile_in(parent(&self.place)).map_err(|error| FileError::of(&self.path, &error))
+    }
+}
+
+/// Whether something has this name; a dangling link counts.
+fn is_taken(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok()
+}
+
+/// A file with its content, but not yet its name.
+#[derive(Debug)]
+pub struct PendingFile {
+    target: OutputFile,
+    file: NamedTempFile,
+}
+
+/// Gives files their final names, one after the other.
+///
+/// # Errors
+/// Input/output; the files before the one that failed then have their names.
+pub fn publish(files: Vec<PendingFile>) -> Result<(), FileError> {
+    for PendingFile { target: OutputFile { path, place, replace }, file } in files {
+        let named = if replace { file.persist(&place) } else { file.persist_noclobber(&place) };
+        // Some file systems can neither refuse to replace nor link. Only another program can come in between.
+        let named = named.or_else(|failed| if is_taken(&place) { Err(failed) } else { failed.file.persist(&place) });
+        named.map_err(|failed| FileError::of(&path, &failed.error))?;
+    }
+    Ok(())
+}
+
+/// Opens a file that is visible while it grows; if it is missing or empty, creates it with `beginning` in it.
+///
+/// # Errors
+/// Input/output.
+pub fn open_or_create(path: &Path, beginning: &[u8]) -> Result<File, FileError> {
+    let length = path.metadata().map(|it| it.len()).ok();
+    if matches!(length, None | Some(0)) {
+        let target = OutputFile::claim(path, length.is_some());
+        match target.and_then(|target| target.write(|file| file.write_all(beginning))) {
+            // Another run was faster.
+            Ok(()) | Err(FileError::Exists(_)) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    OpenOptions::new().read(true).write(true).open(path).map_err(|error| FileError::of(path, &error))
+}

@@ -1,0 +1,155 @@
+//! Commands that fail or are killed while they write: every file under a final name is whole, either as it was or new, and
+//! repeating the command makes the same bytes as an undisturbed run.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::Value as Json;
+
+use crate::program::{command, folder, jointplay, names};
+use crate::reproduce::files as tree;
+
+/// Files by their names.
+type Tree = BTreeMap<String, Vec<u8>>;
+
+/// What a user takes for results: no temporary file, nothing that a later run resumes from.
+fn results(folder: &Path) -> Tree {
+    let mut found = tree(folder);
+    found.retain(|name, _| !name.starts_with(".jointplay-") && !name.ends_with(".partial"));
+    found
+}
+
+/// Runs the commands `before`, then `line` with ever larger limits on the size of a file: a write beyond it fails as on a full
+/// disk, and then, with the signal not ignored, kills the program.
+fn check(before: &[&str], line: &str) {
+    let start = || {
+        let folder = folder();
+        before.iter().for_each(|line| drop(jointplay(folder.path(), line).expect(0)));
+        folder
+    };
+    let clean = start();
+    let old = tree(clean.path());
+    jointplay(clean.path(), line).expect(0);
+    let new = tree(clean.path());
+    let largest = new.values().map(Vec::len).max().unwrap();
+    let mut failed = 0;
+    for blocks in [0, 1, 4, 16, 64, 256].into_iter().filter(|blocks| blocks * 512 < largest) {
+        for trap in ["trap '' XFSZ;", ""] {
+            let folder = start();
+            let limited =
+                format!("{trap} ulimit -c 0; ulimit -f {blocks}; exec {} {line}", env!("CARGO_BIN_EXE_jointplay"));
+            let output = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
+            let what = format!("{limited}: {}, {:?}", String::from_utf8_lossy(&output.stderr), names(folder.path()));
+            assert!(!output.status.success(), "{what}");
+            if !trap.is_empty() {
+                assert_eq!(output.status.code(), Some(1), "{what}");
+                assert!(!names(folder.path()).iter().any(|name| name.starts_with(".jointplay-")), "{what}");
+            }
+            assert!(results(folder.path()) == old, "{what}");
+            jointplay(folder.path(), line).expect(0);
+            assert!(tree(folder.path()) == new, "{what}, then {:?}", names(folder.path()));
+            failed += 1;
+        }
+    }
+    assert!(failed >= 4, "{line}: {failed}");
+}
+
+const RUN: &str = "run pendulum --duration 30ms --every 3ms --quiet";
+
+#[test]
+fn rows_and_impacts_survive_in_every_format() {
+    check(&[], &format!("{RUN} --out a.csv --impacts b.csv --wear c.csv --save-state d"));
+    let old = format!("{RUN} --set contact.friction=0.3 --out a.csv --impacts b.csv");
+    check(&[&old], &format!("{RUN} --out a.csv --impacts b.csv --force"));
+    for ending in ["json", "npz"] {
+        check(&[], &format!("{RUN} --out a.{ending}"));
+    }
+}
+
+#[test]
+fn sweeps_and_merges_survive() {
+    // Without play the points cost next to nothing: this is about files.
+    let sweep = "sweep spcmm --set contact.clearance=0 --vary spcmm.amplitude_x=20mm..25mm:3 --periods 1 --discard 0 --no-exponent --threads 1 --quiet";
+    check(&[], &format!("{sweep} --out a.npz"));
+    let shard = |k: usize| format!("{sweep} --shard {k}/2 --out {k}.npz");
+    check(&[&shard(1), &shard(2)], "merge 1.npz 2.npz --out a.npz");
+}
+
+#[cfg(feature = "gui")]
+#[test]
+fn frames_and_films_survive() {
+    let render = "render pendulum --size 64x64 --quiet --force";
+    check(&[&format!("{render} --at 0s,1ms,3ms --out out")], &format!("{render} --at 0s,2ms --out out"));
+    let film = |duration: &str| format!("{render} --duration {duration} --fps 500 --film a.mp4");
+    check(&[&film("4ms")], &film("2ms"));
+}
+
+/// Each file is that of one of two runs, and the checksum in metadata tells whether it and its rows are from the same run.
+fn whole_and_told(runs: [&Tree; 2], found: &Tree) {
+    assert!(found.keys().eq(["a.csv", "a.csv.meta.json"]), "{:?}", found.keys());
+    let of = |name: &str| runs.map(|run| run[name] == found[name]);
+    let (rows, account) = (of("a.csv"), of("a.csv.meta.json"));
+    assert!(rows.contains(&true) && account.contains(&true));
+    let meta: Json = serde_json::from_slice(&found["a.csv.meta.json"]).unwrap();
+    let told = meta["rows_crc32"] == format!("{:08x}", crc32fast::hash(&found["a.csv"])).as_str();
+    assert_eq!(told, rows == account);
+}
+
+/// Two runs to the same file.
+fn two_runs() -> [(String, Tree); 2] {
+    ["0.1", "0.2"].map(|friction| {
+        let folder = folder();
+        let line = format!("{RUN} --force --set contact.friction={friction} --out a.csv");
+        jointplay(folder.path(), &line).expect(0);
+        (line, tree(folder.path()))
+    })
+}
+
+#[test]
+fn rows_that_are_killed_at_any_instant_are_the_old_or_the_new() {
+    let [(_, old), (line, new)] = two_runs();
+    let work = folder();
+    let started = std::time::Instant::now();
+    jointplay(work.path(), &line).expect(0);
+    crate::common::at_random_instants(started.elapsed(), 4, |instant| {
+        old.iter().for_each(|(name, content)| fs::write(work.path().join(name), content).unwrap());
+        let mut child = command(work.path(), &line).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(instant);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        whole_and_told([&old, &new], &results(work.path()));
+        jointplay(work.path(), &line).expect(0);
+        assert!(tree(work.path()) == new);
+    });
+}
+
+#[test]
+fn two_writers_at_once_leave_whole_files() {
+    let runs = two_runs();
+    let folder = folder();
+    std::thread::scope(|scope| {
+        for (line, _) in &runs {
+            scope.spawn(|| (0..12).for_each(|_| drop(jointplay(folder.path(), line).expect(0))));
+        }
+    });
+    whole_and_told([&runs[0].1, &runs[1].1], &tree(folder.path()));
+}
+
+#[test]
+fn an_account_that_lost_its_rows_stands_in_no_way() {
+    let folder = folder();
+    let line = format!("{RUN} --out a.csv");
+    let at = |name: &str| folder.path().join(name);
+    jointplay(folder.path(), &line).expect(0);
+    fs::remove_file(at("a.csv")).unwrap();
+    jointplay(folder.path(), &line).expect(0);
+    // A file that this program did not write is left alone.
+    fs::remove_file(at("a.csv")).unwrap();
+    fs::write(at("a.csv.meta.json"), "{}").unwrap();
+    let failure = jointplay(folder.path(), &line).expect(1);
+    assert!(failure.stderr.contains("a.csv.meta.json already exists"), "{}", failure.stderr);
+    assert!(!at("a.csv").exists());
+}
