@@ -23,7 +23,7 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     // What is given out is what was read.
     assert_eq!(Link::parse(&link.format()).as_ref(), Ok(&link));
     match link.load() {
-        Ok(scene) if scene.bodies.len() <= MOST_BODIES => {
+        Ok(scene) if scene.machine.bodies.len() <= MOST_BODIES => {
             if let Ok(mut simulation) = Simulation::new(&scene.machine) {
                 let _ = simulation.step();
             }

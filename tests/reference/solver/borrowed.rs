@@ -19,9 +19,9 @@ pub struct Borrowed {
 impl Borrowed {
     pub fn new(scene: &Scene) -> Self {
         Self {
-            mechanism: RefCell::new(Mechanism::new(scene).unwrap()),
-            memory: RefCell::new(vec![Memory::default(); scene.ball_joints.len()]),
-            speed_floor: scene.contact.impact_speed_floor,
+            mechanism: RefCell::new(Mechanism::new(&scene.machine).unwrap()),
+            memory: RefCell::new(vec![Memory::default(); scene.machine.ball_joints.len()]),
+            speed_floor: scene.machine.contact.impact_speed_floor,
         }
     }
 }

@@ -52,7 +52,7 @@ impl Machine {
     /// Starts where the program starts `scene`.
     pub fn new(clearance: f64, friction: f64, printed: bool, scene: &Scene) -> Self {
         let mut frame = Frame::default();
-        Simulation::new(scene).unwrap().sample(0.0, &mut frame);
+        Simulation::new(&scene.machine).unwrap().sample(0.0, &mut frame);
         let mut start = Vec::new();
         // Parents come first: sliders, platform, rods.
         for body in [3, 4, 5, 6].map(|b| frame.bodies[b]) {
