@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use eframe::egui;
-use jointplay::app::{App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, Stretch, Voice, clicks};
+use jointplay::app::{App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, TimeWindow, Voice, clicks};
 use jointplay::render::Offscreen;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Impact, Simulation};
@@ -150,7 +150,7 @@ fn sound(watch: &Stopwatch) {
             ..Impact::default()
         })
         .collect();
-    let stretch = Stretch { from: TIME, to: 2.0 * TIME, lasts: 1.0 / 60.0 };
+    let stretch = TimeWindow { from: TIME, to: 2.0 * TIME, lasts: 1.0 / 60.0 };
     let mut heard: Vec<Click> = Vec::new();
     watch.time("clicks of a frame", || clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));
     clicks(impacts.iter(), &stretch, 1.0, &mut heard);

@@ -5,7 +5,7 @@
 
 use jointplay::contact::Memory;
 use jointplay::integrate::System;
-use jointplay::mechanism::{Mechanism, Touching};
+use jointplay::mechanism::{ActiveSet, Mechanism};
 use jointplay::scene::Scene;
 use jointplay::simulate::Simulation;
 use large::scene_text;
@@ -34,7 +34,7 @@ fn evaluation(watch: &Stopwatch, label: &str, scene: &Scene, time: f64) {
     let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
     let joints = 0..mechanism.contacts.len();
     let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
-    let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
+    let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
     let mut dy = vec![0.0; y.len()];
     let mut n = 0.0;
     watch.time(&format!("{label}: new instant"), || {
@@ -115,7 +115,7 @@ fn chain(watch: &Stopwatch) {
         let t = simulation.time();
         let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
         let memory = vec![Memory::default(); mechanism.contacts.len()];
-        let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
+        let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
         let mut dy = vec![0.0; y.len()];
         let name = format!("chain, one evaluation/{links}");
         let median = watch.time(&name, || mechanism.derivative(black_box(t), black_box(&y), &mut dy));

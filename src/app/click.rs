@@ -1,7 +1,7 @@
 //! Impacts as sound: which clicks a frame has, and their samples.
 //!
 //! A click follows its impact in three ways. It sounds at the instant at which the contact ended, as far into the frame as that
-//! instant is into the stretch of the run that the frame shows. Its pitch is that of a vibration of which the contact lasted
+//! instant is into the window of the run that the frame shows. Its pitch is that of a vibration of which the contact lasted
 //! half a period; the time is the run's own, so that slow motion spreads the clicks but leaves each as it is. Its loudness is a
 //! power below one of its impulse, so that soft impacts are heard beside hard ones.
 
@@ -35,9 +35,9 @@ pub struct Click {
     pub loudness: f64,
 }
 
-/// A stretch of the run, and the time that it is given.
+/// A window of the run, and the time that it is given.
 #[derive(Clone, Copy, Debug)]
-pub struct Stretch {
+pub struct TimeWindow {
     /// From after this instant, s.
     pub from: f64,
     /// Up to this one, s.
@@ -60,16 +60,16 @@ pub fn mass(scene: &Scene) -> f64 {
     scene.machine.bodies.iter().map(|body| body.mass).sum()
 }
 
-/// Writes the clicks of the `impacts` that ended within `stretch` to `out`, in their order; `mass` is that of all bodies, kg.
-pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, stretch: &Stretch, mass: f64, out: &mut Vec<Click>) {
+/// Writes the clicks of the `impacts` that ended within `window` to `out`, in their order; `mass` is that of all bodies, kg.
+pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, window: &TimeWindow, mass: f64, out: &mut Vec<Click>) {
     out.clear();
-    let within = |impact: &&Impact| stretch.from < impact.end && impact.end <= stretch.to;
+    let within = |impact: &&Impact| window.from < impact.end && impact.end <= window.to;
     out.extend(impacts.filter(within).map(|impact| {
-        let part = (impact.end - stretch.from) / (stretch.to - stretch.from);
+        let part = (impact.end - window.from) / (window.to - window.from);
         let lasted = impact.end - impact.start;
         let loudness = impulse(impact, mass) / (mass * LOUDEST_SPEED);
         Click {
-            after: part * stretch.lasts,
+            after: part * window.lasts,
             pitch: (0.5 / lasted).clamp(PITCHES.0, PITCHES.1),
             loudness: libm::pow(loudness, COMPRESSION).min(1.0),
         }
@@ -147,13 +147,13 @@ mod tests {
         }
     }
 
-    fn of(impacts: &[Impact], stretch: Stretch) -> Vec<Click> {
+    fn of(impacts: &[Impact], window: TimeWindow) -> Vec<Click> {
         let mut out = Vec::new();
-        clicks(impacts.iter(), &stretch, 5.0, &mut out);
+        clicks(impacts.iter(), &window, 5.0, &mut out);
         out
     }
 
-    const SECOND: Stretch = Stretch { from: 1.0, to: 2.0, lasts: 0.05 };
+    const SECOND: TimeWindow = TimeWindow { from: 1.0, to: 2.0, lasts: 0.05 };
 
     #[test]
     fn a_stretch_has_the_impacts_that_ended_in_it_at_their_times() {
@@ -162,10 +162,10 @@ mod tests {
         let heard = of(&impacts, SECOND);
         let times: Vec<f64> = heard.iter().map(|click| click.after).collect();
         assert_eq!(times, [0.0125, 0.05]);
-        // What one stretch leaves, the next has: none twice, none lost.
-        let next = Stretch { from: 2.0, to: 3.0, ..SECOND };
+        // What one window leaves, the next has: none twice, none lost.
+        let next = TimeWindow { from: 2.0, to: 3.0, ..SECOND };
         assert_eq!(of(&impacts, next).len(), 1);
-        let nothing = Stretch { to: 1.0, ..SECOND };
+        let nothing = TimeWindow { to: 1.0, ..SECOND };
         assert!(of(&impacts, nothing).is_empty());
     }
 
@@ -173,8 +173,8 @@ mod tests {
     fn the_pitch_is_that_of_the_contact_at_any_speed_of_the_play() {
         for lasted in [2e-4, 1e-3] {
             for lasts in [1e-3, 50.0] {
-                let stretch = Stretch { lasts, ..SECOND };
-                let pitch = of(&[impact(1.5, lasted, 0.01)], stretch)[0].pitch;
+                let window = TimeWindow { lasts, ..SECOND };
+                let pitch = of(&[impact(1.5, lasted, 0.01)], window)[0].pitch;
                 assert!((pitch * 2.0 * lasted - 1.0).abs() < 1e-9, "{pitch} Hz");
             }
         }

@@ -82,7 +82,7 @@ use crate::view::{Preset, Quality, ViewOptions};
 use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
-pub use click::{Click, MOST_CLICKS, PITCHES, Stretch, Voice, clicks};
+pub use click::{Click, MOST_CLICKS, PITCHES, TimeWindow, Voice, clicks};
 pub use compare::{Comparison, Kept};
 use controls::Controls;
 #[cfg(not(target_arch = "wasm32"))]

@@ -2,7 +2,7 @@
 
 use eframe::egui::Ui;
 
-use super::click::{Click, Stretch, clicks, mass};
+use super::click::{Click, TimeWindow, clicks, mass};
 use super::{App, Notice};
 
 /// The switch.
@@ -60,10 +60,10 @@ impl App {
         if !(self.sound.on && plays) {
             return;
         }
-        let stretch = Stretch { from, to: player.pacer.shown(), lasts: dt };
+        let window = TimeWindow { from, to: player.pacer.shown(), lasts: dt };
         // The simulation may be a step ahead of what is on show.
         let impacts = player.simulation().impacts();
-        clicks(impacts, &stretch, mass(player.running()), &mut self.sound.clicks);
+        clicks(impacts, &window, mass(player.running()), &mut self.sound.clicks);
         if !self.sound.clicks.is_empty() {
             self.host.click(&self.sound.clicks);
         }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::args::BenchArguments;
 use super::tradeoff::{grid, percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
-use crate::analysis::{GROWTH, Reach, SPEED_GOALS, Speed, growth, reach, speed};
+use crate::analysis::{GROWTH, GoalResult, SPEED_GOALS, Speed, growth, reach, speed};
 use crate::scene::Scene;
 use crate::units::format_quantity;
 
@@ -34,7 +34,7 @@ fn yes(met: bool) -> String {
     if met { "yes" } else { "no" }.to_owned()
 }
 
-fn text(rows: &[Reach], machines: &[Speed], growth: f64) -> String {
+fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
     let head = ["span", "method", "speed", "asked", "rk4 at 10 us", "ratio", "error", "of", "reached"];
     let mut lines = vec![head.map(str::to_owned).to_vec()];
     for row in rows {

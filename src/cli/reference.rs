@@ -1,7 +1,8 @@
 //! `reference`: the page of the scene format, whose tables follow from the rows by which the reader goes.
 
 use crate::scene::{
-    ABOVE_ZERO, Absent, DRIVE_LAWS, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables, find, is_element,
+    ABOVE_ZERO, DRIVE_LAWS, DefaultRule, FILE, FileKey, FileTable, Kind, ValueType, Variants, file_tables, find,
+    is_element,
 };
 use crate::units::{Dimension, dimension_name, format_quantity, si_unit, unit_table};
 
@@ -108,7 +109,7 @@ fn own(table: &FileTable) -> impl Iterator<Item = &FileKey> {
 /// What a key is: of a parameter, whose page says more, the first sentence.
 fn what(key: &FileKey) -> String {
     match key.takes {
-        Takes::Parameter(_) => {
+        ValueType::Parameter(_) => {
             let (first, _) = key.help.split_once(". ").unwrap_or((key.help, ""));
             first.trim_end_matches('.').to_owned()
         }
@@ -145,39 +146,39 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
     };
     let words = |words: &[&str]| format!("`{}`", words.join("`, `"));
     match key.takes {
-        Takes::Number(of, range) => number(of) + &bounds(of, range),
-        Takes::Vector(Dimension::None, _) | Takes::Direction => "direction".to_owned(),
-        Takes::Vector(of, range) => format!("vector, {}{}", number(of), bounds(of, range)),
-        Takes::Numbers(count, of) => format!("{count} of {}", number(of)),
-        Takes::Quantity => "any quantity".to_owned(),
-        Takes::Range => "two quantities".to_owned(),
-        Takes::Whole(least, most) => format!("whole number, {least} to {most}"),
-        Takes::Flag => words(&["true", "false"]),
-        Takes::Text => "text".to_owned(),
-        Takes::Name => "name".to_owned(),
-        Takes::Body => "name of a body".to_owned(),
-        Takes::Joint => "name of a joint".to_owned(),
-        Takes::File => "name of a file".to_owned(),
-        Takes::Word(of) => words(of),
-        Takes::Words(of, many) => format!("list of at most {} of {}", many.most, words(of)),
-        Takes::Parameter(name) => find(name).map_or_else(String::new, |parameter| match parameter.kind {
+        ValueType::Number(of, range) => number(of) + &bounds(of, range),
+        ValueType::Vector(Dimension::None, _) | ValueType::Direction => "direction".to_owned(),
+        ValueType::Vector(of, range) => format!("vector, {}{}", number(of), bounds(of, range)),
+        ValueType::Numbers(count, of) => format!("{count} of {}", number(of)),
+        ValueType::Quantity => "any quantity".to_owned(),
+        ValueType::Range => "two quantities".to_owned(),
+        ValueType::Whole(least, most) => format!("whole number, {least} to {most}"),
+        ValueType::Flag => words(&["true", "false"]),
+        ValueType::Text => "text".to_owned(),
+        ValueType::Name => "name".to_owned(),
+        ValueType::Body => "name of a body".to_owned(),
+        ValueType::Joint => "name of a joint".to_owned(),
+        ValueType::File => "name of a file".to_owned(),
+        ValueType::Word(of) => words(of),
+        ValueType::Words(of, many) => format!("list of at most {} of {}", many.most, words(of)),
+        ValueType::Parameter(name) => find(name).map_or_else(String::new, |parameter| match parameter.kind {
             Kind::Number { dimension: of, .. } => {
                 format!("{}, {}", dimension(of), parameter.range())
             }
             Kind::Count { .. } => format!("whole number, {}", parameter.range()),
             Kind::Choice(of) => words(of),
         }),
-        Takes::Table(of) => called(of),
-        Takes::List(of, _) if table.head.starts_with("[[") && of.head.starts_with("[[") => {
+        ValueType::Table(of) => called(of),
+        ValueType::List(of, _) if table.head.starts_with("[[") && of.head.starts_with("[[") => {
             format!("`[[{}.{}]]`", table.name, key.name)
         }
-        Takes::List(of, _) if of.head.starts_with("[[") => called(of),
-        Takes::List(_, many) => format!("list of {}", many.what),
-        Takes::Vectors(of, _) => format!("list of vectors, {}", number(of)),
-        Takes::Pairs([first, second], many) => {
+        ValueType::List(of, _) if of.head.starts_with("[[") => called(of),
+        ValueType::List(_, many) => format!("list of {}", many.what),
+        ValueType::Vectors(of, _) => format!("list of vectors, {}", number(of)),
+        ValueType::Pairs([first, second], many) => {
             format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), many.most)
         }
-        Takes::Files(_) => "list of names of files".to_owned(),
+        ValueType::Files(_) => "list of names of files".to_owned(),
     }
 }
 
@@ -201,21 +202,21 @@ fn bounds(dimension: Dimension, (least, most): (f64, f64)) -> String {
 /// What holds where a key is left out, in words.
 pub fn absent(key: &FileKey) -> String {
     match (key.absent, key.takes) {
-        (_, Takes::Parameter(name)) => {
+        (_, ValueType::Parameter(name)) => {
             let show = |parameter: &crate::scene::Parameter| parameter.show(&parameter.default);
             find(name).map_or_else(String::new, show)
         }
-        (Absent::Fault, _) => "must be given".to_owned(),
-        (Absent::Or(other), _) => format!("must be given, or `{other}`"),
-        (Absent::Is(_), Takes::Table(_)) => "none".to_owned(),
-        (Absent::Is(value), _) if value.is_infinite() => "no limit".to_owned(),
-        (Absent::Is(0.0), _) => "0".to_owned(),
-        (Absent::Is(value), _) => {
+        (DefaultRule::Fault, _) => "must be given".to_owned(),
+        (DefaultRule::Or(other), _) => format!("must be given, or `{other}`"),
+        (DefaultRule::Is(_), ValueType::Table(_)) => "none".to_owned(),
+        (DefaultRule::Is(value), _) if value.is_infinite() => "no limit".to_owned(),
+        (DefaultRule::Is(0.0), _) => "0".to_owned(),
+        (DefaultRule::Is(value), _) => {
             let unit = key.dimension(false).map_or("", si_unit);
             format_quantity(value, unit)
         }
-        (Absent::Means(words), Takes::Word(_)) => format!("`{words}`"),
-        (Absent::Means(words), _) => words.to_owned(),
+        (DefaultRule::Means(words), ValueType::Word(_)) => format!("`{words}`"),
+        (DefaultRule::Means(words), _) => words.to_owned(),
     }
 }
 

@@ -11,8 +11,8 @@ use super::args::{RunArguments, SummaryForm};
 use super::assembly::Start;
 use super::impacts::ImpactsFile;
 use super::link::Way;
-use super::output::{NoRow, RowsFile, Table, check_distinct, check_size, significant};
-use super::state::{self, Begun, StateFile};
+use super::output::{RowError, RowsFile, Table, check_distinct, check_size, significant};
+use super::state::{self, Checkpoint, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::presets::too_slow;
@@ -172,7 +172,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         (from, duration),
         times,
         &mut table,
-        &mut Keepers { impacts: impacts.as_mut(), state: state.as_mut(), way: way.as_mut(), end: asked },
+        &mut StepObservers { impacts: impacts.as_mut(), state: state.as_mut(), way: way.as_mut(), end: asked },
         &mut frame,
         &mut stopwatch,
         &progress,
@@ -285,21 +285,19 @@ fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
 /// # Errors
 /// As [`state::read`]; a `duration`, s, that is over by then.
 fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
-    let Begun { state, time } = state::read(path, scene)?;
+    let Checkpoint { state, time } = state::read(path, scene)?;
     if duration < time {
         return Err(Failure::usage(format!(
             "--duration {duration} s lies before the {time} s of --from-state {}: it counts from the start of the run",
             path.display()
         )));
     }
-    simulation
-        .go_on_from(&state)
-        .map_err(|misfit| Failure::usage(format!("--from-state {}: {misfit}", path.display())))?;
+    simulation.resume(&state).map_err(|misfit| Failure::usage(format!("--from-state {}: {misfit}", path.display())))?;
     Ok(time)
 }
 
 /// What looks at the simulation around every step.
-struct Keepers<'a> {
+struct StepObservers<'a> {
     impacts: Option<&'a mut ImpactsFile>,
     state: Option<&'a mut StateFile>,
     /// What was done on the way of a link's run, and where the run is to end, s; by default where the link's is.
@@ -307,7 +305,7 @@ struct Keepers<'a> {
     end: Option<f64>,
 }
 
-impl Keepers<'_> {
+impl StepObservers<'_> {
     /// Whether the run is over.
     fn is_over(&self, simulation: &LiveScene, duration: f64) -> bool {
         let at_link = self.way.as_ref().filter(|_| self.end.is_none());
@@ -324,7 +322,7 @@ fn simulate(
     (from, duration): (f64, f64),
     times: Option<Times>,
     table: &mut Table,
-    keepers: &mut Keepers<'_>,
+    keepers: &mut StepObservers<'_>,
     frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
@@ -337,8 +335,8 @@ fn simulate(
                 simulation.sample(times.at(next), frame);
                 match table.push(frame) {
                     Ok(()) => {}
-                    Err(NoRow::Disk(error)) => return Err(error),
-                    Err(error @ NoRow::NotFinite { .. }) => {
+                    Err(RowError::Disk(error)) => return Err(error),
+                    Err(error @ RowError::NotFinite { .. }) => {
                         return Ok(End {
                             status: Status::Diverged,
                             failure: Some(Failure::new(
@@ -376,7 +374,12 @@ fn simulate(
 }
 
 /// Steps until `row` is reached, the run ends, or a check is due; in words, why it stopped. A row never shortens a step.
-fn step_some(simulation: &mut LiveScene, row: f64, duration: f64, keepers: &mut Keepers<'_>) -> Result<(), String> {
+fn step_some(
+    simulation: &mut LiveScene,
+    row: f64,
+    duration: f64,
+    keepers: &mut StepObservers<'_>,
+) -> Result<(), String> {
     for _ in 0..STEPS_BETWEEN_LOOKS {
         if simulation.time() >= row || keepers.is_over(simulation, duration) {
             break;

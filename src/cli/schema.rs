@@ -4,7 +4,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::reference::{absent, capital, value};
-use crate::scene::{ABOVE_ZERO, Absent, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables, find};
+use crate::scene::{ABOVE_ZERO, DefaultRule, FILE, FileKey, FileTable, Kind, ValueType, Variants, file_tables, find};
 use crate::units::{Dimension, unit_names};
 
 /// The schema as text.
@@ -95,10 +95,10 @@ fn of_variant(table: &FileTable, word: &'static str) -> Json {
 
 /// Which of `keys` must be given.
 fn needs(keys: &[&FileKey]) -> Json {
-    let needed = keys.iter().filter(|key| matches!(key.absent, Absent::Fault));
+    let needed = keys.iter().filter(|key| matches!(key.absent, DefaultRule::Fault));
     let needed: Vec<&str> = needed.map(|key| key.name).collect();
     let either = keys.iter().filter_map(|key| match key.absent {
-        Absent::Or(other) => Some(json!({
+        DefaultRule::Or(other) => Some(json!({
             "anyOf": [{ "required": [key.name] }, { "required": [other] }]
         })),
         _ => None,
@@ -113,7 +113,7 @@ fn needs(keys: &[&FileKey]) -> Json {
 fn of_key(key: &FileKey, table: &FileTable) -> Json {
     let mut description = format!("{}\n\nValue: {}", capital(key.help), value(key, table));
     let dimension = match key.takes {
-        Takes::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
+        ValueType::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
             Some(Kind::Number { dimension, .. }) => Some(dimension),
             _ => None,
         },
@@ -127,7 +127,7 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
         description += &format!("; units {}", units.join(", "));
     }
     description += &match key.absent {
-        Absent::Fault | Absent::Or(_) => format!(".\n{}.", capital(&absent(key))),
+        DefaultRule::Fault | DefaultRule::Or(_) => format!(".\n{}.", capital(&absent(key))),
         _ => format!(".\nIf left out: {}.", absent(key)),
     };
     if !key.frame.is_empty() {
@@ -148,19 +148,19 @@ fn of_value(key: &FileKey) -> Json {
     let text = || json!({ "type": "string" });
     let list = |items: Json| json!({ "type": "array", "items": items });
     match key.takes {
-        Takes::Number(of, range) => number(of, range),
-        Takes::Vector(of, range) => numbers(3, number(of, range)),
-        Takes::Direction => numbers(3, number(Dimension::None, key.range())),
-        Takes::Numbers(count, of) => numbers(count, number(of, key.range())),
-        Takes::Quantity => json!({ "type": ["string", "number"] }),
-        Takes::Range => numbers(2, json!({ "type": ["string", "number"] })),
-        Takes::Whole(least, most) => whole(least.into(), most.into()),
-        Takes::Flag => json!({ "type": "boolean" }),
-        Takes::Name => json!({ "type": "string", "pattern": "^[A-Za-z0-9_-]{1,40}$" }),
-        Takes::Text | Takes::Body | Takes::Joint | Takes::File => text(),
-        Takes::Word(words) => json!({ "enum": words }),
-        Takes::Words(words, _) => list(json!({ "enum": words })),
-        Takes::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
+        ValueType::Number(of, range) => number(of, range),
+        ValueType::Vector(of, range) => numbers(3, number(of, range)),
+        ValueType::Direction => numbers(3, number(Dimension::None, key.range())),
+        ValueType::Numbers(count, of) => numbers(count, number(of, key.range())),
+        ValueType::Quantity => json!({ "type": ["string", "number"] }),
+        ValueType::Range => numbers(2, json!({ "type": ["string", "number"] })),
+        ValueType::Whole(least, most) => whole(least.into(), most.into()),
+        ValueType::Flag => json!({ "type": "boolean" }),
+        ValueType::Name => json!({ "type": "string", "pattern": "^[A-Za-z0-9_-]{1,40}$" }),
+        ValueType::Text | ValueType::Body | ValueType::Joint | ValueType::File => text(),
+        ValueType::Word(words) => json!({ "enum": words }),
+        ValueType::Words(words, _) => list(json!({ "enum": words })),
+        ValueType::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
             Some(Kind::Number { dimension, min, max, .. }) => number(dimension, (min, max)),
             Some(Kind::Count { min, max }) => whole(min, max),
             // "x" stands for "+x".
@@ -171,16 +171,16 @@ fn of_value(key: &FileKey) -> Json {
             }
             None => json!({}),
         },
-        Takes::Table(of) => json!({ "allOf": [reference(of)] }),
-        Takes::List(of, _) => list(reference(of)),
-        Takes::Vectors(of, _) => list(numbers(3, number(of, key.range()))),
-        Takes::Pairs([first, second], _) => {
+        ValueType::Table(of) => json!({ "allOf": [reference(of)] }),
+        ValueType::List(of, _) => list(reference(of)),
+        ValueType::Vectors(of, _) => list(numbers(3, number(of, key.range()))),
+        ValueType::Pairs([first, second], _) => {
             let part = |of| number(of, key.range());
             list(json!({
                 "type": "array", "items": [part(first), part(second)], "minItems": 2, "maxItems": 2
             }))
         }
-        Takes::Files(_) => list(text()),
+        ValueType::Files(_) => list(text()),
     }
 }
 

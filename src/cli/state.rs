@@ -81,7 +81,7 @@ impl StateFile {
 }
 
 /// A state from which a run goes on.
-pub struct Begun {
+pub struct Checkpoint {
     /// The state.
     pub state: SavedState,
     /// Time at which the run that saved it ended, s.
@@ -92,7 +92,7 @@ pub struct Begun {
 ///
 /// # Errors
 /// An unreadable or damaged file; a state of another scene, other parameters or another version of the program.
-pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
+pub fn read(path: &Path, scene: &Scene) -> Result<Checkpoint, Failure> {
     let name = path.display();
     let mut text = Vec::new();
     File::open(path)
@@ -132,7 +132,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
         return Err(refuse("without a state, or its time".to_owned()));
     };
     let state = state.map_err(|cause| refuse(format!("not a state: {cause}")))?;
-    Ok(Begun { state, time })
+    Ok(Checkpoint { state, time })
 }
 
 /// Refuses the state with `meta` of another scene than `scene`, in words.

@@ -1,6 +1,6 @@
 //! The last pass: light becomes the bytes of a picture.
 
-use super::target::{Keeping, extent};
+use super::target::{ColorEncoding, extent};
 use super::{shaders, wgpu};
 
 /// Tone-maps, encodes and dithers what was drawn.
@@ -11,7 +11,7 @@ pub(super) struct Finish {
 
 impl Finish {
     /// To an attachment of format `to`, of what was kept like `keeping`.
-    pub fn new(device: &wgpu::Device, keeping: Keeping, to: wgpu::TextureFormat) -> Self {
+    pub fn new(device: &wgpu::Device, keeping: ColorEncoding, to: wgpu::TextureFormat) -> Self {
         let shader = shaders::module(device, &shaders::FINISH);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("finish"),
@@ -33,10 +33,10 @@ impl Finish {
         });
         // A surface of an sRGB format encodes by itself.
         let entry = match (keeping, to.is_srgb()) {
-            (Keeping::Linear, false) => "fs_encode",
-            (Keeping::Linear, true) => "fs_display",
-            (Keeping::Encoded, false) => "fs_copy",
-            (Keeping::Encoded, true) => "fs_decode",
+            (ColorEncoding::Linear, false) => "fs_encode",
+            (ColorEncoding::Linear, true) => "fs_display",
+            (ColorEncoding::Encoded, false) => "fs_copy",
+            (ColorEncoding::Encoded, true) => "fs_decode",
         };
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("finish"),

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use super::passes::{Blend, Draws, PASSES, Pass};
 use super::shaders;
-use super::target::{DEPTH, Keeping};
+use super::target::{ColorEncoding, DEPTH};
 use super::wgpu;
 use crate::view::{Instance, Line};
 
@@ -19,13 +19,13 @@ pub(super) struct Pipelines {
     pub globals: wgpu::BindGroupLayout,
     pub shadow: wgpu::BindGroupLayout,
     shader: wgpu::ShaderModule,
-    keeping: Keeping,
+    keeping: ColorEncoding,
     /// For one sample per pixel, and for several.
     passes: [[OnceLock<wgpu::RenderPipeline>; PASSES.len()]; 2],
 }
 
 impl Pipelines {
-    pub fn new(device: &wgpu::Device, keeping: Keeping) -> Self {
+    pub fn new(device: &wgpu::Device, keeping: ColorEncoding) -> Self {
         let globals = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("globals"),
             entries: &[wgpu::BindGroupLayoutEntry {
@@ -60,8 +60,8 @@ impl Pipelines {
             ],
         });
         let module = match keeping {
-            Keeping::Linear => shaders::LINEAR,
-            Keeping::Encoded => shaders::ENCODED,
+            ColorEncoding::Linear => shaders::LINEAR,
+            ColorEncoding::Encoded => shaders::ENCODED,
         };
         Self {
             globals,

@@ -12,7 +12,7 @@ use super::fit::{self, Ball, shadow_region};
 use super::meshes::{self, LEVELS};
 use super::passes::{Draws, Group, PASSES};
 use super::pipelines::{Pipelines, SHADOW};
-use super::target::{Keeping, extent};
+use super::target::{ColorEncoding, extent};
 use super::{RenderTarget, wgpu};
 use crate::view::{Colour, DrawList, Eye, Instance, Line, Mesh, MeshData};
 
@@ -119,13 +119,13 @@ pub struct Renderer {
     packed: Vec<Instance>,
     /// Solid things: where they are, and whether they are in view.
     casters: Vec<(Ball, bool)>,
-    keeping: Keeping,
+    keeping: ColorEncoding,
 }
 
 impl Renderer {
     /// Creates pipelines and shared meshes on `device`, which is `adapter`'s.
     pub fn new(device: &wgpu::Device, adapter: &wgpu::Adapter) -> Self {
-        let keeping = Keeping::on(adapter);
+        let keeping = ColorEncoding::on(adapter);
         let pipelines = Pipelines::new(device, keeping);
         let globals = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("globals"),

@@ -7,7 +7,7 @@ use crate::view::DrawList;
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth24Plus;
 /// How light is kept between the passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Keeping {
+pub(super) enum ColorEncoding {
     /// Linear and brighter than white, 16-bit floats: the last pass tone-maps and encodes.
     Linear,
     /// Tone-mapped and encoded by each pass, 8 bits: where the adapter cannot blend or resolve float samples. Blending is then
@@ -15,7 +15,7 @@ pub(super) enum Keeping {
     Encoded,
 }
 
-impl Keeping {
+impl ColorEncoding {
     /// What `adapter` can do.
     pub fn on(adapter: &wgpu::Adapter) -> Self {
         Self::with(&adapter.get_texture_format_features(Self::Linear.format()))
@@ -54,7 +54,7 @@ pub struct RenderTarget {
 impl RenderTarget {
     /// A target of `size` pixels (each at least 1 and at most the device's `max_texture_dimension_2d`) with 1 or 4 samples in each;
     /// every backend supports four.
-    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], samples: u32, keeping: Keeping) -> Self {
+    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], samples: u32, keeping: ColorEncoding) -> Self {
         use wgpu::TextureUsages as Usage;
         let texture = |label, format, sample_count, usage| {
             let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -109,15 +109,15 @@ mod tests {
     fn light_is_kept_linear_only_where_floats_blend_and_resolve() {
         let all = Flags::BLENDABLE | Flags::MULTISAMPLE_X4 | Flags::MULTISAMPLE_RESOLVE;
         let usages = Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING;
-        let of = |flags, allowed_usages| Keeping::with(&wgpu::TextureFormatFeatures { allowed_usages, flags });
-        assert_eq!(of(all | Flags::FILTERABLE, usages), Keeping::Linear);
+        let of = |flags, allowed_usages| ColorEncoding::with(&wgpu::TextureFormatFeatures { allowed_usages, flags });
+        assert_eq!(of(all | Flags::FILTERABLE, usages), ColorEncoding::Linear);
         for missing in all.iter() {
-            assert_eq!(of(all - missing, usages), Keeping::Encoded, "{missing:?}");
+            assert_eq!(of(all - missing, usages), ColorEncoding::Encoded, "{missing:?}");
         }
         for missing in usages.iter() {
-            assert_eq!(of(all, usages - missing), Keeping::Encoded, "{missing:?}");
+            assert_eq!(of(all, usages - missing), ColorEncoding::Encoded, "{missing:?}");
         }
         // WebGL2 without EXT_color_buffer_float.
-        assert_eq!(of(Flags::FILTERABLE, Usage::TEXTURE_BINDING), Keeping::Encoded);
+        assert_eq!(of(Flags::FILTERABLE, Usage::TEXTURE_BINDING), ColorEncoding::Encoded);
     }
 }

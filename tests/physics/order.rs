@@ -2,7 +2,7 @@
 
 use crate::common::{run_until, scene, simulation, slope};
 use jointplay::integrate::{DormandPrince, ImexEuler, RungeKutta4, SemiImplicitEuler, Stepper, System};
-use jointplay::mechanism::{Mechanism, Touching};
+use jointplay::mechanism::{ActiveSet, Mechanism};
 
 /// Largest difference of two states relative to the scales of their components.
 fn distance(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
@@ -21,7 +21,7 @@ fn equal_steps<S: Stepper>(
     let n = start.len();
     let (mut y, mut end) = (start.to_vec(), vec![0.0; n]);
     let (mut k, mut k_end) = (vec![0.0; n], vec![0.0; n]);
-    let mechanism = &mut mechanism.evaluator(Touching::Nothing);
+    let mechanism = &mut mechanism.evaluator(ActiveSet::Nothing);
     let h = duration / f64::from(steps);
     for i in 0..steps {
         let t = f64::from(i) * h;
@@ -36,7 +36,7 @@ fn equal_steps<S: Stepper>(
 fn equal_imex_steps(m: &mut Mechanism, start: &[f64], duration: f64, steps: u32) -> Vec<f64> {
     let mut stepper = ImexEuler::new(start.len());
     m.prepare_implicit_contacts().unwrap();
-    let m = &mut m.evaluator(Touching::Nothing);
+    let m = &mut m.evaluator(ActiveSet::Nothing);
     let (mut y, mut end) = (start.to_vec(), start.to_vec());
     let h = duration / f64::from(steps);
     for i in 0..steps {

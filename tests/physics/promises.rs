@@ -139,7 +139,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     }
     // From a file.
     let mut later = LiveScene::new(scene).unwrap();
-    later.go_on_from(&serde_json::from_str(&saved).unwrap()).unwrap();
+    later.resume(&serde_json::from_str(&saved).unwrap()).unwrap();
     assert_eq!(later.state_hash(), here.0, "read again");
     change(&mut later);
     assert!(go_on(&mut later) == first, "read again");

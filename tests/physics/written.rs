@@ -5,7 +5,7 @@ use crate::common::invariants::finite;
 use crate::properties::config;
 use jointplay::machine::{Quat, Vec3};
 use jointplay::scene::{
-    ABOVE_ZERO, Absent, FileKey, FileTable, Scene, SceneError, Takes, Texts, file_tables, is_element,
+    ABOVE_ZERO, DefaultRule, FileKey, FileTable, Scene, SceneError, Texts, ValueType, file_tables, is_element,
 };
 use jointplay::simulate::{Frame, Simulation};
 use jointplay::units::{Dimension, si_unit};
@@ -46,19 +46,19 @@ fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
         _ => key.like,
     };
     match key.takes {
-        Takes::Number(_, range) => within(range).prop_map(move |x| quoted(x, dimension)).boxed(),
-        Takes::Vector(_, range) => proptest::collection::vec(within(range), 3)
+        ValueType::Number(_, range) => within(range).prop_map(move |x| quoted(x, dimension)).boxed(),
+        ValueType::Vector(_, range) => proptest::collection::vec(within(range), 3)
             .prop_map(move |v| {
                 let all: Vec<String> = v.iter().map(|x| quoted(*x, dimension)).collect();
                 format!("[{}]", all.join(", "))
             })
             .boxed(),
-        Takes::Direction => {
+        ValueType::Direction => {
             (-9..10_i32, -9..10_i32, 1..10_i32).prop_map(|(x, y, z)| format!("[{x}, {y}, {z}]")).boxed()
         }
-        Takes::Word(words) => proptest::sample::select(words).prop_map(|word| format!("\"{word}\"")).boxed(),
-        Takes::Flag => any::<bool>().prop_map(|flag| flag.to_string()).boxed(),
-        Takes::Table(table) if !table.words().is_empty() => {
+        ValueType::Word(words) => proptest::sample::select(words).prop_map(|word| format!("\"{word}\"")).boxed(),
+        ValueType::Flag => any::<bool>().prop_map(|flag| flag.to_string()).boxed(),
+        ValueType::Table(table) if !table.words().is_empty() => {
             // The law of the paper's machine needs that machine.
             let words = table.words().iter().copied();
             let words: Vec<&'static str> = words.filter(|word| *word != "spcmm").collect();
@@ -82,15 +82,15 @@ fn filled(
     let by = table.variants.map(|_| table.words());
     for key in table.of(word).filter(|key| !skip.contains(&key.name)) {
         let values = match (key.takes, word) {
-            (Takes::Word(words), Some(word)) if by == Some(words) => Just(format!("\"{word}\"")).boxed(),
+            (ValueType::Word(words), Some(word)) if by == Some(words) => Just(format!("\"{word}\"")).boxed(),
             _ => value(key, hinge),
         };
         let written = values.prop_map(|value| format!("{} = {value}", key.name));
         all.push(match key.absent {
-            Absent::Fault => written.prop_map(Some).boxed(),
+            DefaultRule::Fault => written.prop_map(Some).boxed(),
             // What goes instead of it is a file.
-            Absent::Or(_) if matches!(key.takes, Takes::File) => Just(None).boxed(),
-            Absent::Or(_) => written.prop_map(Some).boxed(),
+            DefaultRule::Or(_) if matches!(key.takes, ValueType::File) => Just(None).boxed(),
+            DefaultRule::Or(_) => written.prop_map(Some).boxed(),
             _ => proptest::option::weighted(0.7, written).boxed(),
         });
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use boon::{Compiler, Draft, SchemaIndex, Schemas};
 use jointplay::cli::schema;
 use jointplay::scene::{
-    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Takes, Texts, Variants, built_in_text, file_tables,
+    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Texts, ValueType, Variants, built_in_text, file_tables,
 };
 use serde_json::Value as Json;
 
@@ -131,8 +131,8 @@ impl Found {
             let path = [&path[..], &[Step::Key(name.to_owned())]].concat();
             self.keys.push((path.clone(), row, word));
             match row.takes {
-                Takes::Table(rows) => self.walk(inner, rows, path),
-                Takes::List(rows, _) => {
+                ValueType::Table(rows) => self.walk(inner, rows, path),
+                ValueType::List(rows, _) => {
                     let count = inner.as_array().map(|list| list.len());
                     let count = count.or_else(|| Some(inner.as_array_of_tables()?.len()));
                     for place in 0..count.expect("a list") {

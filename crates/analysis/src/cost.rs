@@ -1,10 +1,10 @@
 //! What each part of the model costs: the same scene with more and less of it.
 
-use super::stretch::time_to;
+use super::timing::time_to;
 use super::{AnalysisError, RunContext, Setting, WorkBudget};
 use jointplay_physics::integrate::System as _;
 use jointplay_physics::machine::Preset;
-use jointplay_physics::mechanism::{Mechanism, Touching};
+use jointplay_physics::mechanism::{ActiveSet, Mechanism};
 use jointplay_scene::Scene;
 
 /// Preset used for the runs.
@@ -109,7 +109,7 @@ fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunCo
     mechanism.start().map_err(jointplay_physics::simulate::StartError)?;
     let joints = 0..mechanism.contacts.len();
     let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
-    let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
+    let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
     let mut dy = vec![0.0; y.len()];
     let mut shortest = f64::INFINITY;
     let mut instant = 0.0;

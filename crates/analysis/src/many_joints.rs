@@ -1,6 +1,6 @@
 //! Speed goals of machines with many loose joints, at the loosest tolerance that has the peaks of the first impacts.
 
-use super::stretch::time_to;
+use super::timing::time_to;
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_scene::Scene;
 

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::stretch::time_to;
+use super::timing::time_to;
 use super::work_precision::{Baseline, measure as measure_point};
 use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision};
 use jointplay_physics::machine::Preset;

@@ -1,7 +1,7 @@
 //! Speed goals of the program: three spans of the default scene, each with the speed required of it.
 
 use super::reference_solution::{MeanForces, done};
-use super::stretch::{advance_capped, time_to};
+use super::timing::{advance_capped, time_to};
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
@@ -68,7 +68,7 @@ impl Goal {
 
 /// A measured result.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reach {
+pub struct GoalResult {
     /// The goal.
     pub goal: Goal,
     /// The method.
@@ -82,7 +82,7 @@ pub struct Reach {
     pub error: Option<f64>,
 }
 
-impl Reach {
+impl GoalResult {
     /// Whether the goal is met.
     pub fn met(&self) -> bool {
         self.speed >= self.goal.asked() && self.error.is_none_or(|error| error <= ALLOWED)
@@ -93,7 +93,7 @@ impl Reach {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<Reach>, AnalysisError> {
+pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<GoalResult>, AnalysisError> {
     let goals = Goal::ALL.iter().enumerate();
     goals
         .map(|(n, goal)| {
@@ -106,7 +106,7 @@ pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<Reach>, Anal
         .collect()
 }
 
-fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, AnalysisError> {
+fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult, AnalysisError> {
     let setting = Setting::automatic(TOLERANCE);
     let baseline = Setting::baseline();
     let integrates = !setting.start(scene)?.mechanism().is_kinematic();
@@ -137,7 +137,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
         }
         Goal::Ideal => None,
     };
-    Ok(Reach { goal, setting, speed: first.max(second), baseline, error })
+    Ok(GoalResult { goal, setting, speed: first.max(second), baseline, error })
 }
 
 /// Runs from the start to `end`; `seen` is called after every step.

@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use super::stretch::advance_capped;
+use super::timing::advance_capped;
 use super::{AnalysisError, End, RunContext, Setting, WorkBudget};
 use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{Frame, Peak, Simulation, Snapshot};

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::reference_solution::PhaseCost;
-use super::stretch::time_to;
+use super::timing::time_to;
 use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
 use jointplay_physics::integrate::Method;
 use jointplay_physics::machine::Preset;

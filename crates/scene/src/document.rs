@@ -1,11 +1,11 @@
 //! TOML with positions: every value knows its key, line and column, so that every error can name them.
 
-use super::beside::Beside;
-use super::copy::Copy as PatternCopy;
+use super::assets::AssetResolver;
 use super::error::place_of;
 use super::given::{FileNumber, Place};
-use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
+use super::key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, MAX_SI, ValueType, Variants};
 use super::parameters::{Kind, ValueFault};
+use super::pattern_instance::PatternInstance;
 use super::reading::Reading;
 use super::visible::visible_line;
 use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
@@ -26,11 +26,11 @@ pub(super) struct Document<'d> {
     /// Whether another file includes it.
     pub included: bool,
     /// The copy of a pattern that the values belong to.
-    pub copy: Option<&'d PatternCopy>,
+    pub copy: Option<&'d PatternInstance>,
     /// Whether the values belong to a hinge, where some have other dimensions.
     pub on_hinge: bool,
     /// Files that it names.
-    pub beside: &'d Beside<'d>,
+    pub beside: &'d AssetResolver<'d>,
 }
 
 /// A table with the path of its keys.
@@ -112,7 +112,7 @@ impl<'d> Section<'d> {
         let mut section = Self { document, path, table, span, rows, word: None };
         // First of all: a word may decide which other keys there are.
         for key in rows.keys {
-            if let (Takes::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
+            if let (ValueType::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
                 let word = node.choice()?;
                 if matches!(rows.variants, Some(Variants::Word(by, _)) if by == key.name) {
                     section.word = Some(word);
@@ -185,7 +185,7 @@ impl<'d> Section<'d> {
     /// What the row of a key gives where it is left out, if that is a number.
     fn default(&self, name: &str) -> Option<f64> {
         match self.rows.key(name, self.word)?.absent {
-            Absent::Is(number) => Some(number),
+            DefaultRule::Is(number) => Some(number),
             _ => None,
         }
     }
@@ -312,7 +312,7 @@ impl<'d> Node<'d> {
         match &self.written {
             _ if self.document.included => Place::Included,
             Some(written) => here(written.clone()),
-            None => Place::Absent,
+            None => Place::DefaultRule,
         }
     }
 
@@ -387,7 +387,7 @@ impl<'d> Node<'d> {
     /// A whole number as its row says.
     pub fn whole(&self) -> Result<u32, SceneError> {
         let (least, most) = match self.row.takes {
-            Takes::Whole(least, most) => (least, most),
+            ValueType::Whole(least, most) => (least, most),
             _ => (0, u32::MAX),
         };
         match self.scalar()?.parse() {
@@ -399,7 +399,7 @@ impl<'d> Node<'d> {
     /// One of the words of its row.
     pub fn choice(&self) -> Result<&'static str, SceneError> {
         let words = match self.row.takes {
-            Takes::Word(words) | Takes::Words(words, _) => words,
+            ValueType::Word(words) | ValueType::Words(words, _) => words,
             _ => &[],
         };
         let text = self.text()?;
@@ -450,7 +450,7 @@ impl<'d> Node<'d> {
     /// The entries of a list, as many as its row allows. As [`Self::elements`].
     pub fn entries(&self) -> Result<Vec<Node<'d>>, SceneError> {
         let elements = self.elements()?;
-        let Some(Many { most, what }) = self.row.many() else {
+        let Some(ListLimit { most, what }) = self.row.many() else {
             return Ok(elements);
         };
         match elements.get(most) {
@@ -564,7 +564,7 @@ impl<'d> Node<'d> {
     /// A parameter's value, read and checked against its row of the table.
     pub fn parameter(&self) -> Result<super::Value, SceneError> {
         let parameter = match self.row.takes {
-            Takes::Parameter(key) => find(key),
+            ValueType::Parameter(key) => find(key),
             _ => None,
         };
         let parameter = parameter.expect("a row of a parameter");
@@ -606,7 +606,7 @@ pub(super) fn lists<'d>(files: &[Section<'d>], name: &str, more: Vec<Node<'d>>) 
         }
     }
     nodes.extend(more);
-    let Some(Many { most, what }) = nodes.first().and_then(|node| node.row.many()) else {
+    let Some(ListLimit { most, what }) = nodes.first().and_then(|node| node.row.many()) else {
         return Ok(nodes);
     };
     match nodes.get(most) {

@@ -2,7 +2,7 @@
 
 use super::document::{Node, Section};
 use super::formula::read_formula;
-use super::key::{FileKey, FileTable, MAX_SI, Takes, Variants, key, many, number, positive};
+use super::key::{FileKey, FileTable, MAX_SI, ValueType, Variants, key, many, number, positive};
 use super::points::{Graph, MOST_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
 use std::sync::LazyLock;
@@ -32,7 +32,7 @@ static TERMS: FileTable = FileTable::new("term", "a term", "a harmonic of a sum"
 const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it begins").zero();
 
 const DURATION: FileKey =
-    key("duration", Takes::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
+    key("duration", ValueType::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
 
 /// A law of driven joints in a scene file.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         help: "slider of the paper's machine; places the joint itself",
         keys: &[key(
             "slider",
-            Takes::Whole(1, 3),
+            ValueType::Whole(1, 3),
             "1",
             "which slider: 1, 2 or 3",
         )],
@@ -83,7 +83,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
             MEAN,
             key(
                 "terms",
-                Takes::List(&TERMS, many(MOST_TERMS, "terms")),
+                ValueType::List(&TERMS, many(MOST_TERMS, "terms")),
                 "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]",
                 "the harmonics",
             )
@@ -120,7 +120,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         keys: &[
             key(
                 "points",
-                Takes::Pairs(
+                ValueType::Pairs(
                     [Dimension::Time, Dimension::Length],
                     many(MOST_POINTS, "points"),
                 ),
@@ -134,14 +134,14 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
             .or("file"),
             key(
                 "file",
-                Takes::File,
+                ValueType::File,
                 "\"bump.csv\"",
                 "the points: two columns under a header with units, `time_s,position_mm`",
             )
             .or("points"),
             key(
                 "repeat",
-                Takes::Flag,
+                ValueType::Flag,
                 "true",
                 "whether the points are one period of the motion",
             )
@@ -154,14 +154,14 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         keys: &[
             key(
                 "formula",
-                Takes::Text,
+                ValueType::Text,
                 "\"0.01 * sin(2*pi*t)\"",
                 "an expression of `t`",
             ),
-            key("unit", Takes::Text, "\"mm\"", "unit of its value").absent("`m`, `rad` on a hinge"),
+            key("unit", ValueType::Text, "\"mm\"", "unit of its value").absent("`m`, `rad` on a hinge"),
             key(
                 "resolve",
-                Takes::Number(Dimension::Time, (SHORTEST_PART, 1.0)),
+                ValueType::Number(Dimension::Time, (SHORTEST_PART, 1.0)),
                 "\"1 ms\"",
                 "longest step that an adaptive method takes; a fifth of what the formula does in the shortest time suits it",
             )
@@ -173,7 +173,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
 /// Laws of drives: the rows of each, with its word.
 pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     let words: &[&str] = DRIVE_LAWS.each_ref().map(|kind| kind.word).to_vec().leak();
-    let law = key("law", Takes::Word(words), "\"constant\"", "which motion");
+    let law = key("law", ValueType::Word(words), "\"constant\"", "which motion");
     let of_kind = |(place, kind): (usize, &'static DriveLaw)| {
         let keys = kind.keys.iter();
         keys.map(move |key| key.of(&words[place..=place]))

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use super::copy::Copy;
 use super::document::{Node, Section};
 use super::drives::{DRIVE, FASTEST_DRIVE, read_drive};
-use super::key::{FileKey, FileTable, MAX_SI, Takes, key, many, number};
+use super::key::{FileKey, FileTable, MAX_SI, ValueType, key, many, number};
+use super::pattern_instance::PatternInstance;
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
 use super::points::{Axis, Graph, MOST_POINTS, read_file, read_points};
 use super::read_joints::read_coordinate;
@@ -41,32 +41,32 @@ pub fn is_element(table: &FileTable) -> bool {
 
 pub(super) type ReadKind = fn(&Place<'_, '_>) -> Result<ElementKind, SceneError>;
 
-const NAME: FileKey = key("name", Takes::Name, "\"s1\"", "its name, that of no joint");
+const NAME: FileKey = key("name", ValueType::Name, "\"s1\"", "its name, that of no joint");
 
 const COORDINATE: FileKey = key(
     "coordinate",
-    Takes::Word(&["position", "angle", "child_angle"]),
+    ValueType::Word(&["position", "angle", "child_angle"]),
     "\"angle\"",
     "which coordinate of a joint that has two: `position` or `angle` of a cylindrical one, `angle` or `child_angle` of a universal one",
 )
 .absent("the only one");
 
 const fn joint(help: &'static str) -> FileKey {
-    key("joint", Takes::Joint, "\"crank\"", help)
+    key("joint", ValueType::Joint, "\"crank\"", help)
 }
 
 const fn point(name: &'static str) -> FileKey {
-    key(name, Takes::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "where it holds")
+    key(name, ValueType::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "where it holds")
 }
 
 /// A number of either sign, such as a force, no larger than any element exerts.
 const fn signed(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
-    key(name, Takes::Number(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), like, help)
+    key(name, ValueType::Number(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), like, help)
 }
 
 /// The same, not below 0.
 const fn unsigned(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
-    key(name, Takes::Number(dimension, (0.0, LARGEST_FORCE)), like, help)
+    key(name, ValueType::Number(dimension, (0.0, LARGEST_FORCE)), like, help)
 }
 
 /// Stiffness and damping of an element on a joint.
@@ -85,36 +85,36 @@ const fn coordinate(name: &'static str, like: [&'static str; 2], help: &'static 
 
 /// Stiffnesses or dampings along or about three axes.
 const fn diagonal(name: &'static str, dimension: D, help: &'static str) -> FileKey {
-    key(name, Takes::Vector(dimension, (0.0, LARGEST_FORCE)), "", help)
+    key(name, ValueType::Vector(dimension, (0.0, LARGEST_FORCE)), "", help)
         .zero()
         .frame("its axes: `axes` in the body of `from`")
 }
 
 const fn vector(name: &'static str, dimension: D, help: &'static str) -> FileKey {
-    key(name, Takes::Vector(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), "", help)
+    key(name, ValueType::Vector(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), "", help)
         .zero()
         .frame("the world's, or the body's with `axes = \"body\"`")
 }
 
 const fn rotation(name: &'static str, help: &'static str) -> FileKey {
-    key(name, Takes::Table(&ROTATION), "{ axis = [0, 1, 0], angle = \"15 deg\" }", help).zero()
+    key(name, ValueType::Table(&ROTATION), "{ axis = [0, 1, 0], angle = \"15 deg\" }", help).zero()
 }
 
 fn law(name: &'static str, help: &'static str) -> FileKey {
-    key(name, Takes::Table(&DRIVE), "{ law = \"constant\", velocity = \"10 mm/s\" }", help).absent("none")
+    key(name, ValueType::Table(&DRIVE), "{ law = \"constant\", velocity = \"10 mm/s\" }", help).absent("none")
 }
 
 const CURVE_LIKE: &str = "[[\"-10 mm\", \"-50 N\"], [0, 0], [\"10 mm\", \"80 N\"]]";
 
 /// Points of a curve in place of `stiffness` and `preload`.
 const fn curve(help: &'static str) -> FileKey {
-    let pairs = Takes::Pairs([D::Length, D::Force], many(MOST_POINTS, "points"));
+    let pairs = ValueType::Pairs([D::Length, D::Force], many(MOST_POINTS, "points"));
     key("characteristic", pairs, CURVE_LIKE, help).absent(WITHOUT_CURVE)
 }
 
 const CURVE_FILE: FileKey = key(
     "file",
-    Takes::File,
+    ValueType::File,
     "\"coil.csv\"",
     "instead of the points: a CSV file beside the scene, two columns under a header with units",
 )
@@ -131,7 +131,7 @@ static SPRING: FileTable = FileTable::new(
         point("to"),
         key(
             "length",
-            Takes::Number(D::Length, (0.0, 1e6)),
+            ValueType::Number(D::Length, (0.0, 1e6)),
             "\"100 mm\"",
             "distance of the points at which the spring carries `preload`",
         ),
@@ -145,7 +145,7 @@ static SPRING: FileTable = FileTable::new(
         CURVE_FILE,
         key(
             "side",
-            Takes::Word(SpringSide::WORDS),
+            ValueType::Word(SpringSide::WORDS),
             "",
             "which way it acts: a tyre and a rubber buffer only push, a rope only pulls",
         )
@@ -160,13 +160,14 @@ static LOAD: FileTable = FileTable::new(
     &[
         NAME,
         point("on"),
-        key("frequency", Takes::Number(D::Frequency, (0.0, FASTEST_DRIVE)), "\"2 Hz\"", "0 for a constant load").zero(),
+        key("frequency", ValueType::Number(D::Frequency, (0.0, FASTEST_DRIVE)), "\"2 Hz\"", "0 for a constant load")
+            .zero(),
         key("phase", number(D::Angle), "\"90 deg\"", "phase at t = 0; not used where the load is constant").zero(),
         vector("force", D::Force, "force at the point"),
         vector("torque", D::Torque, "torque"),
         key(
             "axes",
-            Takes::Word(LoadAxes::WORDS),
+            ValueType::Word(LoadAxes::WORDS),
             "",
             "whether force and torque keep to the world's axes or turn with the body",
         )
@@ -223,18 +224,18 @@ static STOP: FileTable = FileTable::new(
             "what a stop bears when it is pressed in slowly by `depth`, on a hinge",
         )
         .or("force"),
-        key("depth", Takes::Number(D::Length, (1e-9, 1e3)), "\"1 mm\"", "depth at which it bears that")
+        key("depth", ValueType::Number(D::Length, (1e-9, 1e3)), "\"1 mm\"", "depth at which it bears that")
             .on_hinge(D::Angle, "\"1 deg\""),
         key(
             "restitution",
-            Takes::Number(D::None, (0.01, 1.0)),
+            ValueType::Number(D::None, (0.01, 1.0)),
             "0.5",
             "speed after over speed before an impact at `speed`",
         )
         .is(1.0),
         key(
             "speed",
-            Takes::Number(D::Speed, (0.0, 1e6)),
+            ValueType::Number(D::Speed, (0.0, 1e6)),
             "\"0.1 m/s\"",
             "approach speed at which it rebounds with `restitution`; needed where that is below 1",
         )
@@ -292,13 +293,13 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
             point("on"),
             key(
                 "radius",
-                Takes::Number(D::Length, (1e-6, 1e3)),
+                ValueType::Number(D::Length, (1e-6, 1e3)),
                 "\"300 mm\"",
                 "height of the point `on`, the wheel's centre, over the ground at which it begins to push",
             ),
             unsigned("stiffness", D::Stiffness, "\"200 kN/m\"", "change of its force with the height"),
             unsigned("damping", D::Damping, "\"200 N s/m\"", "change of its force with the rate of the height").zero(),
-            key("up", Takes::Direction, "[0, 0, 1]", "which way is up").absent("against the file's gravity"),
+            key("up", ValueType::Direction, "[0, 0, 1]", "which way is up").absent("against the file's gravity"),
             law("ground", "height of the ground, along `up` from the world's origin; at rest there if left out"),
         ]
         .leak(),
@@ -348,7 +349,7 @@ impl Place<'_, '_> {
     }
 
     /// The pattern's copy that is read, unless its element holds first (`place` 0) or second (1) at a body of that copy.
-    fn copy_outside(&self, place: usize) -> Option<&Copy> {
+    fn copy_outside(&self, place: usize) -> Option<&PatternInstance> {
         let copy = self.section.document.copy?;
         let body = self.points.get(place).and_then(|point| point.body);
         let own = body.is_some_and(|body| copy.made(&self.scene.machine.bodies[body].name));

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use super::drives::DRIVE;
 use super::elements::ELEMENTS;
-use super::key::{FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector};
+use super::key::{FileKey, FileTable, ListLimit, ValueType, Variants, key, many, number, positive, vector};
 use super::placement::{ATTACHMENT, ROTATION};
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
@@ -37,7 +37,7 @@ fn joined(rows: &[&[FileKey]]) -> &'static [FileKey] {
 /// The row of a parameter, as the key `name`.
 fn of_parameter(name: &'static str, parameter: &'static str) -> FileKey {
     let help = find(parameter).map_or("", |parameter| parameter.help);
-    key(name, Takes::Parameter(parameter), "", help).absent("as parameters")
+    key(name, ValueType::Parameter(parameter), "", help).absent("as parameters")
 }
 
 /// Rows of the parameters in `section`.
@@ -59,36 +59,36 @@ fn contact_keys() -> Vec<FileKey> {
 /// The whole file.
 pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     let names = [
-        key("name", Takes::Name, "\"press\"", "short name, for outputs").absent("the file's").fixed(),
-        key("title", Takes::Text, "\"A press\"", "a line, for lists").absent("`name`").fixed(),
-        key("description", Takes::Text, "\"It jumps.\"", "a paragraph").absent("none").fixed(),
+        key("name", ValueType::Name, "\"press\"", "short name, for outputs").absent("the file's").fixed(),
+        key("title", ValueType::Text, "\"A press\"", "a line, for lists").absent("`name`").fixed(),
+        key("description", ValueType::Text, "\"It jumps.\"", "a paragraph").absent("none").fixed(),
         of_parameter("start", "start"),
         of_parameter("formulation", "formulation"),
     ];
     let sections = [
-        key("gravity", Takes::Table(&GRAVITY), "{ z = \"-9.81 m/s^2\" }", GRAVITY.help),
-        key("contact", Takes::Table(&CONTACT), "{ clearance = \"0.2 mm\" }", CONTACT.help),
-        key("solver", Takes::Table(&SOLVER), "{ method = \"automatic\" }", SOLVER.help),
-        key("view", Takes::Table(&VIEW), "{ down = \"-z\" }", VIEW.help),
-        key("output", Takes::Table(&OUTPUT), "{ body = \"rod\" }", OUTPUT.help),
+        key("gravity", ValueType::Table(&GRAVITY), "{ z = \"-9.81 m/s^2\" }", GRAVITY.help),
+        key("contact", ValueType::Table(&CONTACT), "{ clearance = \"0.2 mm\" }", CONTACT.help),
+        key("solver", ValueType::Table(&SOLVER), "{ method = \"automatic\" }", SOLVER.help),
+        key("view", ValueType::Table(&VIEW), "{ down = \"-z\" }", VIEW.help),
+        key("output", ValueType::Table(&OUTPUT), "{ body = \"rod\" }", OUTPUT.help),
     ]
     .map(|key| key.absent("the defaults"));
     let others = [
         key(
             "spcmm",
-            Takes::Table(&SPCMM),
+            ValueType::Table(&SPCMM),
             "{ mean_x = \"203 mm\", gamma = \"15 deg\", hinge_radius = \"52 mm\", driving_rod = \"28 mm\", driven_rod = \"200 mm\" }",
             SPCMM.help,
         ),
         key(
             "chain",
-            Takes::Table(&CHAIN),
+            ValueType::Table(&CHAIN),
             "{ link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }",
             CHAIN.help,
         ),
         key(
             "include",
-            Takes::Files(many(MOST_FILES, "files")),
+            ValueType::Files(many(MOST_FILES, "files")),
             "[\"leg.toml\"]",
             "files beside this one, whose lists belong to the scene, too",
         ),
@@ -147,12 +147,12 @@ fn parts() -> Vec<FileKey> {
 }
 
 /// A list of tables, each like the one in `like` if that is not empty, under the name of the table.
-fn list_of(table: &'static FileTable, many: Many, like: &'static str) -> FileKey {
+fn list_of(table: &'static FileTable, many: ListLimit, like: &'static str) -> FileKey {
     let like = match like {
         "" => "",
         like => format!("[{like}]").leak(),
     };
-    key(table.name, Takes::List(table, many), like, table.help).absent("none")
+    key(table.name, ValueType::List(table, many), like, table.help).absent("none")
 }
 
 static GRAVITY: LazyLock<FileTable> = LazyLock::new(|| {
@@ -179,7 +179,7 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
             .absent("the usual one"),
         key(
             "time_scale",
-            Takes::Number(D::None, SLOWEST_TO_REAL),
+            ValueType::Number(D::None, SLOWEST_TO_REAL),
             "0.05",
             "simulated seconds per second that a window begins with",
         )
@@ -187,7 +187,7 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
         .fixed(),
         key(
             "plots",
-            Takes::Words(&PLOT_WORDS, many(MOST_PLOTS, "plots")),
+            ValueType::Words(&PLOT_WORDS, many(MOST_PLOTS, "plots")),
             "[\"normal-force\", \"acceleration\"]",
             "plots that a window begins with",
         )
@@ -203,7 +203,7 @@ static OUTPUT: FileTable = FileTable::new(
     "[output]",
     "what is reported",
     &[
-        key("body", Takes::Body, "\"rod\"", "whose pose is reported").absent("the last one").fixed(),
+        key("body", ValueType::Body, "\"rod\"", "whose pose is reported").absent("the last one").fixed(),
         key("probe", vector(D::Length), "\"60 0 0 mm\"", "a point of that body, reported as well")
             .absent("none")
             .frame("the body's"),
@@ -237,7 +237,7 @@ static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
             .frame(WORLD),
         key(
             "rotation",
-            Takes::Table(&ROTATION),
+            ValueType::Table(&ROTATION),
             "{ axis = [0, 1, 0], angle = \"-30 deg\" }",
             "orientation of every link at the start",
         )
@@ -245,13 +245,13 @@ static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
         .frame(WORLD),
         key(
             "link",
-            Takes::Table(&LINK),
+            ValueType::Table(&LINK),
             "{ mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" }",
             "what each of them is",
         ),
         key(
             "joint",
-            Takes::List(&CHAIN_JOINT, many(MOST_BALL_JOINTS, "ball joints")),
+            ValueType::List(&CHAIN_JOINT, many(MOST_BALL_JOINTS, "ball joints")),
             "[{ name = \"J1\", clearance = \"0.1 mm\" }]",
             "joints with contact parameters of their own",
         )
@@ -278,7 +278,7 @@ static LINK: LazyLock<FileTable> = LazyLock::new(|| {
 });
 
 static CHAIN_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
-    let name = [key("name", Takes::Joint, "\"J1\"", "which one: `J1`, `J2`, …, from the top")];
+    let name = [key("name", ValueType::Joint, "\"J1\"", "which one: `J1`, `J2`, …, from the top")];
     FileTable::new(
         "chain_joint",
         "[[chain.joint]]",
@@ -290,11 +290,11 @@ static CHAIN_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
 
 fn opening() -> FileKey {
     let help = "side on which the socket is drawn open; no effect on the motion";
-    key("opening", Takes::Direction, "[0, 0, 1]", help).absent("`view.down`")
+    key("opening", ValueType::Direction, "[0, 0, 1]", help).absent("`view.down`")
 }
 
 static BODY: LazyLock<FileTable> = LazyLock::new(|| {
-    let name = [key("name", Takes::Name, "\"rod\"", "its name, not `world`")];
+    let name = [key("name", ValueType::Name, "\"rod\"", "its name, not `world`")];
     FileTable::new("body", "[[body]]", "a rigid body", joined(&[&name, &mass()]))
 });
 
@@ -323,7 +323,7 @@ fn mass() -> [FileKey; 6] {
         .frame("the body's"),
         key(
             "shapes",
-            Takes::List(&SHAPE, many(MOST_SHAPES, "shapes")),
+            ValueType::List(&SHAPE, many(MOST_SHAPES, "shapes")),
             "[{ form = \"sphere\", role = \"pin\", centre = \"0 0 0 mm\", radius = \"4 mm\" }]",
             "what it looks like",
         )
@@ -342,7 +342,7 @@ fn mass() -> [FileKey; 6] {
 static SHAPE: LazyLock<FileTable> = LazyLock::new(|| of_shape("shape", "a shape", &[]));
 
 static FIXED_SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
-    let own = [key("at_slider_plane", Takes::Flag, "true", "whether it is moved along X by `spcmm.slider_plane`")
+    let own = [key("at_slider_plane", ValueType::Flag, "true", "whether it is moved along X by `spcmm.slider_plane`")
         .absent("false")];
     of_shape("fixed_shape", "[[fixed_shape]]", &own).also(&SHAPE)
 });
@@ -359,10 +359,10 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         key(name, takes, "\"4 mm\"", help).of(of)
     };
     let own = [
-        key("form", Takes::Word(Form::WORDS), "\"capsule\"", "what form it has"),
-        key("role", Takes::Word(Role::WORDS), "\"frame\"", "what it is part of, which decides its colour")
+        key("form", ValueType::Word(Form::WORDS), "\"capsule\"", "what form it has"),
+        key("role", ValueType::Word(Role::WORDS), "\"frame\"", "what it is part of, which decides its colour")
             .absent("that of what its body does"),
-        key("colour", Takes::Text, "\"#c2255c\"", "red, green and blue in place of the role's colour")
+        key("colour", ValueType::Text, "\"#c2255c\"", "red, green and blue in place of the role's colour")
             .absent("the role's"),
         point("from", LONG, "one end of the axis; of a cone, its base"),
         point("to", LONG, "the other end; of a cone, its tip"),
@@ -371,14 +371,14 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         key("size", vector(D::Length), "\"10 20 30 mm\"", "edge lengths along x, y and z").of(&["box"]),
         key(
             "corners",
-            Takes::Vectors(D::Length, many(MOST_CORNERS, "corners")),
+            ValueType::Vectors(D::Length, many(MOST_CORNERS, "corners")),
             "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]",
             "corners of a polygon in one plane, in its order",
         )
         .of(&["plate"])
         .frame(BODY_FRAME),
         length("thickness", &["plate"], "half to each side of the corners"),
-        key("file", Takes::File, "\"arm.stl\"", "its triangles: STL, OBJ or glTF, beside the scene").of(&["mesh"]),
+        key("file", ValueType::File, "\"arm.stl\"", "its triangles: STL, OBJ or glTF, beside the scene").of(&["mesh"]),
         key(
             "unit",
             positive(D::Length, LARGEST),
@@ -390,7 +390,7 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         point("position", &["mesh"], "where the file's frame lies").zero(),
         key(
             "rotation",
-            Takes::Table(&ROTATION),
+            ValueType::Table(&ROTATION),
             "{ axis = [1, 0, 0], angle = \"90 deg\" }",
             "orientation of the file's frame",
         )
@@ -413,32 +413,32 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     let keys = [
         key(
             "name",
-            Takes::Name,
+            ValueType::Name,
             "\"P1\"",
             "its name, not that of a force element",
         ),
         key(
             "kind",
-            Takes::Word(JointKind::WORDS),
+            ValueType::Word(JointKind::WORDS),
             "\"revolute\"",
             "how it moves: not, along `axis`, about it, both, about two axes, or in every way",
         ),
         key(
             "parent",
-            Takes::Body,
+            ValueType::Body,
             "\"world\"",
             "the body that carries it",
         )
         .absent("the world"),
         key(
             "child",
-            Takes::Body,
+            ValueType::Body,
             "\"rod\"",
             "the body that hangs on it: each hangs on exactly one joint",
         ),
         key(
             "axis",
-            Takes::Direction,
+            ValueType::Direction,
             "[0, 0, 1]",
             "along which it slides or about which it turns, by the right-hand rule",
         )
@@ -447,7 +447,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .frame(PARENT),
         key(
             "child_axis",
-            Takes::Direction,
+            ValueType::Direction,
             "[0, 1, 0]",
             "its second axis, perpendicular to `axis` where both angles are 0",
         )
@@ -472,7 +472,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .frame("the child's"),
         key(
             "rotation",
-            Takes::Table(&ROTATION),
+            ValueType::Table(&ROTATION),
             "{ axis = [0, 1, 0], angle = \"90 deg\" }",
             "orientation of the child where the joint's coordinate is 0",
         )
@@ -481,7 +481,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .frame(PARENT),
         key(
             "drive",
-            Takes::Table(&DRIVE),
+            ValueType::Table(&DRIVE),
             "{ law = \"harmonic\", amplitude = \"10 mm\", frequency = \"1 Hz\" }",
             "the motion that it is forced to make",
         )
@@ -489,7 +489,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .absent("it is free to move"),
         key(
             "drive",
-            Takes::Table(&CYLINDRICAL_DRIVE),
+            ValueType::Table(&CYLINDRICAL_DRIVE),
             "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
             "the motions that it is forced to make",
         )
@@ -497,7 +497,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .absent("it is free to move"),
         key(
             "drive",
-            Takes::Table(&UNIVERSAL_DRIVE),
+            ValueType::Table(&UNIVERSAL_DRIVE),
             "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
             "the motions that it is forced to make",
         )
@@ -505,7 +505,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .absent("it is free to move"),
         key(
             "start",
-            Takes::Table(&START),
+            ValueType::Table(&START),
             "{ position = \"10 mm\" }",
             "where it starts, and how fast; not with a drive",
         )
@@ -514,14 +514,14 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .on_hinge(D::Angle, "{ position = \"10 deg\" }"),
         key(
             "start",
-            Takes::Table(&FREE_START),
+            ValueType::Table(&FREE_START),
             "{ position = \"0 0 100 mm\" }",
             "where the child starts, and how it moves",
         )
         .of(&["free"]),
         key(
             "start",
-            Takes::Table(&CYLINDRICAL_START),
+            ValueType::Table(&CYLINDRICAL_START),
             "{ position = \"10 mm\", angle = \"30 deg\" }",
             "where it starts, and how fast; not what a drive moves",
         )
@@ -529,7 +529,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .absent("0, at rest"),
         key(
             "start",
-            Takes::Table(&UNIVERSAL_START),
+            ValueType::Table(&UNIVERSAL_START),
             "{ angle = \"10 deg\", child_angle = \"30 deg\" }",
             "where it starts, and how fast; not what a drive moves",
         )
@@ -537,7 +537,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .absent("0, at rest"),
         key(
             "drawn",
-            Takes::Flag,
+            ValueType::Flag,
             "false",
             "whether a pin, a rail or a cross is drawn for it, where the scene's shapes show none",
         )
@@ -545,7 +545,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .absent("true"),
         key(
             "closes_loop",
-            Takes::Flag,
+            ValueType::Flag,
             "true",
             "whether its child hangs on another joint, so that this one closes a loop; it then has neither `drive` nor `start`",
         )
@@ -579,7 +579,7 @@ static CYLINDRICAL_START: FileTable = FileTable::new(
 
 /// A motion of one of two coordinates.
 fn motion(freedom: Freedom, like: &'static str, help: &'static str) -> FileKey {
-    key(freedom.word(), Takes::Table(&DRIVE), like, help).absent("it is free to move")
+    key(freedom.word(), ValueType::Table(&DRIVE), like, help).absent("it is free to move")
 }
 
 const TURNING: &str = "{ law = \"constant\", velocity = \"6 rad/s\" }";
@@ -631,7 +631,7 @@ static FREE_START: FileTable = FileTable::new(
         key("position", vector(D::Length), "\"0 0 100 mm\"", "where `child_point` is").frame(WORLD),
         key(
             "rotation",
-            Takes::Table(&ROTATION),
+            ValueType::Table(&ROTATION),
             "{ axis = [0, 1, 0], angle = \"15 deg\" }",
             "orientation of the child",
         )
@@ -647,10 +647,10 @@ static FREE_START: FileTable = FileTable::new(
 static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     let end = |name, help| {
         let like = "{ body = \"rod\", at = \"0 0 100 mm\" }";
-        key(name, Takes::Table(&ATTACHMENT), like, help)
+        key(name, ValueType::Table(&ATTACHMENT), like, help)
     };
     let own = [
-        key("name", Takes::Name, "\"S1\"", "its name, that of no other joint"),
+        key("name", ValueType::Name, "\"S1\"", "its name, that of no other joint"),
         end("socket", "the socket's centre"),
         end("ball", "the ball's centre, on another body"),
         opening().frame("that of the socket's body"),
@@ -669,23 +669,23 @@ static PARAMETER: FileTable = FileTable::new(
     "[[parameter]]",
     "a parameter of the scene's own, for expressions, sliders and `--set`",
     &[
-        key("name", Takes::Name, "\"stroke\"", "its name in expressions: letters, digits and `_`"),
-        key("value", Takes::Quantity, "\"20 mm\"", "its value"),
-        key("label", Takes::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
-        key("unit", Takes::Text, "\"mm\"", "unit in which it is shown")
+        key("name", ValueType::Name, "\"stroke\"", "its name in expressions: letters, digits and `_`"),
+        key("value", ValueType::Quantity, "\"20 mm\"", "its value"),
+        key("label", ValueType::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
+        key("unit", ValueType::Text, "\"mm\"", "unit in which it is shown")
             .absent("that of `value`; must be given where that is an expression"),
-        key("range", Takes::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
-        key("help", Takes::Text, "\"How far it goes.\"", "what it is").absent("none"),
+        key("range", ValueType::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
+        key("help", ValueType::Text, "\"How far it goes.\"", "what it is").absent("none"),
     ],
 );
 
 static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
-        key("name", Takes::Name, "\"leg\"", "its name"),
-        key("count", Takes::Whole(1, MOST_BODIES as u32), "6", "number of copies"),
+        key("name", ValueType::Name, "\"leg\"", "its name"),
+        key("count", ValueType::Whole(1, MOST_BODIES as u32), "6", "number of copies"),
         key(
             "about",
-            Takes::Table(&ABOUT),
+            ValueType::Table(&ABOUT),
             "{ axis = [0, 0, 1] }",
             "the axis about which each copy is turned from the one before",
         )
@@ -704,7 +704,7 @@ static ABOUT: FileTable = FileTable::new(
     "about which copies are turned",
     &[
         key("point", vector(D::Length), "\"0 0 100 mm\"", "a point on it").zero().frame(WORLD),
-        key("axis", Takes::Direction, "[0, 0, 1]", "its direction").frame(WORLD),
+        key("axis", ValueType::Direction, "[0, 0, 1]", "its direction").frame(WORLD),
         key("angle", number(D::Angle), "\"60 deg\"", "from copy to copy").absent("a turn over `count`"),
     ],
 );

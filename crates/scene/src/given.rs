@@ -26,7 +26,7 @@ pub(super) enum Place {
     /// In a file that the scene includes.
     Included,
     /// Nowhere: it has a default, and was changed.
-    Absent,
+    DefaultRule,
 }
 
 impl FileNumber {
@@ -38,7 +38,7 @@ impl FileNumber {
 
 /// A parameter that a scene file defines.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OwnParameter {
+pub struct UserParameter {
     /// `parameter.<name>`.
     pub key: String,
     /// Name for the interface.

@@ -45,13 +45,13 @@ pub struct FileKey {
     /// As the file writes it.
     pub name: &'static str,
     /// Its value.
-    pub takes: Takes,
+    pub takes: ValueType,
     /// An example, as a file writes it; "" for a parameter of the table of parameters.
     pub like: &'static str,
     /// Dimension and example where it belongs to a hinge, if they are others there.
     pub on_hinge: Option<(Dimension, &'static str)>,
     /// What holds where it is left out.
-    pub absent: Absent,
+    pub absent: DefaultRule,
     /// In whose frame its value is; "" where it has none.
     pub frame: &'static str,
     /// What it is, in a line.
@@ -64,7 +64,7 @@ pub struct FileKey {
 
 /// Values that a key takes.
 #[derive(Clone, Copy, Debug)]
-pub enum Takes {
+pub enum ValueType {
     /// A quantity or an expression: dimension, and closed range, SI.
     Number(Dimension, (f64, f64)),
     /// Three of them.
@@ -94,24 +94,24 @@ pub enum Takes {
     /// One of some words.
     Word(&'static [&'static str]),
     /// A list of them.
-    Words(&'static [&'static str], Many),
+    Words(&'static [&'static str], ListLimit),
     /// The value of a row of the table of parameters, by its key there.
     Parameter(&'static str),
     /// A table.
     Table(&'static FileTable),
     /// A list of tables.
-    List(&'static FileTable, Many),
+    List(&'static FileTable, ListLimit),
     /// A list of vectors.
-    Vectors(Dimension, Many),
+    Vectors(Dimension, ListLimit),
     /// A list of pairs of quantities.
-    Pairs([Dimension; 2], Many),
+    Pairs([Dimension; 2], ListLimit),
     /// A list of names of files beside the scene.
-    Files(Many),
+    Files(ListLimit),
 }
 
 /// How many entries a list may have, and what they are called.
 #[derive(Clone, Copy, Debug)]
-pub struct Many {
+pub struct ListLimit {
     /// Most of them.
     pub most: usize,
     /// What they are called.
@@ -119,13 +119,13 @@ pub struct Many {
 }
 
 /// At most `most` entries, called `what`.
-pub(super) const fn many(most: usize, what: &'static str) -> Many {
-    Many { most, what }
+pub(super) const fn many(most: usize, what: &'static str) -> ListLimit {
+    ListLimit { most, what }
 }
 
 /// What holds where a key is left out.
 #[derive(Clone, Copy, Debug)]
-pub enum Absent {
+pub enum DefaultRule {
     /// It must be given.
     Fault,
     /// It must be given, unless this other key is.
@@ -177,7 +177,7 @@ impl FileTable {
             None => &[],
             Some(Variants::Presence(words)) => words,
             Some(Variants::Word(by, _)) => match self.key(by, None).map(|key| key.takes) {
-                Some(Takes::Word(words)) => words,
+                Some(ValueType::Word(words)) => words,
                 _ => &[],
             },
         }
@@ -185,20 +185,20 @@ impl FileTable {
 }
 
 /// A key that must be given.
-pub(super) const fn key(name: &'static str, takes: Takes, like: &'static str, help: &'static str) -> FileKey {
-    FileKey { name, takes, like, on_hinge: None, absent: Absent::Fault, frame: "", help, of: &[], fixed: false }
+pub(super) const fn key(name: &'static str, takes: ValueType, like: &'static str, help: &'static str) -> FileKey {
+    FileKey { name, takes, like, on_hinge: None, absent: DefaultRule::Fault, frame: "", help, of: &[], fixed: false }
 }
 
 impl FileKey {
     /// One that may be left out; `words` say what holds then.
     pub(super) const fn absent(mut self, words: &'static str) -> Self {
-        self.absent = Absent::Means(words);
+        self.absent = DefaultRule::Means(words);
         self
     }
 
     /// One that is `value`, SI, where it is left out.
     pub(super) const fn is(mut self, value: f64) -> Self {
-        self.absent = Absent::Is(value);
+        self.absent = DefaultRule::Is(value);
         self
     }
 
@@ -209,7 +209,7 @@ impl FileKey {
 
     /// One that may be left out where `other` is given.
     pub(super) const fn or(mut self, other: &'static str) -> Self {
-        self.absent = Absent::Or(other);
+        self.absent = DefaultRule::Or(other);
         self
     }
 
@@ -245,7 +245,7 @@ impl FileKey {
     /// The table that it takes, or those of which it takes a list.
     pub fn table(&self) -> Option<&'static FileTable> {
         match self.takes {
-            Takes::Table(table) | Takes::List(table, _) => Some(table),
+            ValueType::Table(table) | ValueType::List(table, _) => Some(table),
             _ => None,
         }
     }
@@ -259,11 +259,11 @@ impl FileKey {
     /// Dimension of its numbers, where they have one; of pairs, that of the second. `hinge`: whether it belongs to one.
     pub fn dimension(&self, hinge: bool) -> Option<Dimension> {
         let dimension = match self.takes {
-            Takes::Number(dimension, _)
-            | Takes::Vector(dimension, _)
-            | Takes::Numbers(_, dimension)
-            | Takes::Vectors(dimension, _)
-            | Takes::Pairs([_, dimension], _) => dimension,
+            ValueType::Number(dimension, _)
+            | ValueType::Vector(dimension, _)
+            | ValueType::Numbers(_, dimension)
+            | ValueType::Vectors(dimension, _)
+            | ValueType::Pairs([_, dimension], _) => dimension,
             _ => return None,
         };
         let own = self.on_hinge.filter(|_| hinge);
@@ -273,35 +273,35 @@ impl FileKey {
     /// Closed range of its numbers, SI.
     pub fn range(&self) -> (f64, f64) {
         match self.takes {
-            Takes::Number(_, range) | Takes::Vector(_, range) => range,
+            ValueType::Number(_, range) | ValueType::Vector(_, range) => range,
             _ => UNCHECKED,
         }
     }
 
     /// Most entries of its list.
-    pub fn many(&self) -> Option<Many> {
+    pub fn many(&self) -> Option<ListLimit> {
         match self.takes {
-            Takes::List(_, many)
-            | Takes::Vectors(_, many)
-            | Takes::Pairs(_, many)
-            | Takes::Words(_, many)
-            | Takes::Files(many) => Some(many),
+            ValueType::List(_, many)
+            | ValueType::Vectors(_, many)
+            | ValueType::Pairs(_, many)
+            | ValueType::Words(_, many)
+            | ValueType::Files(many) => Some(many),
             _ => None,
         }
     }
 }
 
 /// A quantity that only [`MAX_SI`] bounds.
-pub(super) const fn number(dimension: Dimension) -> Takes {
-    Takes::Number(dimension, ANY)
+pub(super) const fn number(dimension: Dimension) -> ValueType {
+    ValueType::Number(dimension, ANY)
 }
 
 /// A quantity above 0 and at most `most`, SI.
-pub(super) const fn positive(dimension: Dimension, most: f64) -> Takes {
-    Takes::Number(dimension, (ABOVE_ZERO, most))
+pub(super) const fn positive(dimension: Dimension, most: f64) -> ValueType {
+    ValueType::Number(dimension, (ABOVE_ZERO, most))
 }
 
 /// Three quantities.
-pub(super) const fn vector(dimension: Dimension) -> Takes {
-    Takes::Vector(dimension, UNCHECKED)
+pub(super) const fn vector(dimension: Dimension) -> ValueType {
+    ValueType::Vector(dimension, UNCHECKED)
 }

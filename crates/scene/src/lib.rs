@@ -3,10 +3,9 @@
 #![doc = include_str!("../../../docs/scene-format.md")]
 
 mod access;
-mod beside;
+mod assets;
 mod chain;
 mod check;
-mod copy;
 mod document;
 mod drives;
 mod elements;
@@ -26,6 +25,7 @@ mod outline;
 mod own;
 mod parameters;
 mod pattern;
+mod pattern_instance;
 mod placement;
 mod points;
 mod quantity;
@@ -41,13 +41,13 @@ mod visible;
 mod write;
 
 pub use access::contact_value;
-pub use beside::{LARGEST_FILE, LARGEST_MESH, file_bytes, largest_file};
+pub use assets::{LARGEST_FILE, LARGEST_MESH, file_bytes, largest_file};
 pub use drives::{DRIVE_LAWS, DriveLaw};
 pub use elements::is_element;
 pub use error::SceneError;
 pub use format::{FILE, file_tables};
-pub use given::{FileNumber, OwnParameter};
-pub use key::{ABOVE_ZERO, Absent, FileKey, FileTable, Many, Takes, Variants};
+pub use given::{FileNumber, UserParameter};
+pub use key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, ValueType, Variants};
 pub use live::{LiveScene, SceneSnapshot, SetError};
 pub use load::*;
 pub use model::*;

@@ -1,6 +1,6 @@
 //! Where scenes come from: the built-in ones, and files.
 
-use super::beside::{Beside, LARGEST_FILE};
+use super::assets::{AssetResolver, LARGEST_FILE};
 use super::error::line_and_column;
 use super::{Scene, SceneError, visible_line};
 use jointplay_physics::suggest::{brief, nearest};
@@ -73,7 +73,7 @@ impl Scene {
         if argument.contains('/') || argument.ends_with(".toml") {
             let text = read_file(Path::new(path), argument)?;
             let folder = Path::new(path).parent().unwrap_or(Path::new(""));
-            return Self::parse_beside(&text, Some(argument), Beside::in_folder(folder), changes);
+            return Self::parse_beside(&text, Some(argument), AssetResolver::in_folder(folder), changes);
         }
         match built_in_text(argument) {
             Some(text) => Self::parse(text, None, changes),

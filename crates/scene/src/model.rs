@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::given::{FileNumber, OwnParameter};
+use super::given::{FileNumber, UserParameter};
 use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::words::words;
 
@@ -47,7 +47,7 @@ pub struct Source {
     /// Numbers from which the scene was built, by key.
     pub numbers: Arc<BTreeMap<String, FileNumber>>,
     /// The scene's own parameters, in the order of the file.
-    pub own: Vec<OwnParameter>,
+    pub own: Vec<UserParameter>,
     /// Texts of the files beside the scene that it names, as they were when it was loaded.
     pub beside: Texts,
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use super::field::Access;
-use super::given::{FileNumber, OwnParameter};
+use super::given::{FileNumber, UserParameter};
 use super::parameters::{Kind, Parameter, Scope};
 use super::value::Value;
 use jointplay_physics::units::Dimension;
@@ -24,7 +24,7 @@ pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Paramete
 }
 
 /// Row of a parameter that the file defines.
-pub(super) fn row_of_own(own: &OwnParameter) -> &'static Parameter {
+pub(super) fn row_of_own(own: &UserParameter) -> &'static Parameter {
     let default = own.default.unwrap_or_default();
     let around = match default {
         0.0 => (-1.0, 1.0),

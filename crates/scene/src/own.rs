@@ -1,7 +1,7 @@
 //! Parameters that a scene file defines.
 
 use super::document::{Node, Section, lists};
-use super::given::OwnParameter;
+use super::given::UserParameter;
 use super::numbers::row_of_own;
 use super::*;
 use jointplay_physics::units::{all_units, same_unit, split_unit};
@@ -10,8 +10,8 @@ use jointplay_physics::units::{all_units, same_unit, split_unit};
 ///
 /// # Errors
 /// Anything wrong in one.
-pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, SceneError> {
-    let mut all: Vec<OwnParameter> = Vec::new();
+pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<UserParameter>, SceneError> {
+    let mut all: Vec<UserParameter> = Vec::new();
     let nodes = lists(files, "parameter", Vec::new())?;
     for (i, node) in nodes.iter().enumerate() {
         let own = read_parameter(node).map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
@@ -38,7 +38,7 @@ fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
     Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
 }
 
-fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
+fn read_parameter(node: &Node<'_>) -> Result<UserParameter, SceneError> {
     let title = node.title("parameter");
     let section = node.section_as(title.clone())?;
     let name_node = section.require("name")?;
@@ -88,7 +88,7 @@ fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
             Some((least, most))
         }
     };
-    let own = OwnParameter {
+    let own = UserParameter {
         key: format!("parameter.{name}"),
         label: visible_line(label).into_owned(),
         help: visible_line(help).into_owned(),

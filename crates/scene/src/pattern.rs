@@ -4,15 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use toml::de::DeValue;
 
-use super::copy::Copy;
 use super::document::{Node, Section, lists};
-use super::key::Takes;
+use super::key::ValueType;
+use super::pattern_instance::PatternInstance;
 use super::*;
 
 /// A `[[pattern]]` with its copies.
 pub(super) struct Pattern<'d> {
     section: Section<'d>,
-    copies: Vec<Copy>,
+    copies: Vec<PatternInstance>,
 }
 
 /// The patterns of a scene's files.
@@ -48,7 +48,7 @@ fn values(value: &DeValue<'_>) -> usize {
 fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
     let section = node.section_as(node.title("pattern"))?;
     let lists = section.rows.keys.iter();
-    let lists = lists.filter(|key| matches!(key.takes, Takes::List(..)));
+    let lists = lists.filter(|key| matches!(key.takes, ValueType::List(..)));
     let lists: Vec<&str> = lists.map(|key| key.name).collect();
     section.require("name")?.name()?;
     let count_node = section.require("count")?;
@@ -102,7 +102,7 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
     };
     let (bodies, joints) = (Arc::new(bodies), Arc::new(joints));
     let copies = (0..count)
-        .map(|index| Copy {
+        .map(|index| PatternInstance {
             number: index + 1,
             centre,
             turn: turned(axis, angle * f64::from(index)),

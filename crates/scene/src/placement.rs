@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::document::{Node, Section};
 use super::error::no_body;
-use super::key::{FileTable, Takes, Variants, key, number, vector};
+use super::key::{FileTable, ValueType, Variants, key, number, vector};
 use super::*;
 use jointplay_physics::units::Dimension as D;
 
@@ -13,7 +13,7 @@ pub(super) static ATTACHMENT: FileTable = FileTable::new(
     "a point on a body",
     "where something holds a body",
     &[
-        key("body", Takes::Body, "\"rod\"", "the body, or `world`"),
+        key("body", ValueType::Body, "\"rod\"", "the body, or `world`"),
         key("at", vector(D::Length), "\"0 0 100 mm\"", "the point").zero().frame("that of its `body`"),
     ],
 );
@@ -23,14 +23,15 @@ pub(super) static ROTATION: FileTable = FileTable::new(
     "a rotation",
     "an orientation, in one of four forms",
     &[
-        key("axis", Takes::Direction, "[0, 1, 0]", "axis of the turn").of(&["axis"]),
+        key("axis", ValueType::Direction, "[0, 1, 0]", "axis of the turn").of(&["axis"]),
         key("angle", number(D::Angle), "\"15 deg\"", "angle of the turn").of(&["axis"]),
-        key("sequence", Takes::Text, "\"xzy\"", "axes of three turns: `\"xzy\"` is Rx Rz Ry, as in paper eq. (2)")
+        key("sequence", ValueType::Text, "\"xzy\"", "axes of three turns: `\"xzy\"` is Rx Rz Ry, as in paper eq. (2)")
             .of(&["sequence"]),
-        key("angles", Takes::Numbers(3, D::Angle), "\"0 2 15 deg\"", "their angles, in that order").of(&["sequence"]),
-        key("x", Takes::Direction, "[1, 0, 0]", "the x axis").of(&["x"]),
-        key("y", Takes::Direction, "[0, 1, 0]", "on which side of it the y axis lies").of(&["x"]),
-        key("quaternion", Takes::Numbers(4, D::None), "[1, 0, 0, 0]", "a quaternion: w, x, y, z, of any length")
+        key("angles", ValueType::Numbers(3, D::Angle), "\"0 2 15 deg\"", "their angles, in that order")
+            .of(&["sequence"]),
+        key("x", ValueType::Direction, "[1, 0, 0]", "the x axis").of(&["x"]),
+        key("y", ValueType::Direction, "[0, 1, 0]", "on which side of it the y axis lies").of(&["x"]),
+        key("quaternion", ValueType::Numbers(4, D::None), "[1, 0, 0, 0]", "a quaternion: w, x, y, z, of any length")
             .of(&["quaternion"]),
     ],
 )

@@ -1,6 +1,6 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
-use super::beside::Beside;
+use super::assets::AssetResolver;
 use super::document::{Document, Node, Section, lists};
 use super::elements::{ELEMENTS, read_element};
 use super::error::no_body;
@@ -28,7 +28,7 @@ impl Scene {
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, file: Option<&str>, changes: &[(String, String)]) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, Beside::default(), changes)
+        Self::parse_beside(text, file, AssetResolver::default(), changes)
     }
 
     /// As [`Self::parse`] for the text of a file in `folder`, where the files that it names are read.
@@ -41,7 +41,7 @@ impl Scene {
         folder: &Path,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, Beside::in_folder(folder), changes)
+        Self::parse_beside(text, file, AssetResolver::in_folder(folder), changes)
     }
 
     /// As [`Self::parse`] for a text opened together with other files, `given` by their names without a folder; one that its
@@ -56,7 +56,7 @@ impl Scene {
         folder: Option<&Path>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, Beside::given(given, folder), changes)
+        Self::parse_beside(text, file, AssetResolver::given(given, folder), changes)
     }
 
     /// As [`Self::parse`] for a text that names the files `beside` it.
@@ -69,14 +69,14 @@ impl Scene {
         beside: &Texts,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, Beside::known(beside), changes)
+        Self::parse_beside(text, file, AssetResolver::known(beside), changes)
     }
 
     /// Parses a scene that finds the files it names in `beside`.
     pub(super) fn parse_beside(
         text: &str,
         file: Option<&str>,
-        beside: Beside<'_>,
+        beside: AssetResolver<'_>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
         let of_text = changes.iter().filter(|(key, _)| is_of_text(key));

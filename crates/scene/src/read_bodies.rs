@@ -1,9 +1,9 @@
 //! Bodies and shapes of a scene file.
 
-use super::beside::NoMesh;
-use super::copy::Copy;
+use super::assets::NoMesh;
 use super::document::{Document, Node, Section};
 use super::mesh::{Fault, Format};
+use super::pattern_instance::PatternInstance;
 use super::placement::read_rotation;
 use super::*;
 use jointplay_physics::machine::Solid;
@@ -287,7 +287,7 @@ fn read_shift(section: &Section<'_>, spcmm: Option<&Spcmm>) -> Result<Vec3, Scen
 }
 
 /// Moves a shape with a copy of a pattern.
-fn place_shape(shape: &mut Shape, copy: &Copy, form: &Node<'_>) -> Result<(), SceneError> {
+fn place_shape(shape: &mut Shape, copy: &PatternInstance, form: &Node<'_>) -> Result<(), SceneError> {
     match &mut shape.geometry {
         Geometry::Capsule { from, to, .. } | Geometry::Cylinder { from, to, .. } | Geometry::Cone { from, to, .. } => {
             *from = copy.point(*from);

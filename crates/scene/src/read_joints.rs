@@ -1,9 +1,9 @@
 //! Tree joints, joints that close loops, and ball joints of a scene file, and the forest they make.
 
-use super::copy::Copy;
 use super::document::{Node, Section};
 use super::drives::{SLIDERS_ONLY, read_drive};
 use super::error::no_body;
+use super::pattern_instance::PatternInstance;
 use super::placement::{read_attachment, read_rotation};
 use super::table::contact_rows;
 use super::*;
@@ -84,11 +84,11 @@ pub(super) fn read_joint<'d>(
             read_two_degrees(&section, scene, &mut joint)?;
         }
     }
-    let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
+    let own = |copy: &PatternInstance| parent.is_some_and(|parent| copy.made(&bodies[parent]));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
         place_parent_side(&mut joint, copy);
     }
-    let outside = |copy: &&Copy| closes_loop && !copy.made(&bodies[child]);
+    let outside = |copy: &&PatternInstance| closes_loop && !copy.made(&bodies[child]);
     if let Some(copy) = node.document.copy.filter(outside) {
         place_child_side(&mut joint, copy);
     }
@@ -114,14 +114,14 @@ fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError>
 }
 
 /// Moves the child's side of a joint with a copy of a pattern to which its child does not belong.
-fn place_child_side(joint: &mut Joint, copy: &Copy) {
+fn place_child_side(joint: &mut Joint, copy: &PatternInstance) {
     joint.child_point = copy.point(joint.child_point);
     joint.child_axis = copy.direction(joint.child_axis);
     joint.rotation *= copy.turn.inverse();
 }
 
 /// Moves the parent's side of a joint with a copy of a pattern to which its parent does not belong.
-fn place_parent_side(joint: &mut Joint, copy: &Copy) {
+fn place_parent_side(joint: &mut Joint, copy: &PatternInstance) {
     joint.parent_point = copy.point(joint.parent_point);
     joint.axis = copy.direction(joint.axis);
     joint.rotation = copy.rotation(joint.rotation);
@@ -351,7 +351,7 @@ pub(super) fn read_ball_joint<'d>(
         return Err(section.error("ball", "socket and ball are on the same body: a ball joint needs two"));
     }
     let mut opening = section.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
-    let own = |copy: &Copy| socket.body.is_some_and(|body| copy.made(&scene.machine.bodies[body].name));
+    let own = |copy: &PatternInstance| socket.body.is_some_and(|body| copy.made(&scene.machine.bodies[body].name));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
         opening = copy.direction(opening);
     }

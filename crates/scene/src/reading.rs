@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::copy::Copy;
 use super::given::FileNumber;
+use super::pattern_instance::PatternInstance;
 use super::quantity::{DimensionError, Quantity};
 use jointplay_physics::expression::{ExpressionError, Number as _, Program};
 use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start};
@@ -64,7 +64,12 @@ impl<'d> Reading<'d> {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn evaluate(&self, text: &str, dimension: Dimension, copy: Option<&Copy>) -> Result<f64, ReadingError> {
+    pub fn evaluate(
+        &self,
+        text: &str,
+        dimension: Dimension,
+        copy: Option<&PatternInstance>,
+    ) -> Result<f64, ReadingError> {
         let error = match parse_quantity(text, dimension) {
             Ok(value) => return Ok(value),
             Err(error) => error,
@@ -107,7 +112,7 @@ impl<'d> Reading<'d> {
         &self,
         text: &str,
         dimension: Dimension,
-        copy: Option<&Copy>,
+        copy: Option<&PatternInstance>,
     ) -> Result<(Program, bool), ReadingError> {
         let own = self.own.borrow();
         let (mut names, mut values) = named(&own, copy);
@@ -165,7 +170,7 @@ impl<'d> Reading<'d> {
 }
 
 /// Names and values that expressions may use: the scene's own parameters, and the number of a pattern's copy.
-fn named<'a>(own: &'a BTreeMap<String, Quantity>, copy: Option<&Copy>) -> (Vec<&'a str>, Vec<Quantity>) {
+fn named<'a>(own: &'a BTreeMap<String, Quantity>, copy: Option<&PatternInstance>) -> (Vec<&'a str>, Vec<Quantity>) {
     let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
     let mut values: Vec<Quantity> = own.values().copied().collect();
     if let Some(copy) = copy {

@@ -62,7 +62,7 @@ impl Scene {
                 Place::Included => {
                     return Err(refuse("it stands in another file, which this one includes"));
                 }
-                Place::Absent => {
+                Place::DefaultRule => {
                     return Err(refuse("the text does not give it; write it there first"));
                 }
                 Place::Value(span) if same.len() == 1 => (span, text(number)),

@@ -74,7 +74,7 @@ impl Sight {
         let sliding = normal.filter(|_| touches).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);
-            let read = law.friction_reads(&normal, &velocity, &ball_spin, &socket_spin);
+            let read = law.slip_velocity(&normal, &velocity, &ball_spin, &socket_spin);
             law.sliding(&gap, &read)
         });
         let mut begun = player.impact_record().latest(Some(joint), shown);

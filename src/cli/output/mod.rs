@@ -10,7 +10,7 @@ pub use csv::significant;
 #[cfg(feature = "gui")]
 pub use json::write_meta;
 pub use npz::{as_io, write_archive};
-pub use table::{NoRow, Table};
+pub use table::{RowError, Table};
 
 use std::path::{Path, PathBuf};
 

@@ -20,7 +20,7 @@ pub struct Table {
 
 /// Why a row is not in the table.
 #[derive(Debug, thiserror::Error)]
-pub enum NoRow {
+pub enum RowError {
     /// A value that is not a number.
     #[error("{column} is {value} at t = {time:.6e} s")]
     NotFinite {
@@ -118,12 +118,12 @@ impl Table {
     ///
     /// # Errors
     /// A value that is not finite, except one that is unknown in the frame; a full disk. The table is then unchanged.
-    pub fn push(&mut self, frame: &Frame) -> Result<(), NoRow> {
+    pub fn push(&mut self, frame: &Frame) -> Result<(), RowError> {
         self.values.clear();
         for (reading, column) in self.readings.iter().zip(&self.names) {
             let value = reading.read(frame);
             if let Some(value) = value.filter(|value| !value.is_finite()) {
-                return Err(NoRow::NotFinite { column: column.clone(), value, time: frame.time });
+                return Err(RowError::NotFinite { column: column.clone(), value, time: frame.time });
             }
             // After the ideal mechanism has come to its end there is no tip error.
             self.values.push(value.unwrap_or(f64::NAN));

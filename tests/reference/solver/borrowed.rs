@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use jointplay::contact::Memory;
 use jointplay::integrate::System;
-use jointplay::mechanism::{Mechanism, Touching};
+use jointplay::mechanism::{Mechanism, ActiveSet};
 use jointplay::scene::Scene;
 
 use crate::integrate::Equations;
@@ -34,7 +34,7 @@ impl Equations for Borrowed {
     fn derivative(&self, t: f64, y: &[f64], dy: &mut [f64]) {
         let memory = self.memory.borrow();
         let mut mechanism = self.mechanism.borrow_mut();
-        let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
         evaluator.derivative(t, y, dy);
     }
 

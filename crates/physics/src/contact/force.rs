@@ -43,7 +43,7 @@ pub struct Stiffness {
     pub by_displacement: Mat3,
     /// Derivative with respect to the centres' relative velocity, through the penetration rate, N s/m.
     pub by_rate: Mat3,
-    /// Derivative with respect to the velocity [`Coefficients::friction_reads`], N s/m.
+    /// Derivative with respect to the velocity [`Coefficients::slip_velocity`], N s/m.
     pub by_slip: Mat3,
     /// dF/dt at fixed eccentricity, due to a ramping clearance, N/s.
     pub by_clearance: Vec3,
@@ -53,7 +53,7 @@ pub struct Stiffness {
 
 impl Stiffness {
     /// Adds that the velocity used by friction has the derivative `by_normal` with respect to the normal, m/s.
-    pub fn add_turning_read(&mut self, by_normal: &Mat3) {
+    pub fn add_normal_rotation(&mut self, by_normal: &Mat3) {
         self.by_displacement += self.by_slip * by_normal * self.normal;
     }
 
@@ -85,9 +85,9 @@ impl Coefficients {
         velocity + ball.cross(&(normal * radius)) - socket.cross(&(normal * (radius + self.clearance)))
     }
 
-    /// Derivative of [`Self::friction_reads`] with respect to the normal, m/s. The play is so small that a ball which moves a
+    /// Derivative of [`Self::slip_velocity`] with respect to the normal, m/s. The play is so small that a ball which moves a
     /// little there turns its normal a lot: where bodies spin, the surfaces then slide otherwise.
-    pub fn friction_reads_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
+    pub fn slip_velocity_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
         match self.friction_velocity {
             FrictionVelocity::Centres | FrictionVelocity::Printed => Mat3::zeros(),
             FrictionVelocity::Surface => {
@@ -100,7 +100,7 @@ impl Coefficients {
     /// Relative velocity used by friction, not yet projected onto the tangent plane, m/s; arguments as in
     /// [`Self::surface_velocity`].
     #[inline]
-    pub fn friction_reads(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
+    pub fn slip_velocity(&self, normal: &Vec3, velocity: &Vec3, ball: &Vec3, socket: &Vec3) -> Vec3 {
         match self.friction_velocity {
             FrictionVelocity::Centres | FrictionVelocity::Printed => *velocity,
             FrictionVelocity::Surface => self.surface_velocity(normal, velocity, ball, socket),
@@ -279,7 +279,7 @@ mod tests {
     /// Force on the ball.
     fn on_ball(c: &Coefficients, memory: &Memory, e: &Vec3, v: &Vec3) -> Vec3 {
         let at = c.separation(e, v);
-        let read = || c.friction_reads(&at.normal, v, &BALL, &SOCKET);
+        let read = || c.slip_velocity(&at.normal, v, &BALL, &SOCKET);
         let force = c.force(memory, &at, read);
         at.normal * -force.normal + force.friction
     }
@@ -299,11 +299,11 @@ mod tests {
                     let (c, e, v) = pressed(friction_velocity, speed);
                     let memory = memory(slip, pace);
                     let at = c.separation(&e, &v);
-                    let read = c.friction_reads(&at.normal, &v, &BALL, &SOCKET);
+                    let read = c.slip_velocity(&at.normal, &v, &BALL, &SOCKET);
                     let force = c.force(&memory, &at, || read);
                     assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
                     let mut s = c.linearise(&memory, &at, &v, &read, &force, Slope::Tangent);
-                    s.add_turning_read(&c.friction_reads_by_normal(&BALL, &SOCKET));
+                    s.add_normal_rotation(&c.slip_velocity_by_normal(&BALL, &SOCKET));
                     let by_velocity = s.by_rate + s.by_slip;
                     for k in 0..3 {
                         let unit = Vec3::ith(k, 1.0);
@@ -336,7 +336,7 @@ mod tests {
         let (r, socket) = (c.ball_radius, c.ball_radius + c.clearance);
         let printed = v + turning * r - turning * socket;
         let tangential = printed - at.normal * at.normal.dot(&printed);
-        let got = c.sliding(&at, &c.friction_reads(&at.normal, &v, &BALL, &SOCKET));
+        let got = c.sliding(&at, &c.slip_velocity(&at.normal, &v, &BALL, &SOCKET));
         assert!((got - tangential).norm() < 1e-12 * 0.2);
         // Its dead band ends where the centres move at v_a |e| / delta.
         let ends = c.slip_low * at.distance / at.penetration;

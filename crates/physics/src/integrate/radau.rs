@@ -195,7 +195,7 @@ impl Radau {
             let [z1, z2, z3] = self.z.each_mut().map(|z| &mut z[part.clone()]);
             let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[part.clone()]);
             for i in 0..part.len() {
-                let course = Course::of(&before.map(|z| z[i]));
+                let course = DenseOutput::of(&before.map(|z| z[i]));
                 let start = course.at(from);
                 let z = at.map(|s| course.at(s) - start);
                 [z1[i], z2[i], z3[i]] = z;
@@ -353,7 +353,7 @@ impl Radau {
     pub fn truncate(&mut self, theta: f64) {
         let n = self.stage.len();
         for i in 0..n {
-            let course = Course::of(&std::array::from_fn(|j| self.previous.z[j][i]));
+            let course = DenseOutput::of(&std::array::from_fn(|j| self.previous.z[j][i]));
             for j in 0..3 {
                 self.previous.z[j][i] = course.at(C[j] * theta - 1.0);
             }
@@ -367,7 +367,7 @@ impl Radau {
         let y = &y[part.clone()];
         let z = self.previous.z.each_ref().map(|z| &z[part.clone()]);
         for (i, out) in out[part].iter_mut().enumerate() {
-            *out = y[i] + Course::of(&z.map(|z| z[i])).at(theta - 1.0);
+            *out = y[i] + DenseOutput::of(&z.map(|z| z[i])).at(theta - 1.0);
         }
     }
 }
@@ -389,9 +389,9 @@ fn times(m: &[[f64; 3]; 3], x: &[f64; 3]) -> [f64; 3] {
 }
 
 /// Increment of one component from the step's start: the cubic through 0 and the three stages, in Newton's form.
-struct Course([f64; 4]);
+struct DenseOutput([f64; 4]);
 
-impl Course {
+impl DenseOutput {
     const NODES: [f64; 2] = [C[0] - 1.0, C[1] - 1.0];
 
     #[inline(always)]
@@ -438,7 +438,7 @@ pub(super) fn weights_within(theta: f64, a: &[Vec<f64>; 3]) -> Vec<f64> {
     let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
     let mut weights = vec![0.0; 3];
     for (i, row) in a.iter().enumerate() {
-        let part = Course::of(&unit(i)).at(theta - 1.0);
+        let part = DenseOutput::of(&unit(i)).at(theta - 1.0);
         for (weight, a) in weights.iter_mut().zip(row) {
             *weight += part * a;
         }
@@ -577,7 +577,7 @@ mod tests {
     #[test]
     fn polynomial_passes_through_its_stages() {
         let z = [0.3, -0.7, 1.1];
-        let course = Course::of(&z);
+        let course = DenseOutput::of(&z);
         assert!(course.at(-1.0).abs() < 1e-15);
         for j in 0..3 {
             assert!((course.at(C[j] - 1.0) - z[j]).abs() < 1e-14);

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::elements::{At, Contact, ForceElement, Gap, Loads, Touching};
+use super::elements::{ActiveSet, At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
 use super::model::Model;
 use crate::contact::{Coefficients, Parameters};
@@ -153,7 +153,7 @@ impl Contacts {
 
     /// Gaps and forces of all contacts, if any may carry a force.
     pub(super) fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        if !self.any_contact || matches!(at.touching, Touching::Nothing) {
+        if !self.any_contact || matches!(at.touching, ActiveSet::Nothing) {
             return;
         }
         self.update_ramps(at.t);
@@ -168,7 +168,7 @@ impl Contacts {
     }
 
     /// Completes the gaps of the latest evaluation, with `touching`, and measures those that it left out.
-    pub(super) fn finish_all(&mut self, touching: Touching<'_>, motion: &[Kinematics]) {
+    pub(super) fn finish_all(&mut self, touching: ActiveSet<'_>, motion: &[Kinematics]) {
         for contact in &mut self.joints {
             if self.only_touching && !contact.may_press(touching) {
                 contact.measure(motion);
@@ -193,15 +193,15 @@ impl Contacts {
     }
 
     /// Relative velocity used by friction at the contact of joint `i` for the normal `n`, m/s.
-    pub fn friction_reads(&self, i: usize, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
-        self.joints[i].friction_reads(n, motion)
+    pub fn slip_velocity(&self, i: usize, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
+        self.joints[i].slip_velocity(n, motion)
     }
 
     /// Sliding speed of joint `i`, whose ball must be off centre, in the motion last measured, m/s.
     pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
         let contact = &self.joints[i];
         let at = &contact.gap.separation;
-        let read = contact.friction_reads(&at.normal, motion);
+        let read = contact.slip_velocity(&at.normal, motion);
         contact.law.sliding(at, &read).norm()
     }
 }

@@ -43,7 +43,7 @@ pub(super) trait Equations: Send {
     /// Lets evaluations leave out the bodies for which `asleep` holds, if [`Self::is_block_diagonal`]: free bodies, each a
     /// tree of its own. Their components of derivatives stay as they are, and their motion is that of the latest
     /// [`Self::update_kinematics`] or [`Self::update_asleep`].
-    fn put_to_sleep(&mut self, _asleep: &dyn Fn(BodyIndex) -> bool) {}
+    fn suspend(&mut self, _asleep: &dyn Fn(BodyIndex) -> bool) {}
 
     /// [`Self::update_kinematics`] for the bodies that are awake.
     fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kinematics::{part, rotation_of};
 use super::model::{Body, BodyIndex, Motion};
-use super::{Mechanism, Touching};
+use super::{ActiveSet, Mechanism};
 use std::ops::Range;
 
 use crate::machine::{Formulation, Machine, Vec3};
@@ -19,7 +19,7 @@ const LONGEST: f64 = 0.1;
 
 /// A free body that nothing but contacts, gravity and the hand ever loads.
 #[derive(Clone, Debug)]
-pub struct Flyer {
+pub struct FreeFlightBody {
     /// Its index.
     pub body: BodyIndex,
     /// Ball joints of which it carries the ball or the socket.
@@ -28,7 +28,7 @@ pub struct Flyer {
     v: usize,
 }
 
-impl Flyer {
+impl FreeFlightBody {
     /// Those of `scene`, none where bodies couple through ideal joints or drives must hold what others do.
     pub(super) fn all(mechanism: &Mechanism, machine: &Machine) -> Vec<Self> {
         let model = &*mechanism.model;
@@ -65,17 +65,17 @@ impl Flyer {
 
 /// Components of a state that steps move: those of the bodies that do not fly.
 #[derive(Default)]
-pub(super) struct Moving {
+pub(super) struct ActiveRanges {
     /// In their order, positions first.
     pub parts: Vec<Range<usize>>,
     /// How many of them are positions.
     of_positions: usize,
 }
 
-impl Moving {
+impl ActiveRanges {
     /// With room to leave out so many flyers.
-    pub fn with_room(flyers: usize) -> Self {
-        Self { parts: Vec::with_capacity(2 * (flyers + 1)), of_positions: 0 }
+    pub fn with_room(free_flight_bodies: usize) -> Self {
+        Self { parts: Vec::with_capacity(2 * (free_flight_bodies + 1)), of_positions: 0 }
     }
 
     /// Those that are positions.
@@ -88,12 +88,17 @@ impl Moving {
         &self.parts[self.of_positions..]
     }
 
-    /// Of a state of `dimension` components, `positions` of them positions, of which the `flyers` are left out.
-    fn leave_out<'a>(&mut self, positions: usize, dimension: usize, flyers: impl Iterator<Item = &'a Flyer> + Clone) {
+    /// Of a state of `dimension` components, `positions` of them positions, of which the `free_flight_bodies` are left out.
+    fn leave_out<'a>(
+        &mut self,
+        positions: usize,
+        dimension: usize,
+        free_flight_bodies: impl Iterator<Item = &'a FreeFlightBody> + Clone,
+    ) {
         self.parts.clear();
         for (kind, all) in [0..positions, positions..dimension].into_iter().enumerate() {
             let mut from = all.start;
-            for flyer in flyers.clone() {
+            for flyer in free_flight_bodies.clone() {
                 let part = &flyer.parts()[kind];
                 if from < part.start {
                     self.parts.push(from..part.start);
@@ -177,7 +182,7 @@ impl Flight {
     }
 
     /// Writes the coordinates of `flyer` at `t` to those of the state `y`.
-    pub fn put(&self, flyer: &Flyer, t: f64, y: &mut [f64]) {
+    pub fn put(&self, flyer: &FreeFlightBody, t: f64, y: &mut [f64]) {
         let s = t - self.start;
         let mut turn = self.turn[ORDER];
         let mut spin = self.spin[ORDER];
@@ -200,33 +205,33 @@ impl Flight {
 
 impl Mechanism {
     /// The bodies that may fly.
-    pub fn flyers(&self) -> &[Flyer] {
-        &self.flyers
+    pub fn free_flight_bodies(&self) -> &[FreeFlightBody] {
+        &self.free_flight_bodies
     }
 
     /// Of ball and socket of joint `j`, those that may fly.
     pub fn flyers_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
-        let of = |b: BodyIndex| self.flyers.binary_search_by_key(&b, |flyer| flyer.body).ok();
+        let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |flyer| flyer.body).ok();
         [of(joint.ball.body), of(joint.socket.body)].into_iter().flatten()
     }
 
     /// Free flight of `flyer` from the state `y` at `t`.
-    pub fn flight(&self, flyer: &Flyer, t: f64, y: &[f64]) -> Flight {
+    pub fn flight(&self, flyer: &FreeFlightBody, t: f64, y: &[f64]) -> Flight {
         let body = &self.model.bodies[flyer.body];
         Flight::new(body, &self.gravity, t, part(y, flyer.q), part(y, flyer.v))
     }
 
     /// Lets evaluations leave out the flyers for which `asleep` holds, by their index.
-    pub fn put_to_sleep(&mut self, asleep: impl Fn(usize) -> bool) {
-        let flyers = &self.flyers;
+    pub fn suspend(&mut self, asleep: impl Fn(usize) -> bool) {
+        let free_flight_bodies = &self.free_flight_bodies;
         let sleeps = |b: BodyIndex| {
-            let flyer = flyers.binary_search_by_key(&b, |flyer| flyer.body);
+            let flyer = free_flight_bodies.binary_search_by_key(&b, |flyer| flyer.body);
             flyer.is_ok_and(&asleep)
         };
-        self.equations.put_to_sleep(&sleeps);
-        self.contacts.only_touching = (0..flyers.len()).any(&asleep);
-        let left_out = flyers.iter().enumerate().filter(|(i, _)| asleep(*i));
+        self.equations.suspend(&sleeps);
+        self.contacts.only_touching = (0..free_flight_bodies.len()).any(&asleep);
+        let left_out = free_flight_bodies.iter().enumerate().filter(|(i, _)| asleep(*i));
         let (positions, dimension) = (self.positions(), self.dimension());
         let left_out = left_out.map(|(_, flyer)| flyer);
         self.moving.leave_out(positions, dimension, left_out);
@@ -238,7 +243,7 @@ impl Mechanism {
     }
 
     /// Completes an evaluation at (t, y), with `touching`, by the motion of the bodies that it left out and all gaps.
-    pub fn complete_gaps(&mut self, touching: Touching<'_>, y: &[f64]) {
+    pub fn complete_gaps(&mut self, touching: ActiveSet<'_>, y: &[f64]) {
         if self.contacts.only_touching {
             self.equations.update_asleep(&self.model, y);
         }
@@ -287,7 +292,7 @@ mod tests {
     #[test]
     fn a_flight_is_the_motion_that_the_equations_give() {
         let (mut mechanism, mut y) = tumbling();
-        let flyer = mechanism.flyers()[0].clone();
+        let flyer = mechanism.free_flight_bodies()[0].clone();
         let flight = mechanism.flight(&flyer, 0.25, &y);
         let length = flight.end - flight.start;
         assert!((1e-3..0.1).contains(&length), "{length}");
@@ -298,7 +303,7 @@ mod tests {
         let (mut end, mut k) = (y.clone(), y.clone());
         let mut k_end = y.clone();
         let h = length / f64::from(n);
-        let mut equations = mechanism.evaluator(Touching::Nothing);
+        let mut equations = mechanism.evaluator(ActiveSet::Nothing);
         equations.derivative(t, &y, &mut k);
         for _ in 0..n {
             stepper.attempt(&mut equations, t, h, &y, &k, &mut end, &mut k_end);
@@ -322,7 +327,7 @@ mod tests {
         let mut mechanism = Mechanism::new(&scene.machine).expect("equations");
         let dimension = mechanism.dimension();
         for flying in [&[][..], &[1], &[0, 1, 3], &[0, 1, 2, 3]] {
-            mechanism.put_to_sleep(|flyer| flying.contains(&flyer));
+            mechanism.suspend(|flyer| flying.contains(&flyer));
             let mut moves = vec![false; dimension];
             for part in mechanism.moving().iter().cloned() {
                 assert!(!part.is_empty());
@@ -330,7 +335,7 @@ mod tests {
                     assert!(!std::mem::replace(&mut moves[i], true), "{i} twice");
                 }
             }
-            for (i, flyer) in mechanism.flyers().iter().enumerate() {
+            for (i, flyer) in mechanism.free_flight_bodies().iter().enumerate() {
                 for component in flyer.parts().into_iter().flatten() {
                     assert_eq!(moves[component], !flying.contains(&i), "{flying:?}");
                 }
@@ -347,7 +352,7 @@ mod tests {
     #[test]
     fn a_flight_starts_where_it_is_and_keeps_energy_and_angular_momentum() {
         let (mechanism, y) = tumbling();
-        let flyer = &mechanism.flyers()[0];
+        let flyer = &mechanism.free_flight_bodies()[0];
         let flight = mechanism.flight(flyer, 0.0, &y);
         let body = &mechanism.model.bodies[flyer.body];
         let invariants = |y: &[f64]| {
@@ -380,7 +385,7 @@ mod tests {
     #[test]
     fn faster_spin_makes_flights_shorter_and_none_longest() {
         let (mechanism, mut y) = tumbling();
-        let flyer = &mechanism.flyers()[0];
+        let flyer = &mechanism.free_flight_bodies()[0];
         let spin = flyer.v + 3..flyer.v + 6;
         let length = |factor: f64| {
             let mut y = y.clone();

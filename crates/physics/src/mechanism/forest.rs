@@ -91,8 +91,8 @@ impl Equations for Forest {
         self.tree.update_kinematics(model, t, y);
     }
 
-    fn put_to_sleep(&mut self, asleep: &dyn Fn(BodyIndex) -> bool) {
-        self.tree.put_to_sleep(asleep);
+    fn suspend(&mut self, asleep: &dyn Fn(BodyIndex) -> bool) {
+        self.tree.suspend(asleep);
     }
 
     fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
@@ -285,7 +285,7 @@ impl Equations for Forest {
 #[cfg(test)]
 mod tests {
     use crate::machine::{Formulation, Vec3};
-    use crate::mechanism::{Mechanism, Touching};
+    use crate::mechanism::{ActiveSet, Mechanism};
     use crate::scene::{BUILT_IN, Scene};
 
     #[test]
@@ -298,7 +298,7 @@ mod tests {
                 continue;
             };
             let start = mechanism.start().unwrap();
-            mechanism.evaluator(Touching::Nothing).evaluate_fully(0.0, &start, &mut vec![0.0; start.len()]);
+            mechanism.evaluator(ActiveSet::Nothing).evaluate_fully(0.0, &start, &mut vec![0.0; start.len()]);
             let mut ask = || {
                 let mut forces = vec![0.0; mechanism.drives()];
                 mechanism.actuators(&mut forces);

@@ -14,9 +14,9 @@ use super::band::Band;
 use super::bounds::{Advice, Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
 use super::contacts::Contacts;
-use super::elements::Touching;
+use super::elements::ActiveSet;
 use super::equations::Equations;
-use super::flight::Moving;
+use super::flight::ActiveRanges;
 use super::model::{BallJoint, Model};
 use crate::contact::{Coefficients, Memory, Slope};
 use crate::integrate::{Method, add_scaled, copy, divide};
@@ -221,7 +221,7 @@ impl Friction {
         &mut self,
         model: &Model,
         contacts: &Contacts,
-        touching: Touching<'_>,
+        touching: ActiveSet<'_>,
         equations: &mut dyn Equations,
         y: &[f64],
     ) {
@@ -242,7 +242,7 @@ impl Friction {
             touch.memory = *memory;
             touch.eccentricity = contact.gap.eccentricity;
             touch.rate = contact.gap.eccentricity_rate;
-            touch.read = contact.friction_reads(&n, equations.motion());
+            touch.read = contact.slip_velocity(&n, equations.motion());
             let sides = contact_sides(&contact.joint, &contact.law);
             collect_columns(&mut self.columns, model, equations, &sides, &n);
             let surfaces = touch.law.uses_surface_velocity();
@@ -354,7 +354,7 @@ impl Friction {
     }
 
     /// Solves (s I - J) x = b in place, for the components that move.
-    pub fn solve(&mut self, b: &mut [f64], moving: &Moving, equations: &dyn Equations, model: &Model) {
+    pub fn solve(&mut self, b: &mut [f64], moving: &ActiveRanges, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let b_v = &mut b[positions..];
         for (&slot, right) in self.active.iter().zip(&mut self.right) {
@@ -395,7 +395,7 @@ fn reach_of(
 mod tests {
     use crate::contact::Memory;
     use crate::integrate::{FrictionSystem, StiffSystem, System};
-    use crate::mechanism::{Mechanism, Touching};
+    use crate::mechanism::{ActiveSet, Mechanism};
     use crate::scene::Scene;
 
     /// Without damping, so that the load, and with it friction, does not follow the penetration rate: that is left out.
@@ -446,7 +446,7 @@ mod tests {
             for (v, x) in moved[positions..].iter_mut().zip(x) {
                 *v += sign * width * x;
             }
-            mechanism.evaluator(Touching::Located(memory)).derivative(0.0, &moved, &mut out);
+            mechanism.evaluator(ActiveSet::Located(memory)).derivative(0.0, &moved, &mut out);
             out.split_off(positions)
         };
         let (plus, minus) = (at(1.0), at(-1.0));
@@ -461,14 +461,14 @@ mod tests {
         let memory = vec![memory; scene.machine.ball_joints.len()];
         let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         mechanism.prepare_friction().unwrap();
-        let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
         evaluator.friction_alone().linearise(0.0, &y);
         let ringing = mechanism.friction_ringing();
         // How fast the lowest joint closes again; the world gives way less to the highest.
         let mut opening = |by: f64| {
             let (mut moved, mut out) = (y.clone(), vec![0.0; y.len()]);
             moved[7 * 2 + 2] -= by;
-            let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
             evaluator.evaluate_fully(0.0, &moved, &mut out);
             let joint = &mechanism.contacts.joint(2).joint;
             joint.opening_acceleration(mechanism.motion()).z
@@ -487,7 +487,7 @@ mod tests {
             let mut mechanism = Mechanism::new(&scene.machine).unwrap();
             let positions = mechanism.positions();
             mechanism.prepare_friction().unwrap();
-            let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
             let mut system = evaluator.friction_alone();
             system.linearise(0.0, &y);
             let shift = 4e4;

@@ -11,7 +11,7 @@ use super::band::Band;
 use super::bounds::{Advice, Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
 use super::contacts::Contacts;
-use super::elements::{Counts, Touching};
+use super::elements::{ActiveSet, Counts};
 use super::equations::Equations;
 use super::model::Model;
 use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
@@ -156,7 +156,7 @@ impl ImplicitContacts {
 
     /// Collects the joints in contact, from the gaps just measured at the end of the step without contact forces. Returns
     /// whether there are any.
-    pub fn gather(&mut self, model: &Model, contacts: &Contacts, touching: Touching<'_>) -> bool {
+    pub fn gather(&mut self, model: &Model, contacts: &Contacts, touching: ActiveSet<'_>) -> bool {
         self.touches.clear();
         self.right.clear();
         let mut near = false;
@@ -201,7 +201,7 @@ impl ImplicitContacts {
             let (j, n) = (touch.joint, touch.normal);
             let joint = &model.joints[j];
             touch.arm = n;
-            touch.read = contacts.friction_reads(j, &n, equations.motion());
+            touch.read = contacts.slip_velocity(j, &n, equations.motion());
             let sides = contact_sides(joint, &touch.law);
             collect_columns(&mut self.columns[j], model, equations, &sides, &n);
         }

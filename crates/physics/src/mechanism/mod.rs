@@ -40,9 +40,9 @@ pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
 pub use drives::periods_of;
-pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
-use flight::Moving;
-pub use flight::{Flight, Flyer};
+pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, Touch};
+use flight::ActiveRanges;
+pub use flight::{Flight, FreeFlightBody};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use spcmm::Unreachable;
@@ -287,8 +287,8 @@ pub struct Mechanism {
     settled: Option<Settled>,
     /// ns, as by [`bounds::evaluation_time`].
     evaluation_time: f64,
-    flyers: Vec<Flyer>,
-    moving: Moving,
+    free_flight_bodies: Vec<FreeFlightBody>,
+    moving: ActiveRanges,
 }
 
 impl Mechanism {
@@ -336,12 +336,12 @@ impl Mechanism {
             implicit: None,
             assembly: Assembly::default(),
             settled: None,
-            flyers: Vec::new(),
-            moving: Moving::default(),
+            free_flight_bodies: Vec::new(),
+            moving: ActiveRanges::default(),
         };
-        mechanism.flyers = Flyer::all(&mechanism, machine);
-        mechanism.moving = Moving::with_room(mechanism.flyers.len());
-        mechanism.put_to_sleep(|_| false);
+        mechanism.free_flight_bodies = FreeFlightBody::all(&mechanism, machine);
+        mechanism.moving = ActiveRanges::with_room(mechanism.free_flight_bodies.len());
+        mechanism.suspend(|_| false);
         mechanism
     }
 

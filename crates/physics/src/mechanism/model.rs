@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::closed_form::{ClosedForm, ClosedMotion};
-use super::drives::{Course, Law, course_of};
+use super::drives::{Law, Trajectory, trajectory_of};
 use super::factor::{NONE, Pattern};
-use super::spcmm::Trajectory;
+use super::spcmm::SliderTrajectory;
 use crate::jet::Jet;
 use crate::machine::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Quat, StartRule, Vec3};
 
@@ -136,7 +136,7 @@ impl Pair {
 /// A driven coordinate.
 #[derive(Clone, Debug)]
 pub struct DriveLaw {
-    pub course: Course,
+    pub trajectory: Trajectory,
     pub body: BodyIndex,
 }
 
@@ -199,8 +199,8 @@ impl Model {
                 let revolute = freedom.turns();
                 match drive {
                     Some(drive) => {
-                        let course = course_of(drive, revolute);
-                        drives.push(DriveLaw { course, body });
+                        let trajectory = trajectory_of(drive, revolute);
+                        drives.push(DriveLaw { trajectory, body });
                         let drive = drives.len() - 1;
                         Motion::Driven { drive, revolute }
                     }
@@ -284,9 +284,9 @@ impl Model {
             place[body] = at;
         }
 
-        let swings = drives.iter().map(|driven| driven.course.swing(machine));
+        let swings = drives.iter().map(|driven| driven.trajectory.swing(machine));
         let shortest_period = swings.fold(f64::INFINITY, f64::min);
-        let laws = drives.iter().filter_map(|driven| driven.course.law());
+        let laws = drives.iter().filter_map(|driven| driven.trajectory.law());
         let bounding = laws.filter(|law| law.bounds_steps()).cloned().collect();
         let mut model = Self {
             bodies,
@@ -455,9 +455,9 @@ impl Model {
 
     /// Driven coordinate `drive` at `t`.
     pub fn drive(&self, drive: usize, t: f64, closed: Option<&ClosedMotion>) -> Jet {
-        match &self.drives[drive].course {
-            Course::ClosedForm(coordinate) => closed.map_or_else(Jet::default, |motion| motion.driven[*coordinate]),
-            Course::Own(law) => law.at(t),
+        match &self.drives[drive].trajectory {
+            Trajectory::ClosedForm(coordinate) => closed.map_or_else(Jet::default, |motion| motion.driven[*coordinate]),
+            Trajectory::Own(law) => law.at(t),
         }
     }
 
@@ -505,7 +505,7 @@ fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) 
 /// The closed form that `scene` follows, if any.
 fn closed_form_of(machine: &Machine) -> Option<Arc<dyn ClosedForm>> {
     let spcmm = machine.spcmm.as_ref()?;
-    Some(Arc::new(Trajectory::new(spcmm)))
+    Some(Arc::new(SliderTrajectory::new(spcmm)))
 }
 
 fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {

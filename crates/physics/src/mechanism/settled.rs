@@ -2,7 +2,7 @@
 //! does not begin with a drop.
 
 use super::start::Assembly;
-use super::{Mechanism, MechanismError, Touching};
+use super::{ActiveSet, Mechanism, MechanismError};
 use crate::contact::{Coefficients, Parameters, settled_penetration};
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
 
@@ -34,7 +34,7 @@ pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
     let assembly = mechanism.assembly().clone();
     for _ in 0..ROUNDS {
         let mut rate = vec![0.0; state.len()];
-        mechanism.evaluator(Touching::Nothing).evaluate_fully(0.0, &state, &mut rate);
+        mechanism.evaluator(ActiveSet::Nothing).evaluate_fully(0.0, &state, &mut rate);
         for (j, joint) in machine.ball_joints.iter().enumerate() {
             if joint.contact.clearance == 0.0 {
                 continue;

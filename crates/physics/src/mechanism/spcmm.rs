@@ -35,7 +35,7 @@ impl Unreachable {
 
 /// Quantities that depend on the parameters alone.
 #[derive(Clone, Copy, Debug)]
-pub struct Trajectory {
+pub struct SliderTrajectory {
     p: Spcmm,
     cos_gamma: f64,
     sin_gamma: f64,
@@ -43,7 +43,7 @@ pub struct Trajectory {
     socket_plane: f64,
 }
 
-impl Trajectory {
+impl SliderTrajectory {
     /// For these dimensions and amplitudes.
     pub fn new(parameters: &Spcmm) -> Self {
         let (sin_gamma, cos_gamma) = libm::sincos(parameters.gamma);
@@ -92,7 +92,7 @@ impl Trajectory {
     }
 }
 
-impl ClosedForm for Trajectory {
+impl ClosedForm for SliderTrajectory {
     /// Sliders f1, f2, f3, positive outward; the platform is turned by R = Rx(0) Rz(beta) Ry(gamma), gamma constant, so that
     /// it turns at the rate of beta about Z. NaN where a rod is too short.
     fn at(&self, t: f64) -> ClosedMotion {
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn anchors_of_the_contract_hold() {
-        let ideal = Trajectory::new(&paper()).at(0.0);
+        let ideal = SliderTrajectory::new(&paper()).at(0.0);
         let expected = [
             (0.1364935480, -0.11575599, -0.13201567),
             (0.2409227735, -0.04964883, -0.0671871),
@@ -185,7 +185,7 @@ mod tests {
         }
         // The reference trajectories' first row; 0.143 m tan(pi / 12).
         assert!((ideal.position[2].value + 0.0383167345177).abs() < 1e-12);
-        let half = Trajectory::new(&paper()).at(0.5);
+        let half = SliderTrajectory::new(&paper()).at(0.5);
         for (f, value) in half.driven.iter().zip([0.0902403840, 0.2210909323, 0.1575618239]) {
             assert!((f.value - value).abs() < 1e-10, "{f:?}");
         }
@@ -195,14 +195,14 @@ mod tests {
     fn square_roots_stay_real_in_the_range_the_contract_gives() {
         for (socket_plane, reachable) in [(0.041518, true), (0.041516, false), (0.364482, true), (0.364484, false)] {
             let p = Spcmm { slider_plane: socket_plane - 0.028, ..paper() };
-            assert_eq!(Trajectory::new(&p).check().is_ok(), reachable, "x_s = {socket_plane}");
+            assert_eq!(SliderTrajectory::new(&p).check().is_ok(), reachable, "x_s = {socket_plane}");
         }
     }
 
     #[test]
     fn names_the_slider_whose_rod_is_too_short() {
         let p = Spcmm { slider_plane: 0.0, ..paper() };
-        let Err(MechanismError::Unreachable(error)) = Trajectory::new(&p).check() else {
+        let Err(MechanismError::Unreachable(error)) = SliderTrajectory::new(&p).check() else {
             panic!("the rod is long enough");
         };
         assert_eq!(error.slider, 1);

@@ -8,9 +8,9 @@
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
-use super::elements::{At, Coupling, ForceElement, SceneElement, Touching, Turning};
+use super::elements::{ActiveSet, At, Coupling, ForceElement, SceneElement, Turning};
 use super::equations::Equations;
-use super::flight::Moving;
+use super::flight::ActiveRanges;
 use super::kinematics::Kinematics;
 use super::lu::Lu;
 use super::model::{BallJoint, Model};
@@ -121,7 +121,7 @@ impl Stiff {
         model: &Model,
         contacts: &Contacts,
         elements: &[Box<dyn SceneElement>],
-        touching: Touching<'_>,
+        touching: ActiveSet<'_>,
         equations: &dyn Equations,
         (t, y): (f64, &[f64]),
     ) {
@@ -187,7 +187,7 @@ impl Stiff {
         &mut self,
         contacts: &Contacts,
         elements: &[Box<dyn SceneElement>],
-        touching: Touching<'_>,
+        touching: ActiveSet<'_>,
         motion: &[Kinematics],
     ) {
         let of_contacts = contacts.loose().map(|contact| {
@@ -337,7 +337,7 @@ impl Stiff {
     }
 
     /// Solves (s I - J) x = b in place, for the components that move.
-    pub fn solve(&mut self, b: &mut [f64], moving: &Moving, equations: &dyn Equations, model: &Model) {
+    pub fn solve(&mut self, b: &mut [f64], moving: &ActiveRanges, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let s = self.shift;
         if self.empty {
@@ -372,7 +372,7 @@ impl Stiff {
         &mut self,
         re: &mut [f64],
         im: &mut [f64],
-        moving: &Moving,
+        moving: &ActiveRanges,
         equations: &dyn Equations,
         model: &Model,
     ) {
@@ -443,7 +443,7 @@ mod tests {
     use crate::contact::Memory;
     use crate::integrate::{StiffSystem, System};
     use crate::machine::Vec3;
-    use crate::mechanism::{Mechanism, Touching};
+    use crate::mechanism::{ActiveSet, Mechanism};
     use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
@@ -479,7 +479,7 @@ mod tests {
             m.measure(t, &y);
             let rises = m.contacts.gaps().all(|gap| gap.separation.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
-            let touching = Touching::Located(&memory);
+            let touching = ActiveSet::Located(&memory);
             m.evaluator(touching).linearise(t, &y);
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
@@ -579,7 +579,7 @@ mod tests {
             for formulation in ["tree", "lagrange"] {
                 let (mut m, y) = linked(elements, formulation);
                 let (t, nq) = (0.1, m.positions());
-                m.evaluator(Touching::Nothing).linearise(t, &y);
+                m.evaluator(ActiveSet::Nothing).linearise(t, &y);
                 let stiff = m.stiff.take().unwrap();
                 let n = stiff.n;
                 let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
@@ -601,20 +601,20 @@ mod tests {
                     for (of, sign) in [(&mut plus, 1e-6), (&mut minus, -1e-6)] {
                         let mut z = y.clone();
                         displace(&m, formulation, &mut z, l, sign);
-                        m.evaluator(Touching::Nothing).derivative(t, &z, of);
+                        m.evaluator(ActiveSet::Nothing).derivative(t, &z, of);
                     }
                     let column = &stiff.by_position[l * n..][..n];
                     check(format!("K{l}"), column, &plus, &minus, stiffest);
                     for (of, sign) in [(&mut plus, 1e-6), (&mut minus, -1e-6)] {
                         let mut z = y.clone();
                         z[nq + l] += sign;
-                        m.evaluator(Touching::Nothing).derivative(t, &z, of);
+                        m.evaluator(ActiveSet::Nothing).derivative(t, &z, of);
                     }
                     let column = &stiff.by_velocity[l * n..][..n];
                     check(format!("D{l}"), column, &plus, &minus, dampest);
                 }
-                m.evaluator(Touching::Nothing).derivative(t + 1e-6, &y, &mut plus);
-                m.evaluator(Touching::Nothing).derivative(t - 1e-6, &y, &mut minus);
+                m.evaluator(ActiveSet::Nothing).derivative(t + 1e-6, &y, &mut plus);
+                m.evaluator(ActiveSet::Nothing).derivative(t - 1e-6, &y, &mut minus);
                 // Speeds are some mm/s.
                 let rates = 1e-2 * stiffest;
                 check("ft".to_owned(), &stiff.time_derivative[nq..], &plus, &minus, rates);

@@ -1,7 +1,7 @@
 //! The equations of motion in the form required by the steppers.
 
+use super::elements::{ActiveSet, Counts};
 use super::elements::{At, Loads};
-use super::elements::{Counts, Touching};
 use super::implicit::TURNS;
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
@@ -11,14 +11,14 @@ use std::ops::Range;
 /// The equations of motion, with what decides over a step which contacts carry a force.
 pub struct Evaluator<'a> {
     mechanism: &'a mut Mechanism,
-    touching: Touching<'a>,
+    touching: ActiveSet<'a>,
     /// Counts of the evaluations made through it.
     pub counts: Counts,
 }
 
 impl Mechanism {
     /// The equations of motion, with what decides which contacts carry a force.
-    pub fn evaluator<'a>(&'a mut self, touching: Touching<'a>) -> Evaluator<'a> {
+    pub fn evaluator<'a>(&'a mut self, touching: ActiveSet<'a>) -> Evaluator<'a> {
         Evaluator { mechanism: self, touching, counts: Counts::default() }
     }
 }
@@ -157,20 +157,20 @@ impl StiffSystem for Evaluator<'_> {
 }
 
 /// The equations of motion of which friction alone is linearised.
-pub struct FrictionAlone<'e, 'a>(&'e mut Evaluator<'a>);
+pub struct FrictionJacobian<'e, 'a>(&'e mut Evaluator<'a>);
 
 impl<'a> FrictionSystem for Evaluator<'a> {
     type Part<'e>
-        = FrictionAlone<'e, 'a>
+        = FrictionJacobian<'e, 'a>
     where
         Self: 'e;
 
-    fn friction_alone(&mut self) -> FrictionAlone<'_, 'a> {
-        FrictionAlone(self)
+    fn friction_alone(&mut self) -> FrictionJacobian<'_, 'a> {
+        FrictionJacobian(self)
     }
 }
 
-impl System for FrictionAlone<'_, '_> {
+impl System for FrictionJacobian<'_, '_> {
     fn dimension(&self) -> usize {
         self.0.dimension()
     }
@@ -196,7 +196,7 @@ impl System for FrictionAlone<'_, '_> {
     }
 }
 
-impl StiffSystem for FrictionAlone<'_, '_> {
+impl StiffSystem for FrictionJacobian<'_, '_> {
     fn linearise(&mut self, t: f64, y: &[f64]) {
         let Some(mut friction) = self.0.mechanism.friction.take() else {
             return;
@@ -239,7 +239,7 @@ impl StiffSystem for FrictionAlone<'_, '_> {
 
 impl ContactSystem for Evaluator<'_> {
     fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        let touching = std::mem::replace(&mut self.touching, Touching::Nothing);
+        let touching = std::mem::replace(&mut self.touching, ActiveSet::Nothing);
         self.derivative(t, y, dy);
         self.touching = touching;
     }

@@ -111,7 +111,7 @@ impl Tree {
     }
 
     /// Lets evaluations leave out the free bodies, each a tree of its own, for which `asleep` holds.
-    pub fn put_to_sleep(&mut self, asleep: impl Fn(BodyIndex) -> bool) {
+    pub fn suspend(&mut self, asleep: impl Fn(BodyIndex) -> bool) {
         self.awake.clear();
         self.asleep.clear();
         for &b in &self.dynamic {

@@ -214,7 +214,7 @@ impl Account {
     }
 
     /// Books a change of parameters that leaves the motion unchanged: `energies` are those with the new ones.
-    pub(super) fn book_change(&mut self, energies: Energies) {
+    pub(super) fn record_change(&mut self, energies: Energies) {
         let (ledger, before) = &mut self.now;
         let jump = energies.elastic - before.elastic;
         ledger.change_work += jump;
@@ -359,7 +359,7 @@ mod tests {
         let half = account.within(0.5, 1.0, at(1.5, 0.5));
         assert_eq!((half.residual(), half.drive_work), (0.0, 1.0));
         // 4 J of elastic energy from a stiffer contact.
-        account.book_change(Energies { kinetic: 2.75, gravitational: 7.0, elastic: 4.0, in_contacts: 4.0 });
+        account.record_change(Energies { kinetic: 2.75, gravitational: 7.0, elastic: 4.0, in_contacts: 4.0 });
         assert_eq!(account.ledger().change_work, 4.0);
         assert_eq!(account.ledger().residual(), -0.25);
     }

@@ -27,7 +27,7 @@ pub use load_peaks::{LoadPeak, LoadPeaks};
 pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
 pub use simulation::ideal::{ProbeFault, closed};
 pub use simulation::live::ChangeError;
-pub use simulation::saved::{Misfit, SavedState};
+pub use simulation::saved::{SavedState, StateMismatch};
 pub use simulation::{CLEARANCE_SPEED, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
@@ -60,7 +60,7 @@ pub enum Effect {
 /// Forces that the motion does not determine, because ideal joints constrain a direction redundantly: the values reported
 /// are the least-squares reactions and what follows from them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct NotUnique {
+pub struct Indeterminate {
     /// Ball joints, by index; joints that close loops count after them.
     pub reactions: Vec<usize>,
     /// Actuators, by index among the driven joints.

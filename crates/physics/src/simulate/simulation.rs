@@ -25,15 +25,15 @@ use std::sync::Arc;
 use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
-use super::stepper::{AnyStepper, Member};
-use super::{Frame, LoadPeaks, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
+use super::stepper::{ActiveScheme, AnyStepper};
+use super::{Frame, Indeterminate, LoadPeaks, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
 use crate::machine::Machine;
-use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, Touching};
+use crate::mechanism::{ActiveSet, Counts, Flight, Mechanism, MechanismError, Pull, Ramp};
 use adaptive::Whole;
-use automatic::{Choice, controller_of, prepare_implicit};
-use corners::Piece;
+use automatic::{SchemeSelector, controller_of, prepare_implicit};
+use corners::LawBranch;
 use flights::{clear_flights, put_flights};
 use ideal::{ProbeFault, Reference};
 
@@ -121,7 +121,7 @@ struct Attempt {
     /// Joint whose contact starts or ends at the step's end.
     located: Option<usize>,
     /// Joint that moves to another piece of a law there.
-    corner: Option<(usize, Piece)>,
+    corner: Option<(usize, LawBranch)>,
     /// If steps end at edges of elements, how the elements are pressed over it, as by [`Mechanism::pressed`].
     sides: Vec<f64>,
     /// It ends at an edge.
@@ -174,9 +174,9 @@ struct Control {
     chatter: u32,
     chatters: bool,
     /// Which member of the automatic choice steps.
-    member: Member,
+    member: ActiveScheme,
     /// What the automatic choice goes by.
-    choice: Choice,
+    choice: SchemeSelector,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
     grid_origin: f64,
@@ -211,9 +211,9 @@ impl Control {
             contact_began: false,
             chatter: 0,
             chatters: false,
-            member: Member::Explicit,
-            choice: Choice::default(),
-            controller: controller_of(machine.solver.method, Member::Explicit),
+            member: ActiveScheme::Explicit,
+            choice: SchemeSelector::default(),
+            controller: controller_of(machine.solver.method, ActiveScheme::Explicit),
             grid_origin: 0.0,
             grid_count: 0,
         }
@@ -231,7 +231,7 @@ impl State {
             ramps: vec![None; joints],
             clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
             pull: None,
-            flights: vec![None; mechanism.flyers().len()],
+            flights: vec![None; mechanism.free_flight_bodies().len()],
             control: Control::new(machine),
             record: Record {
                 account: Account::default(),
@@ -277,7 +277,7 @@ impl Simulation {
         }
         simulation.track_peaks(0.0);
         simulation.track_reactions();
-        simulation.open_account();
+        simulation.start_ledger();
         simulation.state.record.starts_inside = simulation.deepest_in_stop();
         Ok(simulation)
     }
@@ -333,11 +333,11 @@ impl Simulation {
     /// Recomputes derivative and gaps after anything but a step changed the state; discards the previous step.
     fn refresh(&mut self) {
         self.end_flights();
-        self.hold_pieces(true);
+        self.freeze_branches(true);
         let located = self.locates();
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
-        let touching = Touching::by(located, &now.memory);
+        let touching = ActiveSet::by(located, &now.memory);
         let mut evaluator = mechanism.evaluator(touching);
         evaluator.derivative(now.t, &now.y, &mut now.k);
         mechanism.complete_gaps(touching, &now.y);
@@ -472,7 +472,7 @@ impl Simulation {
         let StepEnd { t, y, k, memory, .. } = &state.now;
         mechanism.contacts.forget_left_pieces();
         mechanism.hold_elements(&attempt.sides);
-        let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
         let end = &mut attempt.end;
         let tolerance = machine.solver.tolerance;
         let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance);
@@ -488,7 +488,7 @@ impl Simulation {
         let located = self.locates();
         let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
-        let mut evaluator = mechanism.evaluator(Touching::by(located, &state.now.memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.now.memory));
         evaluator.derivative(t_end, &end.y, &mut end.k);
         attempt.counts += evaluator.counts;
         self.finish_gaps(t_end);
@@ -496,7 +496,7 @@ impl Simulation {
 
     /// What flies, and gaps, at the end `t_end` of the step being taken, after an evaluation there.
     fn finish_gaps(&mut self, t_end: f64) {
-        let touching = Touching::by(self.locates(), &self.state.now.memory);
+        let touching = ActiveSet::by(self.locates(), &self.state.now.memory);
         let end = &mut self.attempt.end;
         put_flights(&self.mechanism, &self.state.flights, t_end, &mut end.y);
         clear_flights(&self.mechanism, &self.state.flights, &mut end.k);
@@ -546,7 +546,7 @@ impl Simulation {
         // Beyond the pose the loops may close again on another branch.
         let passed = self.mechanism.is_determinant_positive() != self.state.record.determinant_positive
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
-        let fault = if passed { Some(StopFault::SingularLoops) } else { self.objection(open, h) };
+        let fault = if passed { Some(StopFault::SingularLoops) } else { self.divergence(open, h) };
         if let Some(fault) = fault {
             let solver = &self.machine.solver;
             let advice = if passed || open.is_nan() || open > OPEN_LOOP {
@@ -578,7 +578,7 @@ impl Simulation {
         if !again && !located {
             self.track_reactions();
         }
-        self.book_step(h, switched.contacts || switched.forces);
+        self.record_step(h, switched.contacts || switched.forces);
         self.pass_corner();
         // The force now depends on the approach speed just found. Where no step needs the derivative at its end, the
         // reactions of ideal joints still do.
@@ -586,7 +586,7 @@ impl Simulation {
             let Self { mechanism, state, scratch_k, .. } = self;
             let StepEnd { t, y, k, memory, .. } = &mut state.now;
             let rate = if mean_rates { scratch_k } else { k };
-            let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
             evaluator.derivative(*t, y, rate);
             let counts = evaluator.counts;
             mechanism.forget_evaluation();
@@ -611,10 +611,10 @@ impl Simulation {
     }
 
     /// Forces at the latest state that the motion does not determine.
-    pub fn not_unique(&mut self) -> NotUnique {
+    pub fn not_unique(&mut self) -> Indeterminate {
         self.sample(self.state.now.t, &mut Frame::default());
         let mechanism = &mut self.mechanism;
-        NotUnique {
+        Indeterminate {
             reactions: (0..mechanism.cut_joints()).filter(|&j| !mechanism.is_reaction_unique(j)).collect(),
             actuators: (0..mechanism.drives()).filter(|&i| !mechanism.is_actuator_unique(i)).collect(),
         }

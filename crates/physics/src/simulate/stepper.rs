@@ -20,13 +20,13 @@ pub(super) enum AnyStepper {
         explicit: DormandPrince,
         friction: Box<Rosenbrock>,
         stiff: Box<Radau>,
-        member: Member,
+        member: ActiveScheme,
     },
 }
 
 /// Which method steps where the choice is automatic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Member {
+pub(super) enum ActiveScheme {
     /// Dormand-Prince.
     #[default]
     Explicit,
@@ -49,13 +49,13 @@ impl AnyStepper {
                 explicit: DormandPrince::new(dimension),
                 friction: Box::new(Rosenbrock::new(dimension)),
                 stiff: Box::new(Radau::new(dimension)),
-                member: Member::Explicit,
+                member: ActiveScheme::Explicit,
             },
         }
     }
 
     /// Puts a member of the automatic choice in charge.
-    pub(super) fn choose(&mut self, chosen: Member) {
+    pub(super) fn choose(&mut self, chosen: ActiveScheme) {
         if let Self::Automatic { member, .. } = self {
             *member = chosen;
         }
@@ -92,7 +92,7 @@ impl AnyStepper {
     /// Largest factor for the step after the latest attempt, besides what its error allows.
     pub(super) fn growth(&self) -> f64 {
         match self {
-            Self::Radau(s) | Self::Automatic { stiff: s, member: Member::Implicit, .. } => s.growth(),
+            Self::Radau(s) | Self::Automatic { stiff: s, member: ActiveScheme::Implicit, .. } => s.growth(),
             _ => f64::INFINITY,
         }
     }
@@ -100,7 +100,7 @@ impl AnyStepper {
     /// How often the latest attempt factored the matrices of all coordinates, if it did so to step with the automatic choice.
     pub(super) fn factorisations(&self) -> u32 {
         match self {
-            Self::Automatic { stiff, member: Member::Implicit, .. } => stiff.factorisations(),
+            Self::Automatic { stiff, member: ActiveScheme::Implicit, .. } => stiff.factorisations(),
             _ => 0,
         }
     }
@@ -108,7 +108,7 @@ impl AnyStepper {
     /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
     pub(super) fn stiffness<S: System>(&self, system: &S, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
-            Self::DormandPrince(explicit) | Self::Automatic { explicit, member: Member::Explicit, .. } => {
+            Self::DormandPrince(explicit) | Self::Automatic { explicit, member: ActiveScheme::Explicit, .. } => {
                 explicit.stiffness(system.moving(), h, y_end, k_end)
             }
             _ => 0.0,
@@ -130,11 +130,11 @@ impl AnyStepper {
             Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::ImexEuler(s) => s.attempt(system, t, h, y, y_end),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: Member::Explicit, .. } => {
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
                 s.attempt(system, t, h, y, k, y_end, k_end)
             }
             Self::Rosenbrock(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::Automatic { friction: s, member: Member::Friction, .. } => {
+            Self::Automatic { friction: s, member: ActiveScheme::Friction, .. } => {
                 s.attempt(&mut system.friction_alone(), t, h, y, k, y_end, k_end)
             }
             Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.attempt(system, t, h, y, k, y_end, k_end, tolerance),
@@ -145,7 +145,7 @@ impl AnyStepper {
     /// own nodes, between which its polynomial departs from stiff contacts.
     pub(super) fn interior(&self) -> &'static [f64] {
         match self {
-            Self::Radau(_) | Self::Automatic { member: Member::Implicit, .. } => &Radau::INTERIOR,
+            Self::Radau(_) | Self::Automatic { member: ActiveScheme::Implicit, .. } => &Radau::INTERIOR,
             _ => &[0.5],
         }
     }
@@ -154,7 +154,7 @@ impl AnyStepper {
     pub(super) fn quadrature(&self) -> &'static [f64] {
         const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
         match self {
-            Self::Radau(_) | Self::Automatic { member: Member::Implicit, .. } => &RADAU,
+            Self::Radau(_) | Self::Automatic { member: ActiveScheme::Implicit, .. } => &RADAU,
             _ => &[0.0, 0.5, 1.0],
         }
     }
@@ -162,15 +162,17 @@ impl AnyStepper {
     /// Ends the latest attempt at fraction `theta` of it, on its interpolant.
     pub(super) fn truncate(&mut self, theta: f64) {
         match self {
-            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: Member::Explicit, .. } => s.truncate(theta),
-            Self::Radau(s) | Self::Automatic { stiff: s, member: Member::Implicit, .. } => s.truncate(theta),
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
+                s.truncate(theta)
+            }
+            Self::Radau(s) | Self::Automatic { stiff: s, member: ActiveScheme::Implicit, .. } => s.truncate(theta),
             _ => {}
         }
     }
 
     /// Whether the interpolant is about as accurate as the step's error estimate.
     pub(super) fn ends_on_interpolant(&self) -> bool {
-        matches!(self, Self::DormandPrince(_) | Self::Automatic { member: Member::Explicit, .. })
+        matches!(self, Self::DormandPrince(_) | Self::Automatic { member: ActiveScheme::Explicit, .. })
     }
 
     /// Whether `attempt` provides the derivative at the end.
@@ -200,11 +202,11 @@ impl AnyStepper {
             | Self::ImexEuler(_)
             | Self::RungeKutta4(_)
             | Self::Rosenbrock(_)
-            | Self::Automatic { member: Member::Friction, .. } => {
+            | Self::Automatic { member: ActiveScheme::Friction, .. } => {
                 let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
                 hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
             }
-            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: Member::Explicit, .. } => {
+            Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
                 s.interpolate(part, theta, h, y, k, out)
             }
             Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.interpolate(part, theta, y, out),

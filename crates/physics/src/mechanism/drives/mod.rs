@@ -48,7 +48,7 @@ pub trait Law: Debug + Send + Sync {
 
 /// What a driven coordinate follows.
 #[derive(Clone, Debug)]
-pub enum Course {
+pub enum Trajectory {
     /// This coordinate of the scene's closed form.
     ClosedForm(usize),
     /// A law of its own.
@@ -62,9 +62,9 @@ const NEAR: f64 = 1e-9;
 const PARTS: f64 = 50.0;
 
 /// What a coordinate with this `drive` follows, an angle if it `turns`.
-pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
-    Course::Own(match drive {
-        Drive::ClosedForm(coordinate) => return Course::ClosedForm(*coordinate),
+pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
+    Trajectory::Own(match drive {
+        Drive::ClosedForm(coordinate) => return Trajectory::ClosedForm(*coordinate),
         Drive::Constant { position, velocity } => Arc::new(Line { position: *position, velocity: *velocity, turns }),
         Drive::Harmonic { mean, terms } => Arc::new(Harmonics::new(*mean, terms)),
         Drive::Ramp { from, to, start, duration } => {
@@ -85,20 +85,20 @@ pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
 pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
     let drives = machine.joints.iter().flat_map(Joint::drives);
     let of_drives = drives.map(|(freedom, drive)| {
-        let course = course_of(drive, freedom.turns());
-        course.law().map_or_else(|| closed_period(machine), |law| law.period())
+        let trajectory = trajectory_of(drive, freedom.turns());
+        trajectory.law().map_or_else(|| closed_period(machine), |law| law.period())
     });
     let of_elements = machine.elements.iter().map(|element| match &element.kind {
         ElementKind::Load(load) => 1.0 / load.frequency,
         _ => element.law().map_or(f64::INFINITY, |law| {
-            let course = course_of(law, element.is_on_hinge());
-            course.law().map_or(f64::INFINITY, |law| law.period())
+            let trajectory = trajectory_of(law, element.is_on_hinge());
+            trajectory.law().map_or(f64::INFINITY, |law| law.period())
         }),
     });
     of_drives.chain(of_elements)
 }
 
-impl Course {
+impl Trajectory {
     /// Its own law, if it has one.
     pub fn law(&self) -> Option<&Arc<dyn Law>> {
         match self {

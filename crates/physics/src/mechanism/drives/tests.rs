@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::{Course, Law, NEAR, course_of, periods_of};
+use super::{Law, NEAR, Trajectory, periods_of, trajectory_of};
 use crate::scene::Scene;
 
 /// A body of 1 kg on a slide along x with this drive.
@@ -20,9 +20,9 @@ fn scene(drive: &str) -> Scene {
 fn law(drive: &str) -> Arc<dyn Law> {
     let joint = &scene(drive).machine.joints[0];
     let (freedom, drive) = joint.drives().next().expect("driven");
-    match course_of(drive, freedom.turns()) {
-        Course::Own(law) => law,
-        Course::ClosedForm(_) => panic!("a law of its own"),
+    match trajectory_of(drive, freedom.turns()) {
+        Trajectory::Own(law) => law,
+        Trajectory::ClosedForm(_) => panic!("a law of its own"),
     }
 }
 

@@ -5,7 +5,7 @@
 //! rotations up to half a turn: both forces act at the second point, and the torque is -J^-T L theta, J the matrix that makes
 //! the relative angular velocity of the rate of theta. About one axis that is -L theta.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, Turning, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, Turning, push};
 use crate::machine::{self, Mat3, Quat, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::{Kinematics, quaternion_of};
@@ -39,7 +39,7 @@ struct State {
     spin: Vec3,
 }
 
-pub(super) fn make(bushing: &machine::Bushing, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(bushing: &machine::Bushing, site: &Mount<'_>) -> Box<dyn SceneElement> {
     let matrix = |rotation: Quat| rotation.to_rotation_matrix().into_inner();
     Box::new(Bushing {
         from: site.anchors[0],

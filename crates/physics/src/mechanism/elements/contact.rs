@@ -1,6 +1,6 @@
 //! Ball joint with clearance: contact between a ball and the wall of its socket, by the laws in `contact`.
 
-use super::{At, Coupling, ForceElement, Loads, Touching};
+use super::{ActiveSet, At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation, Slope};
 use crate::machine::Vec3;
 use crate::mechanism::columns::contact_sides;
@@ -50,7 +50,7 @@ impl Contact {
 
     /// Whether it may carry a force.
     #[inline]
-    pub fn may_press(&self, touching: Touching<'_>) -> bool {
+    pub fn may_press(&self, touching: ActiveSet<'_>) -> bool {
         touching.memory(self.index).is_some()
     }
 
@@ -98,9 +98,9 @@ impl Contact {
 
     /// Relative velocity used by friction for the normal `n`, m/s.
     #[inline]
-    pub fn friction_reads(&self, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
+    pub fn slip_velocity(&self, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
         let [ball, socket] = self.spins(motion);
-        self.law.friction_reads(n, &self.gap.eccentricity_rate, ball, socket)
+        self.law.slip_velocity(n, &self.gap.eccentricity_rate, ball, socket)
     }
 
     /// Measures eccentricity and its rate; forces stay.
@@ -144,7 +144,7 @@ impl ForceElement for Contact {
             counts.friction += 1;
             let spin = |anchor: &Anchor| &at.motion[anchor.body].angular_velocity;
             let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
-            law.friction_reads(&separation.normal, &velocity, ball, socket)
+            law.slip_velocity(&separation.normal, &velocity, ball, socket)
         });
         self.left_piece |= law.leaves_piece(memory, &separation, &force);
         gap.normal_force = force.normal;
@@ -174,12 +174,12 @@ impl ForceElement for Contact {
         let memory = at.touching.memory(self.index);
         let memory = memory.filter(|_| gap.normal_force > 0.0)?;
         let n = gap.separation.normal;
-        let read = self.friction_reads(&n, at.motion);
+        let read = self.slip_velocity(&n, at.motion);
         let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
         let mut stiffness =
             self.law.linearise(memory, &gap.separation, &gap.eccentricity_rate, &read, &force, Slope::Tangent);
         let [ball, socket] = self.spins(at.motion);
-        stiffness.add_turning_read(&self.law.friction_reads_by_normal(ball, socket));
+        stiffness.add_normal_rotation(&self.law.slip_velocity_by_normal(ball, socket));
         Some(Coupling {
             sides: contact_sides(&self.joint, &self.law),
             normal: n,

@@ -3,7 +3,7 @@
 
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::elastic::Elastic;
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement};
 use crate::machine::{self, SpringSide};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -16,7 +16,7 @@ struct JointSpring {
     damping: f64,
 }
 
-pub(super) fn make(spring: &machine::JointSpring, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(spring: &machine::JointSpring, site: &Mount<'_>) -> Box<dyn SceneElement> {
     Box::new(JointSpring {
         on: site.coordinate(),
         position: spring.position,

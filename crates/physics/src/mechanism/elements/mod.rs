@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::drives::{Law, course_of};
+use super::drives::{Law, trajectory_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
@@ -30,7 +30,7 @@ pub use pull::Pull;
 
 /// What decides which contacts carry a force.
 #[derive(Clone, Copy, Debug)]
-pub enum Touching<'a> {
+pub enum ActiveSet<'a> {
     /// The contact memory: the stepper locates the events at which it changes.
     Located(&'a [Memory]),
     /// Penetration, at every evaluation: for steppers without event location.
@@ -39,7 +39,7 @@ pub enum Touching<'a> {
     Nothing,
 }
 
-impl<'a> Touching<'a> {
+impl<'a> ActiveSet<'a> {
     /// By the memory if events are `located`, else by penetration.
     pub fn by(located: bool, memory: &'a [Memory]) -> Self {
         if located { Self::Located(memory) } else { Self::Immediate(memory) }
@@ -80,7 +80,7 @@ impl std::ops::AddAssign for Counts {
 pub(super) struct At<'a> {
     pub t: f64,
     pub motion: &'a [Kinematics],
-    pub touching: Touching<'a>,
+    pub touching: ActiveSet<'a>,
 }
 
 /// What elements add to in an evaluation.
@@ -265,13 +265,13 @@ pub(super) trait SceneElement: ForceElement {
 }
 
 /// Where an element of the scene acts.
-struct Site<'a> {
+struct Mount<'a> {
     /// Its points.
     anchors: &'a [Anchor],
     coordinate: Option<Coordinate>,
 }
 
-impl Site<'_> {
+impl Mount<'_> {
     /// That of the joint it acts on: only for kinds that do.
     fn coordinate(&self) -> Coordinate {
         self.coordinate.expect("a kind that acts on a joint")
@@ -283,7 +283,7 @@ pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn Scene
     let make = |element: &Element| {
         let anchors: Vec<Anchor> = element.points.iter().map(|point| model.anchor(machine, point)).collect();
         let coordinate = element.coordinate().map(|on| Coordinate::of(machine, on, &anchors));
-        let site = Site { anchors: &anchors, coordinate };
+        let site = Mount { anchors: &anchors, coordinate };
         match &element.kind {
             ElementKind::Spring(spring) => spring::make(spring, &site),
             ElementKind::Load(load) => load::make(load, &site),
@@ -306,7 +306,7 @@ pub(super) fn hand(machine: &Machine, model: &Model, pull: Pull) -> Box<dyn Scen
 
 /// The law of time that an element follows, of an angle if it `turns`.
 fn law_of(drive: Option<&Drive>, turns: bool) -> Option<Arc<dyn Law>> {
-    course_of(drive?, turns).law().cloned()
+    trajectory_of(drive?, turns).law().cloned()
 }
 
 /// Position and velocity of a point, m and m/s, and its arm from the centroid.

@@ -2,7 +2,7 @@
 //! coordinate. Its work is a drive's.
 
 use super::coordinate::{Coordinate, Place, Slopes};
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, law_of};
 use crate::jet::Jet;
 use crate::machine;
 use crate::mechanism::Powers;
@@ -20,7 +20,7 @@ struct Motor {
     target: Option<Arc<dyn Law>>,
 }
 
-pub(super) fn make(motor: &machine::Motor, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(motor: &machine::Motor, site: &Mount<'_>) -> Box<dyn SceneElement> {
     Box::new(Motor {
         on: site.coordinate(),
         force: motor.force,

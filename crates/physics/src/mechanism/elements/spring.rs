@@ -2,7 +2,7 @@
 //! a curve over l - length in place of the first two, or what is left of it where it only pushes or only pulls.
 
 use super::elastic::Elastic;
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, point_of, push};
 use crate::machine::{self, Mat3, SpringSide, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -37,7 +37,7 @@ struct State {
     slack: bool,
 }
 
-pub(super) fn make(spring: &machine::Spring, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(spring: &machine::Spring, site: &Mount<'_>) -> Box<dyn SceneElement> {
     Box::new(Spring {
         from: site.anchors[0],
         to: site.anchors[1],

@@ -5,7 +5,7 @@
 //! requested restitution, whatever moves; a slower one with more.
 
 use super::coordinate::{Coordinate, Place, Slopes};
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement};
 use crate::contact::{NormalLaw, damping_factor};
 use crate::machine;
 use crate::mechanism::Powers;
@@ -41,7 +41,7 @@ struct Press {
     force: f64,
 }
 
-pub(super) fn make(stop: &machine::Stop, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(stop: &machine::Stop, site: &Mount<'_>) -> Box<dyn SceneElement> {
     let machine::Stop { lower, upper, depth, .. } = *stop;
     let middle = match (lower.is_finite(), upper.is_finite()) {
         (true, true) => 0.5 * (lower + upper),

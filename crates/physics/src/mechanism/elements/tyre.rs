@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of, point_of, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, law_of, point_of, push};
 use crate::jet::Jet;
 use crate::machine::{self, Mat3, Vec3};
 use crate::mechanism::Powers;
@@ -37,7 +37,7 @@ struct State {
     force: f64,
 }
 
-pub(super) fn make(tyre: &machine::Tyre, site: &Site<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(tyre: &machine::Tyre, site: &Mount<'_>) -> Box<dyn SceneElement> {
     Box::new(Tyre {
         on: site.anchors[0],
         up: tyre.up,

@@ -1,12 +1,12 @@
 //! Steps whose size follows the error estimate, cut at the first contact start or end inside them.
 
 use super::automatic::STABILITY_LIMIT;
-use super::corners::Piece;
+use super::corners::LawBranch;
 use super::{LONGEST_STEP, NEARLY, Simulation, edges, shortest_step};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
-use crate::simulate::stepper::Member;
+use crate::simulate::stepper::ActiveScheme;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
 
 /// Shortest first step after a contact begins, s.
@@ -88,7 +88,7 @@ impl Simulation {
     fn allowed_error(&self) -> f64 {
         let solver = &self.machine.solver;
         let allowed = match (solver.method, self.state.control.member) {
-            (Method::Automatic, Member::Explicit) => solver.tolerance.min(OF_IMPACTS),
+            (Method::Automatic, ActiveScheme::Explicit) => solver.tolerance.min(OF_IMPACTS),
             _ => solver.tolerance,
         };
         let presses = self.mechanism.presses_vertically(&self.attempt.sides);
@@ -124,7 +124,7 @@ impl Simulation {
                 growth.clamp(AFTER_FAILURE.0, AFTER_FAILURE.1)
             };
             state.control.h_next = h * factor;
-            if error > BLOWN_UP && self.turn_to_friction() {
+            if error > BLOWN_UP && self.try_friction_scheme() {
                 self.state.control.h_next = h;
             }
             return None;
@@ -175,7 +175,7 @@ impl Simulation {
             h *= theta;
         } else if let Some(corner) = corner {
             // The whole step worked; a rate that stops rising soon after the contact began is no evidence against it.
-            if contact_began && matches!(corner.next, Piece::Approach(_)) {
+            if contact_began && matches!(corner.next, LawBranch::Approach(_)) {
                 self.state.control.h_contact = next.max(SHORTEST_FIRST);
             }
             self.attempt.located = None;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Simulation, shortest_step};
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{LARGEST_DENSE, Mechanism, MechanismError};
-use crate::simulate::stepper::Member;
+use crate::simulate::stepper::ActiveScheme;
 
 /// h |lambda| beyond which an explicit step is limited by stability.
 pub(super) const STABILITY_LIMIT: f64 = 3.0;
@@ -58,7 +58,7 @@ impl Trial {
     }
 
     /// Ends it; whether it failed, beside steps with this progress per cost.
-    fn judge(&mut self, before: f64) -> bool {
+    fn conclude_trial(&mut self, before: f64) -> bool {
         let fails = self.progress < WORTH_IT * before * self.cost;
         if fails {
             let turn = EXPLICIT_TURN * self.cost / EXPLICIT_COST;
@@ -78,7 +78,7 @@ impl Trial {
 
 /// State of the automatic choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Choice {
+pub(super) struct SchemeSelector {
     /// Steps other than implicit ones since the latest contact began, and how many of them were limited by stability.
     since_contact: u32,
     limited: u32,
@@ -92,7 +92,7 @@ pub(super) struct Choice {
     implicit: Trial,
 }
 
-impl Choice {
+impl SchemeSelector {
     /// Progress per cost of the latest steps other than implicit ones.
     fn explicit(&self) -> f64 {
         self.explicit_progress / self.explicit_cost
@@ -113,14 +113,14 @@ impl Simulation {
             && touching().all(undamped)
             && !mechanism.is_kinematic()
         {
-            self.put_member(Member::Implicit);
+            self.put_member(ActiveScheme::Implicit);
         }
     }
 
     /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
     pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
         let before = self.state.control.member;
-        if before == Member::Friction {
+        if before == ActiveScheme::Friction {
             let longest = RINGING / self.mechanism.friction_ringing();
             let control = &mut self.state.control;
             control.h_next = control.h_next.min(longest);
@@ -131,70 +131,70 @@ impl Simulation {
         }
     }
 
-    fn put_member(&mut self, member: Member) {
+    fn put_member(&mut self, member: ActiveScheme) {
         self.state.control.member = member;
         self.state.control.controller = controller_of(Method::Automatic, member);
         // Corners are located by those that have an interpolant of their own.
-        self.hold_pieces(false);
+        self.freeze_branches(false);
         self.stepper.invalidate();
     }
 
     /// After an explicit step that blew up: whether friction on its ramp may be the cause, and now steps implicitly.
-    pub(super) fn turn_to_friction(&mut self) -> bool {
+    pub(super) fn try_friction_scheme(&mut self) -> bool {
         let touches = self.state.now.memory.iter().any(|m| m.active);
         let turns = self.machine.solver.method == Method::Automatic
-            && self.state.control.member == Member::Explicit
+            && self.state.control.member == ActiveScheme::Explicit
             && self.state.control.choice.friction.wait == 0
             && touches
             && self.mechanism.has_friction_alone();
         if turns {
-            self.put_member(Member::Friction);
-            self.stepper.choose(Member::Friction);
+            self.put_member(ActiveScheme::Friction);
+            self.stepper.choose(ActiveScheme::Friction);
         }
         turns
     }
 
-    fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> Member {
+    fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> ActiveScheme {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
         let tries_friction = self.machine.solver.tolerance < TRIED_BELOW;
         let state = &mut self.state;
         let member = state.control.member;
         let algebra = match member {
-            Member::Explicit => 0.0,
-            Member::Friction => self.mechanism.friction_algebra(),
-            Member::Implicit => factorisations * self.mechanism.implicit_algebra(),
+            ActiveScheme::Explicit => 0.0,
+            ActiveScheme::Friction => self.mechanism.friction_algebra(),
+            ActiveScheme::Implicit => factorisations * self.mechanism.implicit_algebra(),
         };
         let cost = evaluations + algebra + STEP_COST;
         let choice = &mut state.control.choice;
         match member {
-            Member::Explicit => choice.friction.wait = choice.friction.wait.saturating_sub(1),
-            Member::Friction if tries_friction => choice.friction.add(h, cost),
-            Member::Friction => {}
-            Member::Implicit => choice.implicit.add(h, cost),
+            ActiveScheme::Explicit => choice.friction.wait = choice.friction.wait.saturating_sub(1),
+            ActiveScheme::Friction if tries_friction => choice.friction.add(h, cost),
+            ActiveScheme::Friction => {}
+            ActiveScheme::Implicit => choice.implicit.add(h, cost),
         }
         if state.control.contact_began {
             choice.since_contact = 0;
             choice.limited = 0;
             // An impact is short and not stiff: the explicit method resolves it at less cost.
             let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
-            let leaves = member == Member::Implicit && strikes;
+            let leaves = member == ActiveScheme::Implicit && strikes;
             if leaves {
-                choice.implicit.judge(choice.explicit());
+                choice.implicit.conclude_trial(choice.explicit());
             }
             (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
-            return if leaves { Member::Explicit } else { member };
+            return if leaves { ActiveScheme::Explicit } else { member };
         }
-        if member == Member::Implicit {
+        if member == ActiveScheme::Implicit {
             let before = choice.explicit();
             let trial = &mut choice.implicit;
             if trial.steps == GROWING_STEPS {
                 (trial.progress, trial.cost) = (0.0, 0.0);
             }
-            if trial.steps >= TRIAL_STEPS && trial.judge(before) {
+            if trial.steps >= TRIAL_STEPS && trial.conclude_trial(before) {
                 // That step may have been cut at an event to next to nothing.
                 state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
-                return Member::Explicit;
+                return ActiveScheme::Explicit;
             }
             return member;
         }
@@ -203,16 +203,16 @@ impl Simulation {
         choice.explicit_cost = KEPT * choice.explicit_cost + cost;
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
-        if member == Member::Friction {
+        if member == ActiveScheme::Friction {
             // It costs more than an explicit step, which must be as much shorter.
             let dearer = 1.0 + algebra / EXPLICIT_COST;
             let over = self.mechanism.friction_rate() * h < STABILITY_LIMIT * dearer;
             let ends = over || choice.friction.steps >= FRICTION_STEPS;
             let before = choice.explicit();
-            let fails = tries_friction && ends && choice.friction.judge(before);
+            let fails = tries_friction && ends && choice.friction.conclude_trial(before);
             if over || fails {
                 choice.limited = 0;
-                next = Member::Explicit;
+                next = ActiveScheme::Explicit;
             } else {
                 choice.limited += 1;
             }
@@ -225,7 +225,7 @@ impl Simulation {
                 && choice.limited >= LIMITED_BEFORE_FRICTION
                 && choice.limited < LIMITED_STEPS
             {
-                next = Member::Friction;
+                next = ActiveScheme::Friction;
             }
         }
         if choice.implicit.wait > 0 {
@@ -239,17 +239,17 @@ impl Simulation {
             choice.h_explicit = h;
             choice.implicit.restart();
             choice.friction.restart();
-            return Member::Implicit;
+            return ActiveScheme::Implicit;
         }
         next
     }
 }
 
 /// Step-size control for the order of the method's error estimate.
-pub(super) fn controller_of(method: Method, member: Member) -> Controller {
+pub(super) fn controller_of(method: Method, member: ActiveScheme) -> Controller {
     Controller::new(match (method, member) {
-        (Method::Rosenbrock, _) | (Method::Automatic, Member::Friction) => 2,
-        (Method::Radau5, _) | (Method::Automatic, Member::Implicit) => 3,
+        (Method::Rosenbrock, _) | (Method::Automatic, ActiveScheme::Friction) => 2,
+        (Method::Radau5, _) | (Method::Automatic, ActiveScheme::Implicit) => 3,
         _ => 4,
     })
 }
@@ -286,17 +286,17 @@ mod tests {
     fn a_failed_trial_leaves_a_step_that_advances_time() {
         let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap().machine).unwrap();
         simulation.advance_to(1.0).unwrap();
-        assert_eq!(simulation.state.control.member, Member::Implicit);
-        simulation.state.control.choice = Choice {
+        assert_eq!(simulation.state.control.member, ActiveScheme::Implicit);
+        simulation.state.control.choice = SchemeSelector {
             h_explicit: 1e-16,
             explicit_progress: 1.0,
             explicit_cost: 1e-3,
             implicit: Trial { steps: TRIAL_STEPS - 1, ..Trial::default() },
-            ..Choice::default()
+            ..SchemeSelector::default()
         };
         simulation.choose_member(1e-3, 0.0, 10.0);
         let (control, t) = (&simulation.state.control, simulation.state.now.t);
-        assert_eq!(control.member, Member::Explicit);
+        assert_eq!(control.member, ActiveScheme::Explicit);
         assert!(t + control.h_next > t);
         assert!(control.h_next >= shortest_step(t));
         simulation.advance_to(1.1).unwrap();

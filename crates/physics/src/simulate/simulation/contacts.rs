@@ -95,7 +95,7 @@ impl Simulation {
             }
         }
         if begins {
-            self.hold_pieces(false);
+            self.freeze_branches(false);
         }
     }
 

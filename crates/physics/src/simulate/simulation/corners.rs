@@ -4,7 +4,7 @@
 use super::{Simulation, State};
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 use crate::integrate::{Method, find_root};
-use crate::simulate::stepper::Member;
+use crate::simulate::stepper::ActiveScheme;
 
 /// Parts of a step at whose ends sliding speed and penetration rate are checked.
 const PARTS: u32 = 4;
@@ -28,19 +28,19 @@ pub(super) struct Corner {
     /// Fraction of the step.
     pub theta: f64,
     pub joint: usize,
-    pub next: Piece,
+    pub next: LawBranch,
 }
 
 /// Piece beyond a corner.
 #[derive(Clone, Copy)]
-pub(super) enum Piece {
+pub(super) enum LawBranch {
     /// Of the friction law.
     Friction(FrictionPiece),
     /// Of the approach-speed rule.
     Approach(ApproachPiece),
 }
 
-impl Piece {
+impl LawBranch {
     /// Puts a contact on it.
     pub(super) fn put(self, memory: &mut Memory) {
         match self {
@@ -62,13 +62,13 @@ impl Simulation {
     /// a cubic through both ends overshoots, and a step that ends on it gains energy.
     fn locates_corners(&self) -> bool {
         let method = self.machine.solver.method;
-        let whole = self.state.control.member == Member::Friction;
+        let whole = self.state.control.member == ActiveScheme::Friction;
         method.is_adaptive() && method != Method::Rosenbrock && !whole
     }
 
     /// Puts every touching joint on its current pieces of the laws; those that already hold some keep them unless `anew`.
     /// Where corners are not located, all follow the whole laws.
-    pub(super) fn hold_pieces(&mut self, anew: bool) {
+    pub(super) fn freeze_branches(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.control.chatters;
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
@@ -110,7 +110,7 @@ impl Simulation {
                 continue;
             }
             let memory = self.state.now.memory[j];
-            let mut take = |corner: Option<(f64, Piece)>| {
+            let mut take = |corner: Option<(f64, LawBranch)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
                 if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
                     first = Some(Corner { theta, joint: j, next });
@@ -129,7 +129,7 @@ impl Simulation {
     }
 
     /// Where the penetration rate of joint `j` exceeds the largest so far.
-    fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
+    fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         let most = self.state.now.memory[j].approach_speed * (1.0 + NO_FASTER);
         let mut left = (0.0, self.state.now.gaps[j].rate - most);
         for n in 1..=PARTS {
@@ -143,7 +143,7 @@ impl Simulation {
                 } else {
                     left.0
                 };
-                return Some((at, Piece::Approach(ApproachPiece::Rising)));
+                return Some((at, LawBranch::Approach(ApproachPiece::Rising)));
             }
             left = right;
         }
@@ -151,7 +151,7 @@ impl Simulation {
     }
 
     /// Where the penetration rate of joint `j`, the largest so far, stops rising.
-    fn level(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
+    fn level(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let mut before = self.state.now.gaps[j].rate;
         for n in 1..=PARTS {
@@ -179,7 +179,7 @@ impl Simulation {
             }
             let at = 0.5 * (a + b);
             let at = if at < LEVEL_AT_START { 0.0 } else { at };
-            return Some((at, Piece::Approach(ApproachPiece::Held)));
+            return Some((at, LawBranch::Approach(ApproachPiece::Held)));
         }
         None
     }
@@ -202,7 +202,7 @@ impl Simulation {
         let time = now.t + theta * h;
         for flyer in mechanism.flyers_of(j) {
             if let Some(flight) = &state.flights[flyer] {
-                flight.put(&mechanism.flyers()[flyer], time, scratch_y);
+                flight.put(&mechanism.free_flight_bodies()[flyer], time, scratch_y);
             }
         }
         mechanism.measure_one(j, time, scratch_y);
@@ -210,7 +210,7 @@ impl Simulation {
 
     /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which
     /// piece.
-    fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
+    fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         let mut left = (0.0, self.beyond(j, 0.0, h).0);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
@@ -231,7 +231,7 @@ impl Simulation {
                     FrictionPiece::Ramp => FrictionPiece::DeadBand,
                     _ => FrictionPiece::Ramp,
                 };
-                return Some((at, Piece::Friction(next)));
+                return Some((at, LawBranch::Friction(next)));
             }
             left = right;
         }
@@ -278,6 +278,6 @@ impl Simulation {
             state.control.chatter = state.control.chatter.saturating_sub(1);
             state.control.chatters &= state.control.chatter > 0;
         }
-        self.hold_pieces(false);
+        self.freeze_branches(false);
     }
 }

@@ -41,7 +41,7 @@ impl Simulation {
         }
         self.state.record.wear = None;
         self.refresh();
-        self.book_change();
+        self.record_change();
     }
 
     /// Takes the approach speeds that its contacts remember towards those of `other`, a run in the same state but for a little, by
@@ -73,7 +73,7 @@ impl Simulation {
         let turns = self.state.control.member != other.state.control.member;
         self.state.control.clone_from(&other.state.control);
         if turns {
-            self.hold_pieces(false);
+            self.freeze_branches(false);
             self.stepper.invalidate();
         }
     }

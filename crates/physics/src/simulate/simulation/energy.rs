@@ -1,7 +1,7 @@
 //! Keeps the energy ledger: powers at a few instants of each accepted step.
 
 use super::{Record, Simulation, State};
-use crate::mechanism::{Mechanism, Powers, Touching};
+use crate::mechanism::{ActiveSet, Mechanism, Powers};
 use crate::simulate::ledger::{Account, Energies, weights};
 use crate::simulate::{Frame, Ledger};
 
@@ -21,18 +21,18 @@ impl Simulation {
     }
 
     /// Opens a new account at the current state, just fully evaluated.
-    pub(super) fn open_account(&mut self) {
+    pub(super) fn start_ledger(&mut self) {
         let Self { mechanism, state, .. } = self;
         let energies = energies(mechanism, state);
         state.record.account = Account::start(self.machine.solver.energy_ledger, energies);
     }
 
     /// Books what a live change did to the energies; the state was just fully evaluated.
-    pub(super) fn book_change(&mut self) {
+    pub(super) fn record_change(&mut self) {
         let Self { mechanism, state, .. } = self;
         if state.record.account.on {
             let energies = energies(mechanism, state);
-            state.record.account.book_change(energies);
+            state.record.account.record_change(energies);
         }
         // A wear map keeps them even without a ledger.
         state.record.account.powers = None;
@@ -40,7 +40,7 @@ impl Simulation {
 
     /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory is still that of the
     /// step; `switched` if it has changed at its end.
-    pub(super) fn book_step(&mut self, h: f64, switched: bool) {
+    pub(super) fn record_step(&mut self, h: f64, switched: bool) {
         let Record { account, wear, .. } = &self.state.record;
         let keeps_ledger = account.on;
         if !keeps_ledger && wear.is_none() {
@@ -60,10 +60,10 @@ impl Simulation {
             }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
-            let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.before.memory));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             if self.state.record.wear.is_some() {
-                let touching = Touching::by(located, &self.state.before.memory);
+                let touching = ActiveSet::by(located, &self.state.before.memory);
                 self.mechanism.complete_gaps(touching, &self.state.now.y);
                 self.begin_wear_of_step();
             }
@@ -134,7 +134,7 @@ impl Simulation {
         let located = self.locates();
         let Self { mechanism, stepper, state, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
-        let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.before.memory));
         let powers = evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {
             // No quadrature node in a kinematic scene: no ball is in contact there.

@@ -3,7 +3,7 @@
 
 use super::{LONGEST_STEP, Simulation, StepEnd};
 use crate::integrate::{Method, System as _};
-use crate::mechanism::{Flight, Mechanism, Touching};
+use crate::mechanism::{ActiveSet, Flight, Mechanism};
 
 /// With fewer free bodies than this, leaving some out saves less than it costs.
 const FEWEST_FLYERS: usize = 3;
@@ -12,15 +12,15 @@ impl Simulation {
     /// Decides, before a step that ends by `limit`, which bodies it leaves out: those that touch nothing and whose motion is
     /// known until then.
     pub(super) fn choose_flights(&mut self, limit: f64) {
-        let flyers = self.mechanism.flyers().len();
-        if self.machine.solver.method != Method::Automatic || flyers < FEWEST_FLYERS {
+        let free_flight_bodies = self.mechanism.free_flight_bodies().len();
+        if self.machine.solver.method != Method::Automatic || free_flight_bodies < FEWEST_FLYERS {
             return;
         }
         let Self { mechanism, state, .. } = self;
         let now = &mut state.now;
         let until = limit.min(now.t + state.control.h_next.min(LONGEST_STEP));
         let (mut some_land, mut some_start) = (false, false);
-        for (flyer, flight) in mechanism.flyers().iter().zip(&mut state.flights) {
+        for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(&mut state.flights) {
             let flew = flight.is_some();
             let held = state.pull.is_some_and(|pull| pull.body == flyer.body);
             if held || flyer.joints.iter().any(|&j| now.memory[j].active) {
@@ -48,7 +48,7 @@ impl Simulation {
             let located = self.locates();
             let Self { mechanism, state, .. } = self;
             let StepEnd { t, y, k, memory, .. } = &mut state.now;
-            let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
             evaluator.derivative(*t, y, k);
             let counts = evaluator.counts;
             state.record.statistics.count(counts);
@@ -58,14 +58,14 @@ impl Simulation {
     /// Lets evaluations leave out what flies.
     pub(super) fn leave_out_flights(&mut self) {
         let flights = &self.state.flights;
-        self.mechanism.put_to_sleep(|flyer| flights[flyer].is_some());
+        self.mechanism.suspend(|flyer| flights[flyer].is_some());
     }
 
     /// Lets evaluations see everything for a while, if anything flies; whether it does.
     pub(super) fn look_at_all(&mut self) -> bool {
         let any = self.state.flights.iter().any(Option::is_some);
         if any {
-            self.mechanism.put_to_sleep(|_| false);
+            self.mechanism.suspend(|_| false);
         }
         any
     }
@@ -86,7 +86,7 @@ impl Simulation {
 
 /// Writes 0 to the components of bodies in flight.
 pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k: &mut [f64]) {
-    for (flyer, flight) in mechanism.flyers().iter().zip(flights) {
+    for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
         if flight.is_some() {
             for part in flyer.parts() {
                 k[part].fill(0.0);
@@ -97,7 +97,7 @@ pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k
 
 /// Writes the bodies in flight at `t` to the state `y`.
 pub(super) fn put_flights(mechanism: &Mechanism, flights: &[Option<Flight>], t: f64, y: &mut [f64]) {
-    for (flyer, flight) in mechanism.flyers().iter().zip(flights) {
+    for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
         if let Some(flight) = flight {
             flight.put(flyer, t, y);
         }

@@ -14,7 +14,7 @@ const MOST_DRIFT: f64 = 1e-3;
 
 impl Simulation {
     /// What is wrong with the step of size `h` just attempted, if anything.
-    pub(super) fn objection(&self, open: f64, h: f64) -> Option<StopFault> {
+    pub(super) fn divergence(&self, open: f64, h: f64) -> Option<StopFault> {
         if !(open <= OPEN_LOOP) {
             return Some(StopFault::OpenLoops { open });
         }

@@ -30,11 +30,11 @@ pub enum ProbeFault {
 #[derive(Clone, Debug)]
 pub(in crate::simulate) enum Reference<M = IdealMotion> {
     /// There is no probe, or the drives' closed form gives it.
-    Elsewhere,
+    ClosedForm,
     /// Every ball joint is ideal: the motion is its own reference.
-    Itself,
+    SelfReference,
     /// A second simulation.
-    Alongside(Box<M>),
+    Simulated(Box<M>),
     /// The ideal mechanism cannot start.
     None(StartError),
 }
@@ -52,12 +52,12 @@ pub(in crate::simulate) struct IdealMotion {
     body: usize,
     probe: Vec3,
     frame: Frame,
-    pub(super) marks: Marks,
+    pub(super) marks: TipHistory,
 }
 
 /// The latest step ends, and whether more will follow.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Marks {
+pub(super) struct TipHistory {
     /// As many as are kept.
     ring: Vec<Mark>,
     count: usize,
@@ -69,20 +69,20 @@ pub(super) struct Marks {
 #[derive(Clone, Debug)]
 pub(in crate::simulate) struct Kept {
     snapshot: Snapshot,
-    marks: Marks,
+    marks: TipHistory,
 }
 
 impl Reference {
     /// For `scene`, whose mechanism may know its ideal motion in closed form.
     pub(super) fn of(machine: &Machine, closed_form: bool) -> Self {
         let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
-            return Self::Elsewhere;
+            return Self::ClosedForm;
         };
         if machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
-            return Self::Itself;
+            return Self::SelfReference;
         }
         match IdealMotion::new(machine, probe) {
-            Ok(motion) => Self::Alongside(Box::new(motion)),
+            Ok(motion) => Self::Simulated(Box::new(motion)),
             Err(error) => Self::None(error),
         }
     }
@@ -90,9 +90,9 @@ impl Reference {
     /// Tip in `frame` minus the ideal tip at its time.
     pub(super) fn error(&mut self, frame: &Frame) -> Option<Vec3> {
         match self {
-            Self::Elsewhere | Self::None(_) => None,
-            Self::Itself => Some(Vec3::zeros()),
-            Self::Alongside(motion) => {
+            Self::ClosedForm | Self::None(_) => None,
+            Self::SelfReference => Some(Vec3::zeros()),
+            Self::Simulated(motion) => {
                 let body = &frame.bodies[motion.body];
                 let tip = body.position + body.rotation * motion.probe;
                 Some(tip - motion.tip(frame.time)?)
@@ -103,15 +103,15 @@ impl Reference {
     /// Why there is no ideal motion, or no longer one.
     pub(super) fn fault(&self) -> Option<ProbeFault> {
         match self {
-            Self::Elsewhere | Self::Itself => None,
+            Self::ClosedForm | Self::SelfReference => None,
             Self::None(error) => Some(ProbeFault::NoStart(error.clone())),
-            Self::Alongside(motion) => motion.marks.stopped.clone().map(ProbeFault::Stopped),
+            Self::Simulated(motion) => motion.marks.stopped.clone().map(ProbeFault::Stopped),
         }
     }
 
     /// Gravity from `time` on.
     pub(super) fn set_gravity(&mut self, time: f64, gravity: Vec3) {
-        if let Self::Alongside(motion) = self {
+        if let Self::Simulated(motion) = self {
             motion.set_gravity(time, gravity);
         }
     }
@@ -122,7 +122,7 @@ impl Reference {
 
     /// To the state of a reference of the same equations.
     pub(super) fn restore(&mut self, kept: &Reference<Kept>) {
-        if let (Self::Alongside(motion), Reference::Alongside(kept)) = (self, kept) {
+        if let (Self::Simulated(motion), Reference::Simulated(kept)) = (self, kept) {
             motion.simulation.restore(&kept.snapshot);
             motion.marks = kept.marks.clone();
         }
@@ -145,9 +145,9 @@ impl Reference<Kept> {
 impl<M> Reference<M> {
     fn map<N>(&self, turn: impl FnOnce(&M) -> N) -> Reference<N> {
         match self {
-            Self::Elsewhere => Reference::Elsewhere,
-            Self::Itself => Reference::Itself,
-            Self::Alongside(motion) => Reference::Alongside(Box::new(turn(motion))),
+            Self::ClosedForm => Reference::ClosedForm,
+            Self::SelfReference => Reference::SelfReference,
+            Self::Simulated(motion) => Reference::Simulated(Box::new(turn(motion))),
             Self::None(error) => Reference::None(error.clone()),
         }
     }
@@ -179,7 +179,7 @@ impl IdealMotion {
             body: machine.output.body,
             probe,
             frame: Frame::default(),
-            marks: Marks { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
+            marks: TipHistory { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
         };
         motion.mark();
         Ok(motion)
@@ -218,7 +218,7 @@ impl IdealMotion {
     }
 }
 
-impl Marks {
+impl TipHistory {
     /// Whether there are as many as are kept.
     pub(super) fn fits(&self) -> bool {
         self.ring.len() == MARKS
@@ -300,7 +300,7 @@ mod tests {
         simulation.sample(change, &mut frame);
         assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
         // Without gravity a rod in an ideal joint rotates uniformly: its tip stays on its circle, at its speed.
-        let Reference::Alongside(motion) = &mut simulation.reference else {
+        let Reference::Simulated(motion) = &mut simulation.reference else {
             panic!("nothing alongside");
         };
         let times = [0.0, 0.01, 0.02].map(|ahead| change + ahead);

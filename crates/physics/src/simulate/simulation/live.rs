@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::automatic::{Choice, controller_of, prepare_implicit};
+use super::automatic::{SchemeSelector, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
 use crate::machine::{Machine, Vec3};
 use crate::mechanism::{ElementReport, MechanismError, Pull, Ramp};
-use crate::simulate::stepper::{AnyStepper, Member};
+use crate::simulate::stepper::{ActiveScheme, AnyStepper};
 use crate::simulate::{Effect, Frame};
 
 /// Largest distance of a hand, or of the point it holds, m: beyond it a pull makes no sense.
@@ -66,15 +66,15 @@ impl Simulation {
             let solver = &self.machine.solver;
             if solver.method != before.solver.method {
                 self.stepper = AnyStepper::new(solver.method, self.state.now.y.len());
-                self.state.control.member = Member::Explicit;
-                self.state.control.controller = controller_of(solver.method, Member::Explicit);
-                self.state.control.choice = Choice::default();
+                self.state.control.member = ActiveScheme::Explicit;
+                self.state.control.controller = controller_of(solver.method, ActiveScheme::Explicit);
+                self.state.control.choice = SchemeSelector::default();
             }
             self.state.control.h_next = self.state.control.h_next.min(solver.step);
         }
-        self.put_conditions();
+        self.sync_parameters();
         self.refresh();
-        self.book_change();
+        self.record_change();
         Ok(Effect::Now)
     }
 
@@ -85,9 +85,9 @@ impl Simulation {
     pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), ChangeError> {
         pull.map_or(Ok(()), |pull| self.check_pull(&pull))?;
         self.state.pull = pull;
-        self.put_conditions();
+        self.sync_parameters();
         self.refresh();
-        self.book_change();
+        self.record_change();
         Ok(())
     }
 
@@ -125,12 +125,12 @@ impl Simulation {
     /// Sets gravity from now on, m/s^2, of a simulation that is not changed otherwise.
     pub fn set_gravity(&mut self, gravity: Vec3) {
         Arc::make_mut(&mut self.machine).gravity = gravity;
-        self.put_conditions();
+        self.sync_parameters();
         self.refresh();
     }
 
     /// Gives the equations what live changes reach: the machine and the state have it.
-    pub(super) fn put_conditions(&mut self) {
+    pub(super) fn sync_parameters(&mut self) {
         let Self { mechanism, state, machine, .. } = self;
         mechanism.gravity = machine.gravity;
         if mechanism.pull() != state.pull {
@@ -204,9 +204,9 @@ impl Simulation {
             }
         }
         if finished {
-            self.put_conditions();
+            self.sync_parameters();
             self.refresh();
-            self.book_change();
+            self.record_change();
         }
     }
 }

@@ -4,7 +4,7 @@ use super::Simulation;
 use super::flights::put_flights;
 use super::ideal::Reference;
 use crate::integrate::hermite;
-use crate::mechanism::Touching;
+use crate::mechanism::ActiveSet;
 use crate::simulate::{Frame, report};
 
 impl Simulation {
@@ -33,7 +33,7 @@ impl Simulation {
             loads.take(&mut self.mechanism, time);
         }
         out.ledger = self.ledger_of(out);
-        if !matches!(self.reference, Reference::Elsewhere) {
+        if !matches!(self.reference, Reference::ClosedForm) {
             out.probe_error = self.reference.error(out);
         }
     }
@@ -61,7 +61,7 @@ impl Simulation {
             let known = !inside || (!located && !before[j].active);
             *memory = if known { now[j] } else { before[j] };
         }
-        let mut evaluator = mechanism.evaluator(Touching::by(located, scratch_memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, scratch_memory));
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
         if flies {
             self.leave_out_flights();

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ideal::{Marks, Reference};
+use super::ideal::{Reference, TipHistory};
 use super::{Simulation, State, StepEnd};
 use crate::integrate::Polynomial;
 use crate::simulate::{LoadPeaks, Snapshot};
@@ -26,13 +26,13 @@ pub struct SavedState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct SavedIdeal {
     state: SavedState,
-    marks: Marks,
+    marks: TipHistory,
 }
 
 /// A state of another scene, or one that no run of this scene can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the numbers are not those of a run of this scene")]
-pub struct Misfit;
+pub struct StateMismatch;
 
 impl SavedState {
     /// Time of the state, s.
@@ -79,10 +79,10 @@ impl Simulation {
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
             ideal: match &self.reference {
-                Reference::Alongside(motion) => {
+                Reference::Simulated(motion) => {
                     Some(Box::new(SavedIdeal { state: motion.simulation.saved(), marks: motion.marks.clone() }))
                 }
-                Reference::Elsewhere | Reference::Itself | Reference::None(_) => None,
+                Reference::ClosedForm | Reference::SelfReference | Reference::None(_) => None,
             },
             sampled: self.sampled.clone(),
             loads: self.loads.clone(),
@@ -93,7 +93,7 @@ impl Simulation {
     ///
     /// # Errors
     /// A state that cannot be one of this scene; the simulation is then of no use.
-    pub fn go_on_from(&mut self, saved: &SavedState) -> Result<(), Misfit> {
+    pub fn resume(&mut self, saved: &SavedState) -> Result<(), StateMismatch> {
         let polynomial = self.stepper.polynomial();
         let fits = saved.state.fits(self)
             && saved.sampled.len() == self.sampled.len()
@@ -101,15 +101,15 @@ impl Simulation {
             && saved.polynomial.is_some() == polynomial.is_some()
             && saved.polynomial.iter().all(|p| p.fits(self.state.now.y.len()));
         if !fits {
-            return Err(Misfit);
+            return Err(StateMismatch);
         }
         match (&mut self.reference, &saved.ideal) {
-            (Reference::Alongside(motion), Some(ideal)) if ideal.marks.fits() => {
-                motion.simulation.go_on_from(&ideal.state)?;
+            (Reference::Simulated(motion), Some(ideal)) if ideal.marks.fits() => {
+                motion.simulation.resume(&ideal.state)?;
                 motion.marks = ideal.marks.clone();
             }
-            (Reference::Elsewhere | Reference::Itself | Reference::None(_), None) => {}
-            _ => return Err(Misfit),
+            (Reference::ClosedForm | Reference::SelfReference | Reference::None(_), None) => {}
+            _ => return Err(StateMismatch),
         }
         let snapshot = Snapshot {
             machine: self.machine.clone(),

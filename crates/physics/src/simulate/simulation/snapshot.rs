@@ -3,7 +3,7 @@
 use super::automatic::prepare_implicit;
 use super::{Simulation, State};
 use crate::integrate::{Method, System as _};
-use crate::mechanism::{Flight, Mechanism, Touching};
+use crate::mechanism::{ActiveSet, Flight, Mechanism};
 use crate::simulate::stepper::AnyStepper;
 use crate::simulate::{Snapshot, Wear};
 
@@ -79,15 +79,15 @@ impl Simulation {
             self.stepper.set_polynomial(polynomial);
         }
         self.reference.restore(&snapshot.reference);
-        self.put_conditions();
-        self.mechanism.put_to_sleep(|_| false);
+        self.sync_parameters();
+        self.mechanism.suspend(|_| false);
         let located = self.locates();
         let Self { mechanism, state, scratch_k, .. } = self;
         // The interpolant of the previous step is not part of the state.
         state.before.copy_from(&state.now);
         // What is read from the mechanism between steps: motion, reactions, clearance ramps.
         let now = &state.now;
-        let mut evaluator = mechanism.evaluator(Touching::by(located, &now.memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &now.memory));
         evaluator.derivative(now.t, &now.y, scratch_k);
         mechanism.forget_evaluation();
         self.leave_out_flights();

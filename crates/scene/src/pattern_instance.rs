@@ -8,7 +8,7 @@ use jointplay_physics::machine::{Quat, Vec3};
 
 /// One copy of a pattern: what its names become, and where what it leaves to the outside lies.
 #[derive(Clone, Debug)]
-pub(super) struct Copy {
+pub(super) struct PatternInstance {
     /// Counted from 1.
     pub number: u32,
     /// A point on the axis, m, about which copies are turned.
@@ -20,7 +20,7 @@ pub(super) struct Copy {
     pub joints: Arc<BTreeSet<String>>,
 }
 
-impl Copy {
+impl PatternInstance {
     /// `name` of something that the pattern has.
     pub fn name(&self, name: &str) -> String {
         format!("{name}{}", self.number)

@@ -40,7 +40,7 @@ pub fn file_bytes(text: &str) -> Cow<'_, [u8]> {
 }
 
 /// How a scene keeps what a file holds.
-fn kept(bytes: Vec<u8>) -> Arc<str> {
+fn encode(bytes: Vec<u8>) -> Arc<str> {
     match String::from_utf8(bytes) {
         Ok(text) if !text.starts_with(ENCODED) => text.into(),
         Ok(text) => encoded(text.as_bytes()),
@@ -54,7 +54,7 @@ fn encoded(bytes: &[u8]) -> Arc<str> {
 
 /// Why a scene does not get a file that it names.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum BesideFault {
+pub(super) enum AssetFault {
     #[error("is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`")]
     NotBeside,
     #[error(
@@ -82,7 +82,7 @@ pub(super) enum BesideFault {
 /// Why a file gives no mesh.
 pub(super) enum NoMesh {
     /// It is not there, or not of a known kind.
-    Nowhere(BesideFault),
+    Nowhere(AssetFault),
     /// What is wrong in it, with its text if it is one.
     Within { text: Option<Arc<str>>, fault: Fault },
 }
@@ -96,7 +96,7 @@ enum Use {
 
 /// Where a scene finds the files that it names, and those that it has asked for.
 #[derive(Default)]
-pub(super) struct Beside<'d> {
+pub(super) struct AssetResolver<'d> {
     /// Folder of a scene file that is being loaded; `None` where only `known` and `given` may be used.
     folder: Option<&'d Path>,
     /// Read before.
@@ -110,7 +110,7 @@ pub(super) struct Beside<'d> {
     meshes: RefCell<BTreeMap<String, Arc<Mesh>>>,
 }
 
-impl<'d> Beside<'d> {
+impl<'d> AssetResolver<'d> {
     /// Reads files in `folder`.
     pub fn in_folder(folder: &'d Path) -> Self {
         Self { folder: Some(folder), ..Self::default() }
@@ -130,10 +130,10 @@ impl<'d> Beside<'d> {
     ///
     /// # Errors
     /// Why there is none.
-    pub fn text(&self, name: &str) -> Result<Arc<str>, BesideFault> {
+    pub fn text(&self, name: &str) -> Result<Arc<str>, AssetFault> {
         let text = self.content(name, Use::Text)?;
         if text.starts_with(ENCODED) {
-            return Err(BesideFault::NotText);
+            return Err(AssetFault::NotText);
         }
         Ok(text)
     }
@@ -146,7 +146,7 @@ impl<'d> Beside<'d> {
         if let Some(mesh) = self.meshes.borrow().get(name) {
             return Ok(mesh.clone());
         }
-        let format = Format::of(name).ok_or(NoMesh::Nowhere(BesideFault::NotMesh))?;
+        let format = Format::of(name).ok_or(NoMesh::Nowhere(AssetFault::NotMesh))?;
         let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
         // A file that this one names lies beside it.
         let other = |other: &str| {
@@ -166,7 +166,7 @@ impl<'d> Beside<'d> {
     }
 
     /// What the file `name` holds, as it is kept.
-    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, BesideFault> {
+    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, AssetFault> {
         let found = self.asked.borrow().get(name).cloned();
         let found = found.or_else(|| self.known?.get(name).cloned());
         let text = match found {
@@ -183,10 +183,10 @@ impl<'d> Beside<'d> {
         self.asked.into_inner()
     }
 
-    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, BesideFault> {
+    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, AssetFault> {
         let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
         if name.is_empty() || !Path::new(name).components().all(plain) {
-            return Err(BesideFault::NotBeside);
+            return Err(AssetFault::NotBeside);
         }
         let (limit, files) = match what {
             Use::Text => (LARGEST_FILE, "files"),
@@ -197,14 +197,14 @@ impl<'d> Beside<'d> {
         // One byte more than allowed: a pipe or a device does not report its size.
         let bytes = self.bytes(Path::new(name), room + 1)?;
         if bytes.len() as u64 > room {
-            return Err(BesideFault::TooLarge { limit, files });
+            return Err(AssetFault::TooLarge { limit, files });
         }
         held.set(held.get() + bytes.len() as u64);
-        Ok(kept(bytes))
+        Ok(encode(bytes))
     }
 
     /// The first `most` bytes of the file `name`.
-    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, BesideFault> {
+    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, AssetFault> {
         let path = self.folder.map(|folder| folder.join(name));
         // Only names come with a file that was dropped on a page.
         let given = name.file_name().and_then(|own| self.given?.get(own.to_str()?));
@@ -213,14 +213,14 @@ impl<'d> Beside<'d> {
                 let most = bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX));
                 Ok(bytes[..most].to_vec())
             }
-            (_, Some(path)) if path.is_dir() => Err(BesideFault::Directory),
+            (_, Some(path)) if path.is_dir() => Err(AssetFault::Directory),
             (_, Some(path)) => {
                 let mut bytes = Vec::new();
                 let file = std::fs::File::open(path)?;
                 file.take(most).read_to_end(&mut bytes)?;
                 Ok(bytes)
             }
-            (_, None) => Err(BesideFault::NoFolder),
+            (_, None) => Err(AssetFault::NoFolder),
         }
     }
 }
@@ -232,9 +232,9 @@ mod tests {
     #[test]
     fn what_is_kept_gives_back_the_bytes() {
         for bytes in [&b"v 1 2 3"[..], b"base64:AAAA", b"base64:", b"", b"\xff\x00solid"] {
-            let text = kept(bytes.to_vec());
+            let text = encode(bytes.to_vec());
             assert_eq!(&*file_bytes(&text), bytes);
         }
-        assert_eq!(&*kept(b"plain".to_vec()), "plain");
+        assert_eq!(&*encode(b"plain".to_vec()), "plain");
     }
 }
