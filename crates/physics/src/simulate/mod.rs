@@ -155,7 +155,7 @@ pub struct Snapshot {
     structure: Structure,
     state: simulation::State,
     polynomial: Option<crate::integrate::Polynomial>,
-    reference: simulation::ideal::Reference<simulation::ideal::Kept>,
+    reference: simulation::ideal::IdealTip<simulation::ideal::Kept>,
 }
 
 impl Snapshot {

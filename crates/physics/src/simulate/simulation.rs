@@ -35,7 +35,7 @@ use adaptive::Whole;
 use automatic::{SchemeSelector, controller_of, prepare_implicit};
 use corners::LawBranch;
 use flights::{clear_flights, put_flights};
-use ideal::{ProbeFault, Reference};
+use ideal::{IdealTip, ProbeFault};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
 /// gives a force of the order of the static ones.
@@ -70,7 +70,7 @@ pub struct Simulation {
     stepper: AnyStepper,
     state: State,
     /// What the probe is compared with.
-    reference: Reference,
+    reference: IdealTip,
     /// Largest force seen by a sample, and when, by joint: not part of the state, which sampling must not change.
     sampled: Vec<(f64, f64)>,
     /// Peaks of loads, if kept: not part of the state for the same reason.
@@ -266,7 +266,7 @@ impl Simulation {
         prepare_implicit(&mut mechanism, machine.solver.method)?;
         let state = State::new(machine, &mechanism, y);
         let machine = Arc::new(machine.clone());
-        let reference = Reference::of(&machine, mechanism.has_closed_form());
+        let reference = IdealTip::of(&machine, mechanism.has_closed_form());
         let mut simulation = Self::assembled(&machine, mechanism, state, reference);
         simulation.begin_contacts_at_start();
         simulation.choose_first_member();
@@ -293,7 +293,7 @@ impl Simulation {
     }
 
     /// Takes `state` as it is.
-    fn assembled(machine: &Arc<Machine>, mechanism: Mechanism, state: State, reference: Reference) -> Self {
+    fn assembled(machine: &Arc<Machine>, mechanism: Mechanism, state: State, reference: IdealTip) -> Self {
         let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
             machine: machine.clone(),

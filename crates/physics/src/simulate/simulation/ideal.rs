@@ -28,7 +28,7 @@ pub enum ProbeFault {
 
 /// Source of the ideal tip; in a snapshot, with what it keeps of a second simulation.
 #[derive(Clone, Debug)]
-pub(in crate::simulate) enum Reference<M = IdealMotion> {
+pub(in crate::simulate) enum IdealTip<M = IdealMotion> {
     /// There is no probe, or the drives' closed form gives it.
     ClosedForm,
     /// Every ball joint is ideal: the motion is its own reference.
@@ -72,7 +72,7 @@ pub(in crate::simulate) struct Kept {
     marks: TipHistory,
 }
 
-impl Reference {
+impl IdealTip {
     /// For `scene`, whose mechanism may know its ideal motion in closed form.
     pub(super) fn of(machine: &Machine, closed_form: bool) -> Self {
         let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
@@ -116,22 +116,22 @@ impl Reference {
         }
     }
 
-    pub(super) fn kept(&self) -> Reference<Kept> {
+    pub(super) fn kept(&self) -> IdealTip<Kept> {
         self.map(|motion| Kept { snapshot: motion.simulation.snapshot(), marks: motion.marks.clone() })
     }
 
     /// To the state of a reference of the same equations.
-    pub(super) fn restore(&mut self, kept: &Reference<Kept>) {
-        if let (Self::Simulated(motion), Reference::Simulated(kept)) = (self, kept) {
+    pub(super) fn restore(&mut self, kept: &IdealTip<Kept>) {
+        if let (Self::Simulated(motion), IdealTip::Simulated(kept)) = (self, kept) {
             motion.simulation.restore(&kept.snapshot);
             motion.marks = kept.marks.clone();
         }
     }
 }
 
-impl Reference<Kept> {
+impl IdealTip<Kept> {
     /// What it was kept of, for `scene`.
-    pub(super) fn resume(&self, machine: &Machine) -> Reference {
+    pub(super) fn resume(&self, machine: &Machine) -> IdealTip {
         self.map(|kept| IdealMotion {
             simulation: Simulation::of(&kept.snapshot),
             body: machine.output.body,
@@ -142,13 +142,13 @@ impl Reference<Kept> {
     }
 }
 
-impl<M> Reference<M> {
-    fn map<N>(&self, turn: impl FnOnce(&M) -> N) -> Reference<N> {
+impl<M> IdealTip<M> {
+    fn map<N>(&self, turn: impl FnOnce(&M) -> N) -> IdealTip<N> {
         match self {
-            Self::ClosedForm => Reference::ClosedForm,
-            Self::SelfReference => Reference::SelfReference,
-            Self::Simulated(motion) => Reference::Simulated(Box::new(turn(motion))),
-            Self::None(error) => Reference::None(error.clone()),
+            Self::ClosedForm => IdealTip::ClosedForm,
+            Self::SelfReference => IdealTip::SelfReference,
+            Self::Simulated(motion) => IdealTip::Simulated(Box::new(turn(motion))),
+            Self::None(error) => IdealTip::None(error.clone()),
         }
     }
 }
@@ -300,7 +300,7 @@ mod tests {
         simulation.sample(change, &mut frame);
         assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
         // Without gravity a rod in an ideal joint rotates uniformly: its tip stays on its circle, at its speed.
-        let Reference::Simulated(motion) = &mut simulation.reference else {
+        let IdealTip::Simulated(motion) = &mut simulation.reference else {
             panic!("nothing alongside");
         };
         let times = [0.0, 0.01, 0.02].map(|ahead| change + ahead);

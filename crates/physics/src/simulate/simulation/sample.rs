@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use super::flights::put_flights;
-use super::ideal::Reference;
+use super::ideal::IdealTip;
 use crate::integrate::hermite;
 use crate::mechanism::ActiveSet;
 use crate::simulate::{Frame, report};
@@ -33,7 +33,7 @@ impl Simulation {
             loads.take(&mut self.mechanism, time);
         }
         out.ledger = self.ledger_of(out);
-        if !matches!(self.reference, Reference::ClosedForm) {
+        if !matches!(self.reference, IdealTip::ClosedForm) {
             out.probe_error = self.reference.error(out);
         }
     }

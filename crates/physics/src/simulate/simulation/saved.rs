@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ideal::{Reference, TipHistory};
+use super::ideal::{IdealTip, TipHistory};
 use super::{Simulation, State, StepEnd};
 use crate::integrate::Polynomial;
 use crate::simulate::{LoadPeaks, Snapshot};
@@ -79,10 +79,10 @@ impl Simulation {
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
             ideal: match &self.reference {
-                Reference::Simulated(motion) => {
+                IdealTip::Simulated(motion) => {
                     Some(Box::new(SavedIdeal { state: motion.simulation.saved(), marks: motion.marks.clone() }))
                 }
-                Reference::ClosedForm | Reference::SelfReference | Reference::None(_) => None,
+                IdealTip::ClosedForm | IdealTip::SelfReference | IdealTip::None(_) => None,
             },
             sampled: self.sampled.clone(),
             loads: self.loads.clone(),
@@ -104,11 +104,11 @@ impl Simulation {
             return Err(StateMismatch);
         }
         match (&mut self.reference, &saved.ideal) {
-            (Reference::Simulated(motion), Some(ideal)) if ideal.marks.fits() => {
+            (IdealTip::Simulated(motion), Some(ideal)) if ideal.marks.fits() => {
                 motion.simulation.resume(&ideal.state)?;
                 motion.marks = ideal.marks.clone();
             }
-            (Reference::ClosedForm | Reference::SelfReference | Reference::None(_), None) => {}
+            (IdealTip::ClosedForm | IdealTip::SelfReference | IdealTip::None(_), None) => {}
             _ => return Err(StateMismatch),
         }
         let snapshot = Snapshot {
