@@ -1,7 +1,7 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
-//! Layers from the bottom up; a module uses only those below it (`ARCHITECTURE.md`): [`contact`], [`files`] and [`integrate`],
-//! [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`], and the entries [`cli`],
+//! Physics, scene files and analysis are crates of their own, which this one re-exports. Above them, each using only what stands before
+//! it (`ARCHITECTURE.md`): [`files`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`], and the entries [`cli`],
 //! `main.rs` and [`web`].
 
 /// The version that every output file names.
