@@ -3,6 +3,7 @@
 use eframe::egui::{self, Frame, Panel, ScrollArea, Ui};
 
 use super::{App, spoken, transport};
+use crate::session::embedded::{Embedded, Part};
 
 /// Width of the controls beside the picture, points.
 const CONTROLS: f32 = 250.0;
@@ -11,50 +12,6 @@ const PLOTS: f32 = 0.34;
 const BELOW: f32 = 0.4;
 /// Size of the frame that [`App::embedding`] writes, CSS pixels.
 const FRAME: [u32; 2] = [800, 500];
-
-/// A panel beside the picture of an embedded window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
-    Controls,
-    Timeline,
-    Plots,
-    Bench,
-}
-
-const PARTS: [(&str, Part); 4] =
-    [("controls", Part::Controls), ("timeline", Part::Timeline), ("plots", Part::Plots), ("bench", Part::Bench)];
-
-/// Which panels an embedded window has.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Embedded(Vec<Part>);
-
-impl Embedded {
-    /// Reads words separated by commas or spaces; none for the picture and its bar alone.
-    ///
-    /// # Errors
-    /// An unknown word; lists those there are.
-    pub fn read(text: &str) -> Result<Self, String> {
-        let words = text.split([',', ' ']).filter(|word| !word.is_empty());
-        let parts = words.map(|word| {
-            let known = PARTS.iter().find(|(own, _)| *own == word);
-            known.map(|(_, part)| *part).ok_or_else(|| {
-                let all = PARTS.map(|(word, _)| word).join(", ");
-                format!("no panel `{word}`; allowed, separated by commas: {all}")
-            })
-        });
-        Ok(Self(parts.collect::<Result<_, _>>()?))
-    }
-
-    /// The reverse of [`Self::read`].
-    pub fn write(&self) -> String {
-        let words = PARTS.iter().filter(|(_, part)| self.has(*part));
-        words.map(|(word, _)| *word).collect::<Vec<_>>().join(",")
-    }
-
-    fn has(&self, part: Part) -> bool {
-        self.0.contains(&part)
-    }
-}
 
 impl App {
     /// The panels of an embedded window; `None` for a window of its own.
@@ -136,7 +93,7 @@ impl App {
         }
         let panels = self.embedded.clone();
         let mut link = self.link();
-        link.embedded = Some(panels.unwrap_or_else(|| Embedded(vec![Part::Controls])));
+        link.embedded = Some(panels.unwrap_or_else(|| Embedded::with_controls()));
         let (fragment, _) = link.format_short(self.player.pending())?;
         let text = |text: &str| {
             let text = text.replace('&', "&amp;").replace('"', "&quot;");

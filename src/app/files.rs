@@ -11,10 +11,10 @@ use super::host::{Host, OpenedFile, SaveFile};
 use super::lesson::Course;
 use super::player::Player;
 use super::reload::{Given, SceneFile};
-use super::replay::Verdict;
-use super::share::shown::Instruments;
-use super::share::{Link, SceneText, is_link, shown};
 use super::{App, Notice, value};
+use crate::session::link::shown::{self, Instruments};
+use crate::session::link::{Link, SceneText, is_link};
+use crate::session::replay::Verdict;
 use crate::simulate::Channel;
 
 /// Rows of a saved record.
@@ -37,7 +37,7 @@ impl App {
             return Link { lesson, step, embedded: self.embedded.clone(), ..replay.link().clone() };
         }
         let player = &self.player;
-        let (plots, window) = shown::changed(&self.plots, player.pending());
+        let (plots, window) = self.plots.changed(player.pending());
         let followed = self.viewport.followed();
         let joints = &player.running().machine.ball_joints;
         let under_microscope = joints.get(self.microscope.joint());

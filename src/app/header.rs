@@ -9,9 +9,9 @@ use eframe::egui::{
 use super::App;
 use super::dialogs::Dialog;
 use super::files::{is_right, verdict_words};
-use super::replay::Verdict;
 use super::{layout, opening, spoken, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
+use crate::session::replay::Verdict;
 
 /// Width of the window from which the header has room for the program's name, points.
 const NAMED: f32 = 900.0;

@@ -46,11 +46,9 @@ mod pull;
 mod reload;
 #[cfg(not(target_arch = "wasm32"))]
 mod remembered;
-mod replay;
 #[cfg(not(target_arch = "wasm32"))]
 mod saved;
 mod scene_pictures;
-mod share;
 mod sound;
 #[cfg(all(feature = "sound", not(target_arch = "wasm32")))]
 mod speaker;
@@ -75,10 +73,14 @@ use crate::analysis::source::SceneSource;
 use crate::machine::Vec3;
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene};
-use crate::session::{load, log, paths, player, twin, value, watch};
+use crate::session::{link, load, log, paths, player, twin, value, watch};
 use crate::simulate::{LONGEST_FRAME, SPELL, Simulation, StartError};
 use crate::view::{Preset, Quality, ViewOptions};
 
+pub use crate::session::embedded::Embedded;
+pub use crate::session::link::shown::PlotWindow;
+pub use crate::session::link::{CameraPose, LONGEST_LINK, Link, LinkError, NO_PAGE, SceneText, is_page};
+pub use crate::session::replay::{Replay, Verdict};
 use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
@@ -88,7 +90,6 @@ use controls::Controls;
 #[cfg(not(target_arch = "wasm32"))]
 pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
-pub use embed::Embedded;
 pub use film::Wanted as WantedFilm;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::Headless;
@@ -102,13 +103,11 @@ pub use microscope::{Circle, Microscope};
 pub use overlay::{Overlay, force_notes, plates};
 use picture::Picture;
 pub use player::Player;
-pub use plots::{Plots, Window};
+pub use plots::Plots;
 use reload::SceneFile;
 #[cfg(not(target_arch = "wasm32"))]
 pub use remembered::{Remembered, Store};
-pub use replay::{Replay, Verdict};
 use scene_pictures::ScenePictures;
-pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, NO_PAGE, SceneText, is_page};
 use sound::Sound;
 use timeline::Timeline;
 use viewport::Viewport;
@@ -207,13 +206,13 @@ impl AppOptions {
             && link.log.base.is_empty()
         {
             return Ok(Self {
-                theme: link.theme.unwrap_or(ThemePreference::System),
+                theme: link.theme.map_or(ThemePreference::System, theme::preference),
                 embedded: link.embedded.clone(),
                 ..Self::of_lesson(lesson.clone(), *step)
             });
         }
         if link.is_of_nothing(text) {
-            let theme = link.theme.unwrap_or(ThemePreference::System);
+            let theme = link.theme.map_or(ThemePreference::System, theme::preference);
             return Ok(Self { theme, embedded: link.embedded, ..Self::first() });
         }
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
@@ -231,7 +230,7 @@ impl AppOptions {
             options.view.magnification = magnification;
         }
         if let Some(theme) = link.theme {
-            options.theme = theme;
+            options.theme = theme::preference(theme);
         }
         options.link = Some(link);
         Ok(options)
@@ -242,7 +241,7 @@ impl AppOptions {
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
             let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
-            let embedded = share::embedded_in(text);
+            let embedded = link::embedded_in(text);
             Self { problem: Some(problem), playing: false, embedded, ..Self::new(scene) }
         })
     }
@@ -667,7 +666,7 @@ impl App {
     /// # Errors
     /// As [`Self::open_link`] and [`Self::open`], in words.
     pub fn open_any(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
-        if share::is_link(text) { self.open_link(ctx, text) } else { self.open(text.trim()) }
+        if link::is_link(text) { self.open_link(ctx, text) } else { self.open(text.trim()) }
     }
 
     /// Back to t = 0 with every change applied.
@@ -734,7 +733,7 @@ impl App {
             self.viewport.options.magnification = options.view.magnification;
             if let Some(link) = options.link {
                 if let Some(theme) = link.theme {
-                    ctx.set_theme(theme);
+                    ctx.set_theme(theme::preference(theme));
                 }
                 self.show_link(link);
             }

@@ -15,6 +15,7 @@ use super::zoom::{self, Zoom};
 use super::{curve, layout, opening};
 use super::{spoken, theme, value};
 use crate::scene::Scene;
+use crate::session::link::shown::PlotWindow;
 use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
 #[cfg(not(target_arch = "wasm32"))]
@@ -37,17 +38,6 @@ const MARKS: f64 = 5.0;
 /// A range smaller than this fraction of the values, or than this in axis units, is rounding and not motion.
 const GRAIN: f64 = 1e-9;
 
-/// How much of the past the plots show.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Window {
-    /// The last seconds of viewing, whatever the time scale.
-    Automatic,
-    /// The last simulated time, of this many seconds.
-    Last(f64),
-    /// Since the reset.
-    Everything,
-}
-
 /// Which plots are shown and how.
 pub struct Plots {
     /// Quantities shown, in the order of [`Quantity::ALL`].
@@ -58,7 +48,7 @@ pub struct Plots {
     search: String,
     found: Option<(String, Vec<Entry>)>,
     /// Time window.
-    pub window: Window,
+    pub window: PlotWindow,
     /// Channels whose lines are hidden.
     hidden: Vec<usize>,
     /// Traces of one plot at a time, and their points for the hit test.
@@ -81,7 +71,7 @@ pub struct Plots {
 pub struct PlotChoice {
     chosen: Vec<Quantity>,
     picked: Vec<String>,
-    window: Window,
+    window: PlotWindow,
     hidden: Vec<usize>,
 }
 
@@ -209,6 +199,13 @@ struct Place {
 }
 
 impl Plots {
+    /// The chosen quantities and the window, where they differ from those with which a window on `scene` begins.
+    pub fn changed(&self, scene: &Scene) -> (Option<Vec<Quantity>>, Option<PlotWindow>) {
+        let first = Self::of(scene);
+        let chosen = (self.chosen != first.chosen).then(|| self.chosen.clone());
+        (chosen, (self.window != first.window).then_some(self.window))
+    }
+
     /// Those that a window on `scene` begins with.
     pub fn of(scene: &Scene) -> Self {
         Self {
@@ -216,7 +213,7 @@ impl Plots {
             picked: Vec::new(),
             search: String::new(),
             found: None,
-            window: Window::Automatic,
+            window: PlotWindow::Automatic,
             hidden: Vec::new(),
             traces: Vec::new(),
             levels: Vec::new(),
@@ -251,15 +248,15 @@ impl Plots {
             egui::containers::menu::MenuButton::new("Choose plots")
                 .config(menu)
                 .ui(ui, |ui| layout::entries(ui, |ui| self.menu(ui, player)));
-            ui.label("Window");
+            ui.label("PlotWindow");
             ComboBox::from_id_salt("window")
                 .width(110.0)
                 .selected_text(self.window_label())
                 .show_ui(ui, |ui| {
-                    let all = [Window::Automatic]
+                    let all = [PlotWindow::Automatic]
                         .into_iter()
-                        .chain(WINDOWS.map(Window::Last))
-                        .chain([Window::Everything]);
+                        .chain(WINDOWS.map(PlotWindow::Last))
+                        .chain([PlotWindow::Everything]);
                     for window in all {
                         let chosen = self.window == window && self.zoomed.is_none();
                         if ui.selectable_label(chosen, window.label()).clicked() {
@@ -272,7 +269,7 @@ impl Plots {
                     "Simulated time that the plots show. Over a plot: wheel or pinch for nearer, drag to shift, click to put \
                      an instant on show, double-click for the window chosen here",
                 )
-                .accessible_name("Window");
+                .accessible_name("PlotWindow");
             self.comparison.ui(ui, player);
         });
     }
@@ -379,9 +376,9 @@ impl Plots {
     /// Length of the chosen window, s.
     fn window_length(&self, player: &Player) -> f64 {
         match self.window {
-            Window::Automatic => player.automatic_window(),
-            Window::Last(length) => length,
-            Window::Everything => player.known_to().max(1e-4),
+            PlotWindow::Automatic => player.automatic_window(),
+            PlotWindow::Last(length) => length,
+            PlotWindow::Everything => player.known_to().max(1e-4),
         }
     }
 
@@ -393,7 +390,7 @@ impl Plots {
         let shown = player.pacer.shown();
         let known = player.known_to();
         let length = self.window_length(player);
-        let end = if self.window == Window::Everything { known } else { shown };
+        let end = if self.window == PlotWindow::Everything { known } else { shown };
         let end = end.max(known.min(shown + 0.25 * length));
         // A window that starts before t = 0 fills from the left.
         if end < length { (0.0, length) } else { (end - length, end) }
@@ -904,7 +901,7 @@ pub(super) fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
     if round.len() < 2 { marks(ROUND_ENOUGH) } else { round }
 }
 
-impl Window {
+impl PlotWindow {
     fn label(self) -> String {
         match self {
             Self::Automatic => "Automatic".to_owned(),
@@ -1036,7 +1033,7 @@ mod tests {
 
     #[test]
     fn windows_are_told_in_the_unit_that_suits() {
-        let all = WINDOWS.map(|length| Window::Last(length).label());
+        let all = WINDOWS.map(|length| PlotWindow::Last(length).label());
         assert_eq!(all, ["1 ms", "10 ms", "50 ms", "100 ms", "1 s", "10 s"]);
     }
 

@@ -9,11 +9,12 @@ use serde::{Deserialize, Serialize};
 use super::dialogs::Dialog;
 use super::files::SCENE_TYPE;
 use super::host::SaveFile;
-use super::share::THEMES;
-use super::{App, AppOptions, layout, opening};
+use super::{App, AppOptions, layout, opening, theme};
 use crate::files::{FileError, OutputFile, create_dir_all};
 use crate::scene::{DEFAULT_SCENE, Scene, built_in_text};
+use crate::session::link::ThemeChoice;
 use crate::simulate::Simulation;
+use crate::words::Words as _;
 
 /// Most recent files that are listed.
 const MOST_RECENT: usize = 8;
@@ -56,8 +57,7 @@ impl Remembered {
     }
 
     fn theme(&self) -> Option<ThemePreference> {
-        let wanted = self.theme.as_deref()?;
-        THEMES.iter().find(|(name, _)| *name == wanted).map(|(_, theme)| *theme)
+        ThemeChoice::of_word(self.theme.as_deref()?).map(theme::preference)
     }
 
     /// Lists `file` first.
@@ -192,7 +192,8 @@ impl App {
             }
         });
         let theme = ctx.options(|options| options.theme_preference);
-        now.theme = THEMES.iter().find(|(_, named)| *named == theme).map(|(name, _)| (*name).to_owned());
+        let choice = ThemeChoice::ALL.into_iter().find(|choice| theme::preference(*choice) == theme);
+        now.theme = choice.map(|choice| choice.word().to_owned());
         now.zoom = Some(zoom);
         if let Some(file) = file.filter(|_| !teaching) {
             if now.scene.as_ref() != Some(&file) {

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use crate::session::link::ThemeChoice;
 use eframe::egui::{
     self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Frame, Margin, Response, RichText,
-    Stroke, TextStyle, Theme, Ui, Visuals, vec2,
+    Stroke, TextStyle, Theme, ThemePreference, Ui, Visuals, vec2,
 };
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
@@ -33,6 +34,15 @@ const fn rgb(hex: u32) -> Color32 {
 pub fn series(index: usize, dark: bool) -> Color32 {
     let (on_light, on_dark) = SERIES[index % SERIES.len()];
     if dark { on_dark } else { on_light }
+}
+
+/// What egui is told of a choice of colours.
+pub fn preference(choice: ThemeChoice) -> ThemePreference {
+    match choice {
+        ThemeChoice::Light => ThemePreference::Light,
+        ThemeChoice::Dark => ThemePreference::Dark,
+        ThemeChoice::System => ThemePreference::System,
+    }
 }
 
 /// The frame of a panel. The page's canvas is cleared to its colour, so that there it fills nothing: where the processor draws,

@@ -6,10 +6,11 @@ use eframe::egui::{self, Key, Modifiers, Ui};
 
 use super::icons::{Icon, icon_button};
 use super::player::Edit;
-use super::plots::Window;
-use super::share::CameraPose;
+
 use super::{App, layout, theme, value};
 use crate::scene::Scene;
+use crate::session::link::CameraPose;
+use crate::session::link::shown::PlotWindow;
 use crate::simulate::Quantity;
 use crate::view::{Picked, Quality, ViewOptions};
 
@@ -30,7 +31,7 @@ struct View {
     followed: Option<Picked>,
     chosen: Vec<Quantity>,
     picked: Vec<String>,
-    window: Window,
+    window: PlotWindow,
 }
 
 impl View {

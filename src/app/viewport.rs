@@ -14,10 +14,10 @@ use super::overlay::{self, Overlay};
 use super::pace::{Pace, Seen};
 use super::player::Player;
 use super::pull::Grip;
-use super::share::CameraPose;
 use super::{ghosts, keys, spoken, value, zoom};
 use crate::machine::Vec3 as Exact;
 use crate::render;
+use crate::session::link::CameraPose;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
     Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions, WearMap,

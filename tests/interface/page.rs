@@ -17,7 +17,7 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window};
+use jointplay::app::{App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, PlotWindow, SaveFile, Verdict};
 use jointplay::cli::output::Table;
 use jointplay::machine::Drive;
 use jointplay::scene::{DEFAULT_SCENE, Scene, Value};
@@ -404,7 +404,7 @@ fn a_double_tap_follows_what_it_hits() {
     harness.run_steps(3);
     // The link follows it, too, from where the camera is.
     harness.state_mut().plots_mut().chosen.push(Quantity::Energy);
-    harness.state_mut().plots_mut().window = Window::Last(0.01);
+    harness.state_mut().plots_mut().window = PlotWindow::Last(0.01);
     harness.state_mut().microscope_mut().set_open(true);
     harness.state_mut().microscope_mut().focus(1);
     harness.state_mut().player_mut().set_ideal(true);
@@ -1179,16 +1179,16 @@ fn another_scene_brings_its_own_pace_and_plots_and_the_same_one_keeps_them() {
     let (mut harness, _) = window("spcmm", LARGE);
     let app = harness.state_mut();
     app.player_mut().pacer.set_scale(1e-3);
-    app.plots_mut().window = Window::Last(1e-3);
+    app.plots_mut().window = PlotWindow::Last(1e-3);
     app.plots_mut().chosen = vec![Quantity::Energy];
     app.open("press").expect("built in");
     assert_eq!(app.player().pacer.scale(), 0.125);
-    assert_eq!(app.plots_mut().window, Window::Automatic);
+    assert_eq!(app.plots_mut().window, PlotWindow::Automatic);
     assert_eq!(app.plots_mut().chosen, [Quantity::NormalForce, Quantity::Acceleration]);
     // A link without plots brings these, too.
     assert_eq!(app.link().plots, None);
-    app.plots_mut().window = Window::Everything;
+    app.plots_mut().window = PlotWindow::Everything;
     app.player_mut().pacer.set_scale(0.5);
     app.open("press").expect("built in");
-    assert_eq!((app.player().pacer.scale(), app.plots_mut().window), (0.5, Window::Everything));
+    assert_eq!((app.player().pacer.scale(), app.plots_mut().window), (0.5, PlotWindow::Everything));
 }

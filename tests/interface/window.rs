@@ -854,7 +854,7 @@ fn the_energy_balance_is_stacked_from_both_sides_and_shows_what_is_stored() {
     let mut harness = plain("spcmm", &[], [1280.0, 800.0], egui::Theme::Light);
     let plots = harness.state_mut().plots_mut();
     plots.chosen = vec![Quantity::EnergyBalance];
-    plots.window = jointplay::app::Window::Everything;
+    plots.window = jointplay::app::PlotWindow::Everything;
     harness.state_mut().player_mut().run_to(0.05);
     harness.run();
     harness.get_by_label("Energy balance, mJ");

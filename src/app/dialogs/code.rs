@@ -8,7 +8,7 @@ use qrcodegen::{QrCode, QrCodeEcc, QrSegment, Version};
 
 use super::Dialog;
 use crate::app::App;
-use crate::app::share::{NO_PAGE, is_page};
+use crate::session::link::{NO_PAGE, is_page};
 
 /// Light modules around a code, which a reader needs.
 const QUIET: i32 = 4;

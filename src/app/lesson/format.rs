@@ -9,8 +9,8 @@ use toml::Spanned;
 
 use super::names::{Names, comparisons, parameter};
 use super::text;
-use crate::app::share::{Link, SceneText};
 use crate::scene::{LARGEST_FILE, Quantity, Scene, SceneError};
+use crate::session::link::{Link, SceneText};
 use crate::suggest::nearest;
 use crate::units::Dimension;
 use crate::view::Preset;

@@ -1,7 +1,7 @@
 //! Links there and back, by hand, and damaged.
 
 use super::*;
-use crate::app::log::Event;
+use crate::session::log::Event;
 use crate::view::WearMap;
 
 /// Numbers that look random and are the same each time (splitmix64).
@@ -82,9 +82,9 @@ impl Chance {
                 names.map(|n| format!("S{n}.*_-?x{}", c.below(9))).collect()
             }),
             window: self.maybe(|c| match c.below(3) {
-                0 => Window::Automatic,
-                1 => Window::Everything,
-                _ => Window::Last(1e-6 + c.unit()),
+                0 => PlotWindow::Automatic,
+                1 => PlotWindow::Everything,
+                _ => PlotWindow::Last(1e-6 + c.unit()),
             }),
             instruments: self.maybe(|c| Instruments {
                 microscope: c.maybe(|c| format!("S{}", c.below(9))),
@@ -98,7 +98,7 @@ impl Chance {
                 Embedded::read(words[c.below(4) as usize]).expect("panels")
             }),
             playing: self.maybe(|c| c.below(2) == 0),
-            theme: self.maybe(|c| THEMES[c.below(3) as usize].1),
+            theme: self.maybe(|c| ThemeChoice::ALL[c.below(3) as usize]),
             version: self.maybe(|_| "0.1.0".to_owned()),
             beside: Texts::new(),
         }

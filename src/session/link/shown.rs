@@ -1,6 +1,5 @@
 //! The settings of plots, view and instruments that a link carries, as words.
 
-use crate::app::plots::{Plots, Window};
 use crate::scene::Scene;
 use crate::simulate::{MOST_PICKED, Quantity};
 use crate::units::{Dimension, parse_quantity};
@@ -16,6 +15,17 @@ const LONGEST_NAME: usize = 120;
 const IDEAL: &str = "ideal";
 const MICROSCOPE: &str = "microscope.";
 const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-friction-work", WearMap::FrictionWork)];
+
+/// How much of the past the plots show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlotWindow {
+    /// The last seconds of viewing, whatever the time scale.
+    Automatic,
+    /// The last simulated time, of this many seconds.
+    Last(f64),
+    /// Since the reset.
+    Everything,
+}
 
 /// Instruments that are on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -124,26 +134,26 @@ pub fn write_channels(names: &[String]) -> String {
 }
 
 /// Reads a span of time, `automatic` or `everything`.
-pub fn read_window(text: &str) -> Result<Window, String> {
+pub fn read_window(text: &str) -> Result<PlotWindow, String> {
     match text {
-        "automatic" => return Ok(Window::Automatic),
-        "everything" => return Ok(Window::Everything),
+        "automatic" => return Ok(PlotWindow::Automatic),
+        "everything" => return Ok(PlotWindow::Everything),
         _ => {}
     }
     let length = parse_quantity(text, Dimension::Time).map_err(|error| error.to_string())?;
     if (SHORTEST_WINDOW..=LONGEST_WINDOW).contains(&length) {
-        Ok(Window::Last(length))
+        Ok(PlotWindow::Last(length))
     } else {
         Err("allowed automatic, everything, and 1 us to 10000 s".to_owned())
     }
 }
 
 /// The reverse of [`read_window`].
-pub fn write_window(window: Window) -> String {
+pub fn write_window(window: PlotWindow) -> String {
     match window {
-        Window::Automatic => "automatic".to_owned(),
-        Window::Everything => "everything".to_owned(),
-        Window::Last(length) => format!("{length}s"),
+        PlotWindow::Automatic => "automatic".to_owned(),
+        PlotWindow::Everything => "everything".to_owned(),
+        PlotWindow::Last(length) => format!("{length}s"),
     }
 }
 
@@ -176,11 +186,4 @@ pub fn name_followed(scene: &Scene, picked: Picked) -> Option<String> {
         Picked::Body(index) => Some(format!("body.{}", scene.machine.bodies.get(index)?.name)),
         Picked::Fixed(_) => None,
     }
-}
-
-/// The chosen quantities and the window of `plots`, where they differ from the defaults.
-pub fn changed(plots: &Plots, scene: &Scene) -> (Option<Vec<Quantity>>, Option<Window>) {
-    let first = Plots::of(scene);
-    let chosen = (plots.chosen != first.chosen).then(|| plots.chosen.clone());
-    (chosen, (plots.window != first.window).then_some(plots.window))
 }

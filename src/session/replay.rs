@@ -1,8 +1,8 @@
 //! Brings a run to the instant of a link, within a time budget per frame, and checks that the state is the same.
 
+use super::link::Link;
 use super::log::{Entry, Event};
 use super::player::Player;
-use super::share::Link;
 
 /// The outcome of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -143,9 +143,9 @@ fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::log::Log;
-    use crate::app::share::SceneText;
     use crate::scene::Scene;
+    use crate::session::link::SceneText;
+    use crate::session::log::Log;
 
     fn player(scene: &str) -> Player {
         Player::new(&Scene::load(scene, &[]).expect("built in")).expect("starts")

@@ -9,16 +9,15 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
-use eframe::egui::ThemePreference;
 
-use super::embed::Embedded;
+use super::embedded::Embedded;
 use super::log::Log;
-use super::plots::Window;
 use crate::scene::{DEFAULT_SCENE, LARGEST_FILE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::units::{Dimension, parse_quantity};
 use crate::view::Picked;
-use shown::Instruments;
+use crate::words::{Words as _, words};
+use shown::{Instruments, PlotWindow};
 
 /// Longest link written and read, characters: what mail, chats and every browser still pass on.
 pub const LONGEST_LINK: usize = 32_000;
@@ -64,8 +63,23 @@ const LATEST: f64 = 1e6;
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
-pub(super) const THEMES: [(&str, ThemePreference); 3] =
-    [("light", ThemePreference::Light), ("dark", ThemePreference::Dark), ("system", ThemePreference::System)];
+/// Colours of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ThemeChoice {
+    /// Dark on light.
+    Light,
+    /// Light on dark.
+    Dark,
+    /// As the system has them.
+    #[default]
+    System,
+}
+
+words!(ThemeChoice {
+    Light => "light",
+    Dark => "dark",
+    System => "system",
+});
 
 /// A link that cannot be read: what is wrong and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -143,7 +157,7 @@ pub struct Link {
     /// Names of the channels that plots of their own show.
     pub channels: Option<Vec<String>>,
     /// Time that they show.
-    pub window: Option<Window>,
+    pub window: Option<PlotWindow>,
     /// Instruments that are on.
     pub instruments: Option<Instruments>,
     /// Name of the built-in lesson that it belongs to.
@@ -155,7 +169,7 @@ pub struct Link {
     /// Whether the run plays once the state is reached; by default, only if the link names no instant.
     pub playing: Option<bool>,
     /// Light, dark, or as the system asks.
-    pub theme: Option<ThemePreference>,
+    pub theme: Option<ThemeChoice>,
     /// Version of the program that made the link.
     pub version: Option<String>,
     /// Texts of the files that the scene names: they are in no link, but kept with it ([`Self::keep`]).
@@ -302,8 +316,7 @@ impl Link {
                 }
                 "version" => link.version = Some(value.chars().take(40).collect()),
                 "theme" => {
-                    let known = THEMES.iter().find(|(word, _)| *word == value);
-                    let theme = known.map(|(_, theme)| *theme);
+                    let theme = ThemeChoice::of_word(value);
                     link.theme = Some(theme.ok_or_else(|| wrong("allowed light, dark and system"))?);
                 }
                 // Chosen before the application starts, by `web/main.js`.
@@ -382,8 +395,7 @@ impl Link {
         add("step", self.step.map(|step| step.to_string()));
         add("embed", self.embedded.as_ref().map(Embedded::write));
         add("play", self.playing.map(|playing| u8::from(playing).to_string()));
-        let theme = THEMES.iter().find(|(_, theme)| self.theme == Some(*theme));
-        add("theme", theme.map(|(word, _)| (*word).to_owned()));
+        add("theme", self.theme.map(|theme| theme.word().to_owned()));
         add("version", self.version.clone());
         add("hash", self.hash.map(|hash| format!("{hash:016x}")));
         if !self.log.entries.is_empty() {
