@@ -53,6 +53,18 @@ pub struct Axis {
     pub range: Option<(f64, f64)>,
 }
 
+impl Axis {
+    /// A linear axis that follows the data.
+    pub fn new(label: &str, unit: &str) -> Self {
+        Self { label: label.to_owned(), unit: unit.to_owned(), ..Self::default() }
+    }
+
+    /// A logarithmic axis that follows the data.
+    pub fn logarithmic(label: &str, unit: &str) -> Self {
+        Self { scale: Scale::Logarithmic, ..Self::new(label, unit) }
+    }
+}
+
 /// Shape of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
@@ -91,6 +103,23 @@ pub struct Series {
     pub line: bool,
     /// Marker at each point.
     pub marker: Option<Marker>,
+}
+
+impl Series {
+    /// A line without markers.
+    pub fn line(label: &str, points: Vec<(f64, f64)>, colour: Colour) -> Self {
+        Self { label: label.to_owned(), points, colour, line: true, marker: None }
+    }
+
+    /// Markers without a line.
+    pub fn dots(label: &str, points: Vec<(f64, f64)>, colour: Colour, marker: Marker) -> Self {
+        Self { line: false, ..Self::line(label, points, colour).marked(marker) }
+    }
+
+    /// The same with a marker at each point.
+    pub fn marked(self, marker: Marker) -> Self {
+        Self { marker: Some(marker), ..self }
+    }
 }
 
 /// Text at a point.
@@ -143,4 +172,11 @@ pub struct Chart {
     pub levels: Vec<Level>,
     /// Cells below everything else.
     pub map: Option<Map>,
+}
+
+impl Chart {
+    /// Series over a pair of axes.
+    pub fn new(title: &str, x: Axis, y: Axis, series: Vec<Series>) -> Self {
+        Self { title: title.to_owned(), x, y, series, ..Self::default() }
+    }
 }

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use super::args::BenchArguments;
-use super::tradeoff::{grid, percent, times, value};
+use super::tables::{Table, yes};
+use super::tradeoff::{percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
 use crate::analysis::{GROWTH, GoalResult, SPEED_GOALS, Speed, growth, reach, speed};
 use crate::scene::Scene;
@@ -30,15 +31,9 @@ pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
     print(&text(&rows, &machines, growth))
 }
 
-fn yes(met: bool) -> String {
-    if met { "yes" } else { "no" }.to_owned()
-}
-
 fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
-    let head = ["span", "method", "speed", "asked", "rk4 at 10 us", "ratio", "error", "of", "reached"];
-    let mut lines = vec![head.map(str::to_owned).to_vec()];
-    for row in rows {
-        lines.push(vec![
+    let reach = rows.iter().map(|row| {
+        vec![
             row.goal.label().to_owned(),
             format!("{} {}", row.setting.method, value(&row.setting)),
             times(Some(row.speed)),
@@ -48,8 +43,8 @@ fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
             percent(row.error),
             row.goal.error_of().to_owned(),
             yes(row.met()),
-        ]);
-    }
+        ]
+    });
     let mut out = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(out, "Machine           {}", machine::name());
@@ -57,12 +52,11 @@ fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
         "Speeds            simulated seconds in a second of stepping, one core\n\
          All joints ideal  no differential equation is solved, so that a stepper has no part in it\n\n",
     );
-    out.push_str(&grid(&lines));
+    let heads = "span | method | speed | asked | rk4 at 10 us | ratio | error | of | reached";
+    out.push_str(&Table::new(heads, reach).text());
     let _ = writeln!(out, "\nMany loose joints, automatic at the loosest tolerance with good peaks\n");
-    let head = ["machine", "span", "tolerance", "error", "speed", "asked", "reached"];
-    let mut lines = vec![head.map(str::to_owned).to_vec()];
-    for row in machines {
-        lines.push(vec![
+    let speeds = machines.iter().map(|row| {
+        vec![
             row.goal.label.to_owned(),
             format_quantity(row.goal.span, "s"),
             format!("{:e}", row.tolerance),
@@ -70,9 +64,10 @@ fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
             times(Some(row.speed)),
             format!("{:.0}", row.goal.asked),
             yes(row.met()),
-        ]);
-    }
-    out.push_str(&grid(&lines));
+        ]
+    });
+    let heads = "machine | span | tolerance | error | speed | asked | reached";
+    out.push_str(&Table::new(heads, speeds).text());
     let ([short, long], span, most) = GROWTH;
     let _ = writeln!(
         out,

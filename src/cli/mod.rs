@@ -33,6 +33,7 @@ mod tables;
 pub mod tradeoff;
 pub mod validate;
 mod wear;
+mod workers;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};

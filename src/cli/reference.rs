@@ -1,5 +1,6 @@
 //! `reference`: the page of the scene format, whose tables follow from the rows by which the reader goes.
 
+use super::tables::Table;
 use crate::scene::{
     ABOVE_ZERO, DRIVE_LAWS, DefaultRule, FILE, FileKey, FileTable, Kind, ValueType, Variants, file_tables, find,
     is_element,
@@ -53,15 +54,6 @@ pub fn has(page: &str, table: &FileTable) -> bool {
     is_element(table) || page.contains(&format!("{START}{} -->", table.name))
 }
 
-/// A Markdown table.
-fn markdown(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut out = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
-    for row in rows {
-        out += &format!("| {} |\n", row.join(" | "));
-    }
-    out
-}
-
 /// The keys of a table, one a row.
 fn keys(table: &FileTable) -> String {
     let by = match table.variants {
@@ -95,8 +87,7 @@ fn keys(table: &FileTable) -> String {
         let own = String::new;
         rows.push(shown([any, own(), there(), there(), own(), "For this one alone".to_owned()]));
     }
-    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-    markdown(&heads, rows)
+    Table::new(&heads.join(" | "), rows).markdown()
 }
 
 /// Keys of a table but those that another has, too.
@@ -223,7 +214,7 @@ pub fn absent(key: &FileKey) -> String {
 /// The laws of drives.
 fn laws() -> String {
     let row = |kind: &crate::scene::DriveLaw| vec![format!("`{}`", kind.word), kind.help.to_owned()];
-    markdown(&["law", "motion"], DRIVE_LAWS.iter().map(row))
+    Table::new("law | motion", DRIVE_LAWS.iter().map(row)).markdown()
 }
 
 /// All force elements.
@@ -257,5 +248,5 @@ fn frames() -> String {
         }
     }
     let row = |(frame, keys): (&str, Vec<String>)| vec![frame.to_owned(), keys.join("; ")];
-    markdown(&["frame", "keys"], frames.into_iter().map(row))
+    Table::new("frame | keys", frames.into_iter().map(row)).markdown()
 }

@@ -1,8 +1,109 @@
-//! Tables for pages and data files, and the gaps in pages.
+//! Tables as data, and their forms: HTML and Markdown for pages, CSV for programs, aligned columns for terminals. Pages are
+//! templates whose gaps are filled with them.
 
 use std::fmt::Write as _;
 
 use super::output::significant;
+
+/// Rows of plain words under heads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Says in a page what the rows are; "" if the text around the table does.
+    title: String,
+    heads: Vec<String>,
+    /// Class of each column in HTML: `n` for numbers, `verdict` for words that [`BADGES`] marks, "" for words.
+    classes: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+/// Words of a column of verdicts, and their classes in HTML.
+const BADGES: [(&str, &str); 5] = [
+    ("agrees within 10 %", "ok"),
+    ("within a factor of 2", "near"),
+    ("differs", "off"),
+    ("confirmed", "ok"),
+    ("not confirmed", "off"),
+];
+
+impl Table {
+    /// Heads are separated by bars; ` .` after a head gives the class of its column: `Run | Largest force (N) .n`.
+    pub fn new(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Self {
+        let heads = heads.split(" | ").map(|head| head.rsplit_once(" .").unwrap_or((head, "")));
+        let (heads, classes) = heads.map(|(head, class)| (head.to_owned(), class.to_owned())).unzip();
+        Self { title: String::new(), heads, classes, rows: rows.into_iter().collect() }
+    }
+
+    /// The same table with a title.
+    pub fn titled(self, title: &str) -> Self {
+        Self { title: title.to_owned(), ..self }
+    }
+
+    /// As HTML, typeset.
+    pub fn html(&self) -> String {
+        let cell = |tag: &str, class: &str, text: &str| {
+            let badge = BADGES.iter().find(|(word, _)| class == "verdict" && *word == text);
+            let text = escape(&typeset(text));
+            let text =
+                badge.map_or_else(|| text.clone(), |(_, class)| format!("<span class=\"{class}\">{text}</span>"));
+            let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
+            format!("<{tag}{class}>{text}</{tag}>")
+        };
+        let row = |tag: &str, cells: &[String]| -> String {
+            // Of the heads only those of numbers are set as their columns.
+            let class = |class: &'_ String| if tag == "td" || class == "n" { class.clone() } else { String::new() };
+            self.classes.iter().zip(cells).map(|(of, text)| cell(tag, &class(of), text)).collect()
+        };
+        let title = if self.title.is_empty() { String::new() } else { format!("<p>{}</p>\n", escape(&self.title)) };
+        let rows = self.rows.iter().map(|cells| format!("<tr>{}</tr>\n", row("td", cells)));
+        format!(
+            "{title}<div class=\"scroll\"><table>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody></table></div>\n",
+            row("th", &self.heads),
+            rows.collect::<String>()
+        )
+    }
+
+    /// As Markdown.
+    pub fn markdown(&self) -> String {
+        let mut out = format!("| {} |\n{}|\n", self.heads.join(" | "), "|---".repeat(self.heads.len()));
+        for row in &self.rows {
+            // Writing to a String cannot fail.
+            let _ = writeln!(out, "| {} |", row.join(" | "));
+        }
+        out
+    }
+
+    /// As CSV.
+    pub fn csv(&self) -> String {
+        let quoted = |text: &String| {
+            let plain = !text.contains([',', '"', '\n']);
+            if plain { text.clone() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+        };
+        let line = |cells: &Vec<String>| cells.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
+        std::iter::once(&self.heads).chain(&self.rows).map(line).collect()
+    }
+
+    /// In columns for a terminal: numbers to the right, words to the left.
+    pub fn text(&self) -> String {
+        let is_number = |text: &String| {
+            let first = text.chars().next();
+            text == "-" || first.is_none_or(|c| c.is_ascii_digit() || c == '<')
+        };
+        let looks = self.heads.iter().enumerate().map(|(column, head)| {
+            let cells = || self.rows.iter().map(|row| &row[column]);
+            let width = cells().chain([head]).map(|text| text.chars().count()).max().unwrap_or(0);
+            (width, !self.rows.is_empty() && cells().all(is_number))
+        });
+        let looks: Vec<(usize, bool)> = looks.collect();
+        let line = |row: &Vec<String>| {
+            let cells = row.iter().zip(&looks).map(|(text, &(width, right))| {
+                if right { format!("{text:>width$}  ") } else { format!("{text:<width$}  ") }
+            });
+            cells.collect::<String>().trim_end().to_owned() + "\n"
+        };
+        let title = if self.title.is_empty() { String::new() } else { format!("{}\n", self.title) };
+        std::iter::once(&self.heads).chain(&self.rows).map(line).fold(title, |all, line| all + &line)
+    }
+}
 
 /// Fills every gap `{name}` of `page`.
 ///
@@ -21,63 +122,55 @@ pub fn fill(page: &str, gaps: &[(&str, String)]) -> String {
     out
 }
 
-/// An HTML table whose cells are already mark-up. Heads are separated by bars; ` .` after a head gives the class of the cells
-/// below: `Run | Largest force (N) .n`. The class of numbers, `n`, also applies to the head.
-pub fn html(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let heads: Vec<(&str, &str)> =
-        heads.split(" | ").map(|head| head.rsplit_once(" .").unwrap_or((head, ""))).collect();
-    let cell = |tag: &str, class: &str, text: &str| match class {
-        "" => format!("<{tag}>{text}</{tag}>"),
-        _ => format!("<{tag} class=\"{class}\">{text}</{tag}>"),
-    };
-    let mut out = String::from("<div class=\"scroll\"><table>\n<thead><tr>");
-    for (head, class) in &heads {
-        out += &cell("th", if *class == "n" { "n" } else { "" }, head);
-    }
-    out += "</tr></thead>\n<tbody>\n";
-    for row in rows {
-        let cells = heads.iter().zip(&row);
-        let cells: String = cells.map(|((_, class), text)| cell("td", class, text)).collect();
-        // Writing to a String cannot fail.
-        let _ = writeln!(out, "<tr>{cells}</tr>");
-    }
-    out + "</tbody></table></div>\n"
-}
-
-/// A Markdown table; heads are separated by bars.
-pub fn markdown(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let rule = "|---".repeat(heads.split(" | ").count());
-    let mut out = format!("| {heads} |\n{rule}|\n");
-    for row in rows {
-        let _ = writeln!(out, "| {} |", row.join(" | "));
-    }
-    out
-}
-
-/// CSV rows under the header line `head`.
-pub fn csv(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut out = format!("{head}\n");
-    for row in rows {
-        let cells: Vec<String> = row.iter().map(|text| quoted(text)).collect();
-        out += &cells.join(",");
-        out.push('\n');
-    }
-    out
-}
-
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
-}
-
 /// A number in CSV; empty if there is none.
 pub fn number(value: impl Into<Option<f64>>) -> String {
     let value = value.into().filter(|v| !v.is_nan());
     value.map_or_else(String::new, |v| significant(v, 12))
 }
 
+/// A cell that says whether something holds.
+pub fn yes(holds: bool) -> String {
+    if holds { "yes" } else { "no" }.to_owned()
+}
+
+/// Labelled values for a terminal, a line each.
+pub fn lines<'a>(values: impl IntoIterator<Item = (&'a str, String)>) -> String {
+    values.into_iter().map(|(label, value)| format!("{label:<20}{value}\n")).collect()
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// As in print: beta as its letter, powers of ten raised, minus signs.
+pub fn typeset(text: &str) -> String {
+    const BETWEEN: [char; 6] = [' ', ',', ';', ':', '(', ')'];
+    let set = |part: &str| {
+        let word = part.trim_end_matches(BETWEEN);
+        let number = word.ends_with(|c: char| c.is_ascii_digit()) && word.parse::<f64>().is_ok();
+        let set = match word.split_once('e').filter(|_| number) {
+            Some((mantissa, power)) => {
+                let raised = |c: char| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c.to_digit(10)? as usize);
+                let sign = if power.starts_with('-') { "⁻" } else { "" };
+                let digits = power.trim_start_matches(['-', '+', '0']).chars().filter_map(raised);
+                format!("{mantissa}·10{sign}{}", digits.collect::<String>())
+            }
+            None if word == "beta" => "β".to_owned(),
+            None => word.to_owned(),
+        };
+        let set = if number { set.replacen('-', "\u{2212}", 1) } else { set };
+        set + &part[word.len()..]
+    };
+    text.split_inclusive(BETWEEN).map(set).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn table<const N: usize>(heads: &str, rows: &[[&str; N]]) -> Table {
+        Table::new(heads, rows.iter().map(|row| row.map(str::to_owned).to_vec()))
+    }
 
     #[test]
     fn gaps_are_filled_once() {
@@ -87,22 +180,49 @@ mod tests {
 
     #[test]
     fn cells_have_the_class_of_their_column() {
-        let row = || ["S1", "0.5"].map(str::to_owned).to_vec();
-        let table = html("Joint | v. of it (m/s) .n", [row()]);
+        let table = table("Joint | v. of it (m/s) .n", &[["S1", "0.5"]]).html();
         let head = "<th>Joint</th><th class=\"n\">v. of it (m/s)</th>";
         assert!(table.contains(head), "{table}");
         assert!(table.contains("<tr><td>S1</td><td class=\"n\">0.5</td></tr>\n"), "{table}");
     }
 
     #[test]
+    fn words_stay_words() {
+        let hostile = "<script>alert(1)</script> & <b>";
+        let out = table("Place | Verdict .verdict", &[[hostile, "confirmed"], [hostile, hostile]]).html();
+        assert!(!out.contains("<script>") && !out.contains(" & "), "{out}");
+        assert_eq!(out.matches("&lt;script&gt;").count(), 3, "{out}");
+        assert!(out.contains("<td class=\"verdict\"><span class=\"ok\">confirmed</span></td>"), "{out}");
+    }
+
+    #[test]
     fn a_table_in_markdown_has_its_rule() {
-        let rows = [["a", ""].map(str::to_owned).to_vec()];
-        assert_eq!(markdown("x | y", rows), "| x | y |\n|---|---|\n| a |  |\n");
+        assert_eq!(table("x | y", &[["a", ""]]).markdown(), "| x | y |\n|---|---|\n| a |  |\n");
     }
 
     #[test]
     fn what_csv_cannot_hold_plainly_is_quoted() {
-        let rows = [vec!["a \"b\"".to_owned(), number(1.5)], vec!["c, d".to_owned(), number(None)]];
-        assert_eq!(csv("x,y", rows), "x,y\n\"a \"\"b\"\"\",1.5\n\"c, d\",\n");
+        let rows = [["a \"b\"", &number(1.5)], ["c, d", &number(None)]];
+        assert_eq!(table("x | y", &rows).csv(), "x,y\n\"a \"\"b\"\"\",1.5\n\"c, d\",\n");
+    }
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [["word", "1"], ["b", "-"]];
+        assert_eq!(table("a | number", &rows).text(), "a     number\nword       1\nb          -\n");
+    }
+
+    #[test]
+    fn numbers_and_names_are_set_as_in_print() {
+        for (text, set) in [
+            ("9.06117e-4 rad", "9.06117·10⁻⁴ rad"),
+            ("-1.305e-05 and -18.26 to -0.89 1/s", "−1.305·10⁻⁵ and −18.26 to −0.89 1/s"),
+            ("2e+12, 3e7", "2·10¹², 3·10⁷"),
+            ("rate of beta, beta", "rate of β, β"),
+            ("betas, alphabeta, 0-1 test, 12 edges, 4e", "betas, alphabeta, 0-1 test, 12 edges, 4e"),
+            ("", ""),
+        ] {
+            assert_eq!(typeset(text), set);
+        }
     }
 }

@@ -1,6 +1,8 @@
 //! What Sheng & Chen show, print and say in sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that
 //! it names. Nothing is tuned to match; the paper omits one dimension and contradicts itself in places.
 
+#![allow(missing_docs, reason = "the table explains its keys")]
+
 mod quantity;
 
 use std::f64::consts::PI;
@@ -94,17 +96,11 @@ impl Series {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SeriesRow {
-    /// Key of the parameter.
     pub key: String,
-    /// Its name on an axis.
     pub label: String,
-    /// Unit of its values here.
     pub unit: String,
-    /// How a value, `{}`, is written beside others.
     pub value: String,
-    /// The runs, in ascending order of the parameter.
     pub runs: [Case; 3],
-    /// Smallest and largest value of the diagrams over the parameter.
     pub range: [f64; 2],
 }
 
@@ -112,11 +108,8 @@ pub struct SeriesRow {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variant {
-    /// Prefix of its file names.
     pub prefix: String,
-    /// Title.
     pub title: String,
-    /// Keys and values.
     pub changes: Vec<(String, String)>,
 }
 
@@ -124,12 +117,16 @@ pub struct Variant {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variants {
-    /// The model of this program.
     pub corrected: Variant,
-    /// Friction uses (13) as printed.
     pub printed: Variant,
-    /// The latter, each with a second change.
     pub combinations: Vec<Variant>,
+}
+
+impl Variants {
+    /// All of them, in the order of the table.
+    pub fn all(&self) -> impl Iterator<Item = &Variant> {
+        [&self.corrected, &self.printed].into_iter().chain(&self.combinations)
+    }
 }
 
 /// One of the two coordinates plotted in the paper.
@@ -186,14 +183,10 @@ pub enum Sections {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// Figure it belongs to.
     pub figure: String,
-    /// The run.
     #[serde(rename = "run")]
     pub case: Case,
-    /// The quantity measured.
     pub quantity: FigureValue,
-    /// The value given in the text of section 4.2, SI units.
     pub value: f64,
 }
 
@@ -201,13 +194,9 @@ pub struct Published {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Verification {
-    /// Part of the figure, such as `17e`.
     pub figure: String,
-    /// The quantity measured.
     pub quantity: FigureValue,
-    /// From the paper's own program.
     pub own: f64,
-    /// From the commercial program it is compared with.
     pub commercial: f64,
 }
 
@@ -216,14 +205,7 @@ pub struct Verification {
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Shows {
     /// Columns of three runs over the whole period, and while the balls bounce.
-    Response {
-        /// The runs.
-        to: Series,
-        /// Columns of the upper charts.
-        whole: Vec<String>,
-        /// Columns of the lower charts.
-        early: Vec<String>,
-    },
+    Response { to: Series, whole: Vec<String>, early: Vec<String> },
     /// The contact forces of a run.
     Forces(Case),
     /// Columns of two formulations and the ideal motion.
@@ -248,15 +230,10 @@ pub enum Shows {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Figure {
-    /// Name in files: `figure-` and two digits for a figure of the paper.
     pub name: String,
-    /// Heading.
     pub heading: String,
-    /// Caption.
     pub caption: String,
-    /// What is drawn.
     pub shows: Shows,
-    /// Figures whose largest forces are tabulated below it.
     #[serde(default)]
     pub strongest_of: Vec<String>,
 }
@@ -273,76 +250,38 @@ impl Figure {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Section {
-    /// Name in links.
     pub id: String,
-    /// Heading.
     pub title: String,
-    /// Its figures.
     #[serde(rename = "figure")]
     pub figures: Vec<Figure>,
 }
 
-/// What must hold here for a statement to count as confirmed, as [`super::reproduction::Findings::statements`] judges it.
+/// What must hold here for a statement to count as confirmed; [`super::reproduction::Findings::statements`] has the criterion of each.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-#[allow(missing_docs, reason = "fields read as the sentences of the table")]
 pub enum Test {
-    /// In a run, a coordinate deviates from the ideal motion by a small fraction of its amplitude.
     StaysNearIdeal { coordinate: Coordinate, run: Case },
-    /// A quantity grows from run to run.
     Grows { of: FigureValue, with: Series },
-    /// All quantities said to grow do grow.
     AllGrow(Series),
-    /// One quantity exceeds another in every run.
     Exceeds { of: FigureValue, that: FigureValue, over: Series },
-    /// A quantity has its extreme in the middle run.
     NoRule { of: FigureValue, with: Series },
-    /// One quantity varies by a larger fraction of its mean than another.
     DiffersMore { of: FigureValue, than: FigureValue, with: Series },
-    /// A quantity varies more over one series than over the other.
     ChangesMoreWith { of: FigureValue, with: Series, than: Series },
-    /// No ball leaves its socket after a given instant, s.
     Steady { after: f64, over: Series },
-    /// A joint, counted from 1, has the largest peak force in a run.
     Hardest { joint: usize, run: Case },
-    /// Curves stay close to each other and to the ideal motion from a given instant (s) on.
-    Coincide {
-        curves: Curves,
-        #[serde(default)]
-        ideal: bool,
-        columns: Vec<String>,
-        from: f64,
-    },
-    /// Two formulations stay close, relative to the largest deviation from the ideal motion.
+    Coincide { curves: Curves, ideal: Option<bool>, columns: Vec<String>, from: f64 },
     FormulationsAgree(Vec<Coordinate>),
-    /// Settled curves stay close to each other.
     PortraitsCoincide { of: Coordinate, over: Series },
-    /// Settled curves do not close and, if `growing`, are further from closing the larger the parameter.
-    PortraitsWide {
-        of: Coordinate,
-        over: Series,
-        #[serde(default)]
-        growing: bool,
-    },
-    /// The last sections of three runs are in ascending order.
+    PortraitsWide { of: Coordinate, over: Series, growing: Option<bool> },
     SectionsAscend { of: Coordinate, over: Series },
-    /// The sections of three runs spread, increasingly from run to run.
     SectionsSpread { of: Coordinate, over: Series },
-    /// Sections are denser towards their centre.
     SectionsCrowd(Series),
-    /// Sections barely move over a series.
     SectionsStay { of: Sections, over: Series },
-    /// Sections agree at every value of a sweep.
     SectionsRepeat { of: Coordinate, over: Series },
-    /// Three runs are quasi-periodic.
     QuasiPeriodic(Series),
-    /// Every value of a sweep gives motion of period one.
     AllPeriodic(Series),
-    /// The first value of a sweep is periodic, the last chaotic.
     PeriodicToChaotic(Series),
-    /// The upper half of a sweep has more chaotic values.
     ChaosGrows(Series),
-    /// Every value of a sweep is chaotic, or none.
     ChaosAllOrNone(Series),
 }
 
@@ -350,11 +289,8 @@ pub enum Test {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
-    /// Where in the paper it is made.
     pub place: String,
-    /// The statement, paraphrased.
     pub says: String,
-    /// The test applied to it.
     pub test: Test,
 }
 
@@ -362,27 +298,17 @@ pub struct Claim {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paper {
-    /// Period of trajectory (59), s: simulated time of the runs of section 4.2.
     pub period: f64,
-    /// Amplitudes of x (m) and of beta (rad) in trajectory (59).
     pub amplitudes: [f64; 2],
-    /// The paper's output step, s.
     pub sampling: f64,
-    /// Every run that the figures need, once each; first the nominal one.
     pub runs: Vec<Case>,
-    /// Runs that differ in a single parameter, in the order of [`Series`].
     pub series: [SeriesRow; 2],
-    /// What they are computed with.
     pub variants: Variants,
-    /// Numbers from a named run.
     #[serde(rename = "number")]
     pub numbers: Vec<Published>,
-    /// Numbers from an unnamed run.
     pub verification: Vec<Verification>,
-    /// Figures.
     #[serde(rename = "section")]
     pub sections: Vec<Section>,
-    /// Statements.
     #[serde(rename = "statement")]
     pub statements: Vec<Claim>,
 }

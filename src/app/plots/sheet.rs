@@ -107,12 +107,10 @@ impl Plots {
             player.bins(channel, from, to, INSTANTS, &mut bins);
             ends(&bins)
         };
-        let line =
-            |label: &str, points, colour| Series { label: label.to_owned(), points, colour, line: true, marker: None };
         let mut series = Vec::new();
         if panel.kind == PlotKind::FromZeroWithClearances {
             for channel in player.clearances() {
-                let level = line(if series.is_empty() { "clearance" } else { "" }, points(channel), LEVEL);
+                let level = Series::line(if series.is_empty() { "clearance" } else { "" }, points(channel), LEVEL);
                 let closed = level.points.iter().all(|(_, value)| *value <= 0.0);
                 if !closed && !series.iter().any(|other: &Series| other.points == level.points) {
                     series.push(level);
@@ -125,7 +123,7 @@ impl Plots {
                 for (index, trace) in traces.iter().enumerate() {
                     let [r, g, b, _] = trace.colour.to_array();
                     let label = if index == 0 { kept.name() } else { String::new() };
-                    series.push(line(&label, ends(&trace.bins), (r, g, b)));
+                    series.push(Series::line(&label, ends(&trace.bins), (r, g, b)));
                 }
             }
         }
@@ -133,20 +131,10 @@ impl Plots {
             if !self.hidden.contains(channel) {
                 // The first colour is for a reference.
                 let colour = PALETTE[1 + index % (PALETTE.len() - 1)];
-                series.push(line(member, points(*channel), colour));
+                series.push(Series::line(member, points(*channel), colour));
             }
         }
-        Chart {
-            title: panel.label.to_owned(),
-            x: Axis {
-                label: "Time".to_owned(),
-                unit: time_unit.to_owned(),
-                range: Some((from / time_size, to / time_size)),
-                ..Axis::default()
-            },
-            y: Axis { label: panel.label.to_owned(), unit: unit.to_owned(), ..Axis::default() },
-            series,
-            ..Chart::default()
-        }
+        let time = Axis { range: Some((from / time_size, to / time_size)), ..Axis::new("Time", time_unit) };
+        Chart::new(panel.label, time, Axis::new(panel.label, unit), series)
     }
 }

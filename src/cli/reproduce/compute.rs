@@ -1,82 +1,96 @@
-//! Runs all jobs of a report on several threads.
+//! Runs all jobs of a report on several threads. Finished blocks of the sweeps are kept beside the report until it is written,
+//! so that an interrupted report resumes where it stopped; everything else takes seconds and is recomputed.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::thread;
+use std::path::{Path, PathBuf};
 
 use indicatif::ProgressBar;
 
-use super::interrupted;
-use super::kept::Kept;
-use crate::analysis::reproduction::{Agenda, Outcome, Report, ReproductionError};
+use crate::analysis::reproduction::{Agenda, Outcome, Report, RunError, SweepData};
 use crate::analysis::response::ResponseError;
-use crate::cli::{Failure, interrupt};
+use crate::cli::sweep::{Partial, meta};
+use crate::cli::workers::run_jobs;
+use crate::cli::{Failure, warn};
+use crate::files::{create_dir_all, remove_dir};
 
-/// Runs the jobs of `work` that `kept` lacks, and keeps their outcomes there; these depend neither on the number of
-/// threads nor on interruptions.
+/// The finished blocks: one file per sweep, in a folder of their own.
+pub(super) struct Kept {
+    folder: PathBuf,
+    parts: Vec<Partial>,
+}
+
+impl Kept {
+    /// Opens or creates the folder beside `out`.
+    ///
+    /// # Errors
+    /// As [`Partial::open`].
+    pub(super) fn open(out: &Path, work: &Agenda) -> Result<Self, Failure> {
+        // By components, which drops a trailing slash.
+        let mut name = out.components().as_path().as_os_str().to_owned();
+        name.push(".partial");
+        let folder = PathBuf::from(name);
+        create_dir_all(&folder).map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
+        let part = |data: &SweepData| {
+            let blocks: Vec<usize> = (0..data.sweep.grid().blocks()).collect();
+            Partial::open(&folder.join(data.file_name()), &meta(&data.sweep), &data.sweep, &blocks)
+        };
+        let parts = work.sweeps().iter().map(part).collect::<Result<_, Failure>>()?;
+        Ok(Self { folder, parts })
+    }
+
+    /// The folder, if an earlier run left anything there.
+    pub(super) fn begun(&self) -> Option<&Path> {
+        self.parts.iter().any(Partial::is_begun).then_some(&self.folder)
+    }
+
+    /// The error of a report that Ctrl-C broke off.
+    pub(super) fn interrupted(&self) -> Failure {
+        let folder = self.folder.display();
+        let words = format!("interrupted; no report was written, and the same command resumes from {folder}");
+        Failure::new(Failure::INTERRUPTED, words)
+    }
+
+    /// Removes the folder: its content is in the report.
+    pub(super) fn remove(self) {
+        self.parts.into_iter().for_each(Partial::remove);
+        if let Err(error) = remove_dir(&self.folder) {
+            warn(&format!("{} is no longer needed and could not be removed: {error}", self.folder.display()));
+        }
+    }
+}
+
+/// Runs the jobs of `work` that `kept` lacks; their outcomes depend neither on the number of threads nor on interruptions.
 ///
 /// # Errors
 /// Ctrl-C; the file system; a run that fails: of those begun, the first in job order.
 pub(super) fn compute(work: Agenda, kept: &mut Kept, threads: usize, bar: &ProgressBar) -> Result<Report, Failure> {
     let mut outcomes: Vec<Option<Outcome>> = (0..work.jobs()).map(|_| None).collect();
-    for (job, outcome) in kept.found(&work)? {
-        outcomes[job] = Some(outcome);
-        bar.inc(work.length(job).round() as u64);
+    let mut blocks = kept.parts.iter().map(Partial::blocks).collect::<Result<Vec<_>, _>>()?;
+    for (job, outcome) in outcomes.iter_mut().enumerate() {
+        *outcome = work.block(job).and_then(|(s, b)| Some(Outcome::Block(blocks[s].remove(&b)?)));
+        bar.inc(if outcome.is_some() { work.length(job).round() as u64 } else { 0 });
     }
     bar.reset_eta();
     let left: Vec<usize> = (0..work.jobs()).filter(|&job| outcomes[job].is_none()).collect();
-    let next = AtomicUsize::new(0);
-    let stop = AtomicBool::new(false);
-    let mut done: Vec<(usize, Result<Outcome, Failure>)> = Vec::new();
-    let shared = Mutex::new((kept, &mut done));
-    let worker = || {
-        while !stop.load(Ordering::Relaxed) {
-            let Some(&job) = left.get(next.fetch_add(1, Ordering::Relaxed)) else {
-                return;
-            };
-            let mut told = 0.0;
-            let outcome = work.run(job, |now| {
-                if now - told >= 1.0 {
-                    bar.inc((now - told) as u64);
-                    told += (now - told).floor();
-                }
-                !(stop.load(Ordering::Relaxed) || interrupt::asked())
-            });
-            bar.inc((work.length(job) - told).max(0.0).round() as u64);
-            // A thread's panic has already been reported.
-            let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
-            let (kept, done) = &mut *shared;
-            let outcome = match outcome {
-                Ok(outcome) => kept.keep(&work, job, &outcome).map(|()| outcome),
-                Err(error) if is_cancelled(&error) => return,
-                Err(error) => Err(Failure::new(Failure::DIVERGED, error.to_string())),
-            };
-            if outcome.is_err() {
-                stop.store(true, Ordering::Relaxed);
-            }
-            done.push((job, outcome));
+    let run = |job: usize, go_on: &dyn Fn() -> bool| {
+        let mut told = 0.0;
+        let outcome = work.run(job, |now| {
+            bar.inc((now - told) as u64);
+            told += f64::floor(now - told);
+            go_on()
+        });
+        bar.inc((work.length(job) - told).max(0.0).round() as u64);
+        match outcome {
+            Err(RunError { error, .. }) if matches!(*error, ResponseError::Cancelled) => None,
+            outcome => Some(outcome.map_err(|error| Failure::new(Failure::DIVERGED, error.to_string()))),
         }
     };
-    thread::scope(|scope| {
-        for _ in 0..threads.clamp(1, work.jobs()) {
-            scope.spawn(worker);
+    run_jobs(&left, threads, run, |job, outcome| {
+        if let (Some((s, b)), Outcome::Block(records)) = (work.block(job), &outcome) {
+            kept.parts[s].append(b, records)?;
         }
-    });
-    let (kept, _) = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
-    done.sort_by_key(|(job, _)| *job);
-    for (job, outcome) in done {
-        outcomes[job] = Some(outcome?);
-    }
-    let all: Option<Vec<Outcome>> = outcomes.into_iter().collect();
-    match all {
-        Some(outcomes) => Ok(work.gather(outcomes)),
-        None => Err(interrupted(kept)),
-    }
-}
-
-fn is_cancelled(error: &ReproductionError) -> bool {
-    match error {
-        ReproductionError::Run { error, .. } => matches!(**error, ResponseError::Cancelled),
-        _ => false,
-    }
+        outcomes[job] = Some(outcome);
+        Ok(())
+    })?;
+    let outcomes: Option<Vec<Outcome>> = outcomes.into_iter().collect();
+    outcomes.map(|outcomes| work.gather(outcomes)).ok_or_else(|| kept.interrupted())
 }

@@ -10,9 +10,6 @@ pub use merge::merge;
 pub(super) use partial::Partial;
 
 use std::collections::HashSet;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::thread;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
@@ -22,6 +19,7 @@ use self::options::Shard;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::{NearSingular, near_singular};
 use super::summary::count;
+use super::workers::run_jobs;
 use super::{Failure, interrupt, load, print, progress, threads, warn};
 use crate::analysis::drive::drive_period;
 use crate::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange};
@@ -217,42 +215,21 @@ fn compute(
     partial: &mut Partial,
     bar: &ProgressBar,
 ) -> Result<(), Failure> {
-    let next = AtomicUsize::new(0);
-    let stop = AtomicBool::new(false);
-    let worker = |send: mpsc::SyncSender<(usize, Vec<f64>)>| {
-        while let Some(&b) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut block = sweep.begin(b);
-            let mut told = 0;
-            while !block.is_done() {
-                if stop.load(Ordering::Relaxed) || interrupt::asked() {
-                    return;
-                }
-                block.advance(STEPS_BETWEEN_LOOKS);
-                let finished = block.finished().len();
-                bar.inc((finished - told) as u64);
-                told = finished;
+    let work = |b: usize, go_on: &dyn Fn() -> bool| {
+        let mut block = sweep.begin(b);
+        let mut told = 0;
+        while !block.is_done() {
+            if !go_on() {
+                return None;
             }
-            // The receiver is gone only after a failure, which is reported there.
-            if send.send((b, block.records())).is_err() {
-                return;
-            }
+            block.advance(STEPS_BETWEEN_LOOKS);
+            let finished = block.finished().len();
+            bar.inc((finished - told) as u64);
+            told = finished;
         }
+        Some(Ok(block.records()))
     };
-    thread::scope(|scope| {
-        let (send, receive) = mpsc::sync_channel(threads);
-        for _ in 0..threads.min(todo.len()) {
-            let send = send.clone();
-            scope.spawn(|| worker(send));
-        }
-        drop(send);
-        for (b, records) in receive {
-            if let Err(failure) = partial.append(b, &records) {
-                stop.store(true, Ordering::Relaxed);
-                return Err(failure);
-            }
-        }
-        Ok(())
-    })
+    run_jobs(todo, threads, work, |b, records| partial.append(b, &records))
 }
 
 /// Number of points by outcome.

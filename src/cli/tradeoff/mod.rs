@@ -3,10 +3,10 @@
 mod files;
 mod page;
 mod picture;
-mod words;
+mod points;
 
 pub use page::skeleton;
-pub use words::{grid, percent, times, value};
+pub use points::{percent, times, value};
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -46,11 +46,11 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Resu
         }
     }
     let found = measure(&scene, budget, arguments.quiet)?;
-    print(&words::text(&found))?;
+    print(&points::text(&found))?;
     if let Some((path, folder)) = folder {
         let manifest = files::fill(&folder, &found, &scene)?;
         folder.finish(manifest)?;
-        print(&format!("Written           {}\n", path.display()))?;
+        print(&format!("Written             {}\n", path.display()))?;
     }
     Ok(())
 }
@@ -61,7 +61,7 @@ fn measure(scene: &Scene, budget: &WorkBudget, quiet: bool) -> Result<WorkPrecis
 
 /// Measures everything that the documentation states, and writes it in one go at the end.
 fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
-    let targets = page::Targets::claim(root)?;
+    let files = page::claim(root)?;
     let mut found = Vec::with_capacity(BUILT_IN.len());
     let mut paces = Vec::with_capacity(BUILT_IN.len());
     for name in BUILT_IN {
@@ -71,9 +71,9 @@ fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
         paces.push((name, measuring::measure(quiet, Some(&scene), pace)?));
     }
     let costs = measuring::measure(quiet, None, |context| model_costs(budget, context))?;
-    targets.write(&found, &paces, &costs)?;
+    page::write(files, &found, &paces, &costs)?;
     for found in &found {
-        print(&words::text(found))?;
+        print(&points::text(found))?;
     }
-    print(&words::costs(&costs))
+    print(&points::costs(&costs).text())
 }

@@ -1,8 +1,8 @@
 //! The work-precision diagram of a scene.
 
-use super::words::value;
+use super::points::value;
 use crate::analysis::{Point, View, WorkPrecision};
-use crate::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Scale, Series, Sheet};
+use crate::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Series, Sheet};
 use crate::integrate::Method;
 
 /// Width of one diagram and height of the page, pixels.
@@ -27,23 +27,12 @@ const FRONT: &str = "On the front: nothing is both faster and more accurate";
 /// also mean something on other machines.
 pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
     let floor = &found.reference.floor;
-    let mut charts = vec![diagram(
-        found,
-        relative,
-        if found.reference.impacts == 0 { "Reactions" } else { "First impacts" },
-        "Largest relative error of a peak force",
-        Point::in_impacts,
-        floor.peak,
-    )];
+    let impacts = if found.reference.impacts == 0 { "Reactions" } else { "First impacts" };
+    let peak = "Largest relative error of a peak force";
+    let mut charts = vec![diagram(found, relative, impacts, peak, Point::in_impacts, floor.peak)];
     if found.reference.settled.is_some() {
-        charts.push(diagram(
-            found,
-            relative,
-            "Settled motion",
-            "Largest relative error of a mean force",
-            Point::in_settled,
-            floor.settled,
-        ));
+        let mean = "Largest relative error of a mean force";
+        charts.push(diagram(found, relative, "Settled motion", mean, Point::in_settled, floor.settled));
     }
     let columns = charts.len();
     Sheet {
@@ -65,54 +54,29 @@ fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view
         let error = error.max(floor.unwrap_or(0.0));
         (error <= WORST).then_some((cost, error))
     };
-    let mut series = Vec::new();
-    for (n, method) in Method::ALL.into_iter().enumerate() {
+    let series = Method::ALL.into_iter().enumerate().map(|(n, method)| {
         let own = found.points.iter().filter(|p| p.setting.method == method);
         // A gap where a point has no place: the line does not cross it.
         let points = own.map(|p| place(p).unwrap_or((f64::NAN, f64::NAN))).collect();
-        series.push(Series {
-            label: method.word().to_owned(),
-            points,
-            colour: PALETTE[n % PALETTE.len()],
-            line: true,
-            marker: Some(MARKERS[n % MARKERS.len()]),
-        });
-    }
-    let on_front = |p: &&Point| view(p).is_some_and(|(phase, _)| phase.front);
-    series.push(Series {
-        label: FRONT.to_owned(),
-        points: found.points.iter().filter(on_front).filter_map(place).collect(),
-        colour: (90, 90, 90),
-        line: false,
-        marker: Some(Marker::Ring),
+        let line = Series::line(method.word(), points, PALETTE[n % PALETTE.len()]);
+        line.marked(MARKERS[n % MARKERS.len()])
     });
-    let labels = found
-        .points
-        .iter()
-        .filter_map(|point| {
-            let text = match point.preset {
-                Some(preset) => preset.word().to_owned(),
-                None if is_baseline(point) => {
-                    format!("{} {}", point.setting.method, value(&point.setting))
-                }
-                None => return None,
-            };
-            Some(Label { at: place(point)?, text })
-        })
-        .collect();
+    let on_front = found.points.iter().filter(|p| view(p).is_some_and(|(phase, _)| phase.front));
+    let front = Series::dots(FRONT, on_front.filter_map(place).collect(), (90, 90, 90), Marker::Ring);
+    let labels = found.points.iter().filter_map(|point| {
+        let text = match point.preset {
+            Some(preset) => preset.word().to_owned(),
+            None if is_baseline(point) => format!("{} {}", point.setting.method, value(&point.setting)),
+            None => return None,
+        };
+        Some(Label { at: place(point)?, text })
+    });
+    let unit = if relative { "that of rk4 at 10 us is 1" } else { "s" };
+    let time = Axis::logarithmic("Time for a simulated second", unit);
     Chart {
-        title: title.to_owned(),
-        x: Axis {
-            label: "Time for a simulated second".to_owned(),
-            unit: if relative { "that of rk4 at 10 us is 1" } else { "s" }.to_owned(),
-            scale: Scale::Logarithmic,
-            range: None,
-        },
-        y: Axis { label: error.to_owned(), scale: Scale::Logarithmic, ..Axis::default() },
-        series,
-        labels,
+        labels: labels.collect(),
         levels: floor.map(|y| Level { y, text: "less cannot be told".to_owned() }).into_iter().collect(),
-        map: None,
+        ..Chart::new(title, time, Axis::logarithmic(error, ""), series.chain([front]).collect())
     }
 }
 

@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 use super::args::ValidateArguments;
 use super::output::significant;
-use super::tables::{fill, markdown};
+use super::tables::{Table, fill};
 use super::{Failure, print};
 use crate::analysis::validation::{CASES, Case, Check, Comparison, Right};
 use crate::files::OutputFile;
@@ -43,7 +43,7 @@ pub fn page() -> Result<(String, Vec<String>), Failure> {
     }
     let heads = "Case | Quantity | Right value from | Right | Ours | Difference | Bound";
     let sources: String = CASES.iter().map(source).collect();
-    let page = fill(include_str!("page.md"), &[("cases", markdown(heads, rows)), ("sources", sources)]);
+    let page = fill(include_str!("page.md"), &[("cases", Table::new(heads, rows).markdown()), ("sources", sources)]);
     Ok((page, missed))
 }
 

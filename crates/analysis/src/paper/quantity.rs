@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Deserializer, de::Error as _};
 
-use super::{Coordinate, Coordinate::Beta, Coordinate::X, Published};
+use super::Coordinate::{Beta, X};
+use super::Published;
 use crate::response::{Extremes, Response};
 use jointplay_physics::words::{Words as _, words};
 
@@ -48,53 +49,40 @@ impl FigureValue {
     /// Contact forces, joint by joint.
     pub const NORMAL: [Self; 3] = [Self::Normal1, Self::Normal2, Self::Normal3];
 
-    /// Its unit.
-    pub fn unit(self) -> &'static str {
+    /// Its unit, and its value among the extremes of a run; `None` where sampling does not matter.
+    fn row(self) -> (&'static str, fn(&Extremes) -> Option<f64>) {
         match self {
-            Self::DeviationX => "m",
-            Self::DeviationBeta => "rad",
-            Self::RateX => "m/s",
-            Self::RateBeta => "rad/s",
-            Self::AccelerationX => "m/s²",
-            Self::AccelerationBeta => "rad/s²",
-            Self::Normal1 | Self::Normal2 | Self::Normal3 | Self::Strongest => "N",
-            Self::LastSeparation => "s",
+            Self::DeviationX => ("m", |e| Some(e.deviation[X.index()])),
+            Self::DeviationBeta => ("rad", |e| Some(e.deviation[Beta.index()])),
+            Self::RateX => ("m/s", |e| Some(e.rate[X.index()])),
+            Self::RateBeta => ("rad/s", |e| Some(e.rate[Beta.index()])),
+            Self::AccelerationX => ("m/s²", |e| Some(e.acceleration[X.index()])),
+            Self::AccelerationBeta => ("rad/s²", |e| Some(e.acceleration[Beta.index()])),
+            Self::Normal1 => ("N", |e| e.normal.first().copied()),
+            Self::Normal2 => ("N", |e| e.normal.get(1).copied()),
+            Self::Normal3 => ("N", |e| e.normal.get(2).copied()),
+            Self::Strongest => ("N", |e| e.normal.iter().copied().reduce(f64::max)),
+            Self::LastSeparation => ("s", |_| None),
         }
     }
 
-    fn of_extremes(self, extremes: &Extremes) -> Option<f64> {
-        let at = |values: &[f64], coordinate: Coordinate| Some(values[coordinate.index()]);
-        let normal = |joint: usize| extremes.normal.get(joint).copied();
-        match self {
-            Self::DeviationX => at(&extremes.deviation, X),
-            Self::DeviationBeta => at(&extremes.deviation, Beta),
-            Self::RateX => at(&extremes.rate, X),
-            Self::RateBeta => at(&extremes.rate, Beta),
-            Self::AccelerationX => at(&extremes.acceleration, X),
-            Self::AccelerationBeta => at(&extremes.acceleration, Beta),
-            Self::Normal1 => normal(0),
-            Self::Normal2 => normal(1),
-            Self::Normal3 => normal(2),
-            Self::Strongest => extremes.normal.iter().copied().reduce(f64::max),
-            Self::LastSeparation => None,
-        }
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        self.row().0
     }
 
     /// Value in continuous time; NaN where undefined.
     pub fn of(self, response: &Response) -> f64 {
         let value = match self {
-            Self::LastSeparation => {
-                let last = response.last_separation.iter().flatten();
-                last.copied().reduce(f64::max)
-            }
-            _ => self.of_extremes(&response.full),
+            Self::LastSeparation => response.last_separation.iter().flatten().copied().reduce(f64::max),
+            _ => self.row().1(&response.full),
         };
         value.unwrap_or(f64::NAN)
     }
 
     /// Value at the paper's sampling; `None` where sampling does not matter.
     pub fn sampled(self, response: &Response) -> Option<f64> {
-        self.of_extremes(&response.sampled)
+        self.row().1(&response.sampled)
     }
 }
 

@@ -6,47 +6,42 @@ use crate::paper::{Case, Comparison, PAPER, Published, Series, Variant};
 
 /// The results of a report.
 pub struct Report {
-    /// With this program's model.
-    pub corrected: Findings,
-    /// With friction that uses (13) as printed.
-    pub printed: Findings,
-    /// The latter, each with a second change.
-    pub combinations: Vec<Combination>,
-}
-
-/// Results of (13) as printed together with a second change.
-pub struct Combination {
-    /// The changes.
-    pub variant: &'static Variant,
-    /// Runs by clearance.
-    pub runs: Vec<RecordedRun>,
-    /// Their sections.
-    pub sections: SweepData,
-}
-
-/// All results with one model.
-pub struct Findings {
     /// How much was computed.
     pub extent: Extent,
-    /// The model.
+    /// Results of each variant of the model, in the order of [`PAPER`].
+    pub models: Vec<Findings>,
+}
+
+impl Report {
+    /// The variants with all figures and statements: this program's model, and friction that uses (13) as printed.
+    pub fn complete(&self) -> [&Findings; 2] {
+        [&self.models[0], &self.models[1]]
+    }
+
+    /// Total simulated time of all runs, without twins, s.
+    pub fn simulated(&self) -> f64 {
+        let of_sweep = |data: &SweepData| data.sweep.plan().periods * data.sweep.grid().points();
+        let of_run = |run: &RecordedRun| if run.settled.is_some() { 1 + self.extent.settle + 2 } else { 1 };
+        let of_model = |found: &Findings| {
+            found.runs.iter().map(of_run).sum::<usize>() + found.sweeps.iter().map(of_sweep).sum::<usize>()
+        };
+        // One more with ideal joints.
+        PAPER.period * (1 + self.models.iter().map(of_model).sum::<usize>()) as f64
+    }
+}
+
+/// Results of one variant of the model. Combinations have only the runs by clearance and their sections.
+pub struct Findings {
+    /// The variant.
     pub variant: &'static Variant,
-    /// The paper's runs, in the order of [`PAPER`].
+    /// The paper's runs, in the order of [`PAPER`]; then the first of them with all bodies and multipliers.
     pub runs: Vec<RecordedRun>,
-    /// The first of them with all bodies and multipliers.
-    pub lagrange: RecordedRun,
     /// The run with ideal joints.
     pub ideal: RecordedRun,
-    /// Settled curves, in the order of [`PAPER`].
-    pub curves: Vec<SettledCurve>,
     /// Sweeps: [`Findings::sweep`] finds one by name.
     pub sweeps: Vec<SweepData>,
     /// Smallest differences in x (m) and beta (rad) that distinguish two sections.
     pub resolution: [f64; 2],
-}
-
-fn index(case: Case) -> usize {
-    let found = PAPER.runs.iter().position(|of| *of == case);
-    found.expect("the table names no other run")
 }
 
 impl Findings {
@@ -84,12 +79,20 @@ impl Findings {
     /// # Panics
     /// If it is none of those in [`PAPER`].
     pub fn run(&self, case: Case) -> &RecordedRun {
-        &self.runs[index(case)]
+        self.runs.iter().find(|run| run.case == case).expect("the table names no other run")
+    }
+
+    /// The nominal run with all bodies and multipliers.
+    pub fn lagrange(&self) -> &RecordedRun {
+        &self.runs[PAPER.runs.len()]
     }
 
     /// Settled curves of a series.
+    ///
+    /// # Panics
+    /// In a combination, which has none.
     pub fn loops(&self, series: Series) -> [&SettledCurve; 3] {
-        series.cases().map(|case| &self.curves[index(case)])
+        series.cases().map(|case| self.run(case).settled.as_ref().expect("taken of all runs of the paper"))
     }
 
     /// Every number of the paper from a named run, beside this program's.

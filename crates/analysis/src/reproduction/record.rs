@@ -6,6 +6,7 @@ use crate::response::{Observation, Response};
 use crate::sweep::Sweep;
 
 /// A column of a [`RecordedRow`].
+#[derive(Clone, Copy)]
 pub struct Column {
     /// Name in files.
     pub name: &'static str,
@@ -15,30 +16,45 @@ pub struct Column {
     pub unit: &'static str,
     /// That unit in SI units.
     pub one: f64,
+    /// Its value at an instant.
+    pub(super) of: fn(&Observation) -> f64,
 }
 
-const fn column(name: &'static str, label: &'static str, unit: &'static str, one: f64) -> Column {
-    Column { name, label, unit, one }
+const fn column(
+    name: &'static str,
+    label: &'static str,
+    unit: &'static str,
+    one: f64,
+    of: fn(&Observation) -> f64,
+) -> Column {
+    Column { name, label, unit, one, of }
 }
+
+const X: usize = Coordinate::X.index();
+const BETA: usize = Coordinate::Beta.index();
 
 /// Columns of a [`RecordedRow`]; each coordinate is followed by its derivatives.
 pub const COLUMNS: [Column; 15] = [
-    column("t_s", "time", "s", 1.0),
-    column("x_m", "x", "mm", 1e-3),
-    column("vx_m_s", "velocity in x", "m/s", 1.0),
-    column("ax_m_s2", "acceleration in x", "m/s²", 1.0),
-    column("beta_rad", "beta", "mrad", 1e-3),
-    column("beta_rate_rad_s", "rate of beta", "rad/s", 1.0),
-    column("beta_accel_rad_s2", "acceleration of beta", "rad/s²", 1.0),
-    column("S1_normal_N", "contact force", "N", 1.0),
-    column("S2_normal_N", "contact force", "N", 1.0),
-    column("S3_normal_N", "contact force", "N", 1.0),
-    column("x_deviation_m", "x less ideal", "mm", 1e-3),
-    column("beta_deviation_rad", "beta less ideal", "mrad", 1e-3),
-    column("probe_error_m", "tip error", "µm", 1e-6),
-    column("constraint_drift", "largest violation so far", "", 1.0),
-    column("sample", "at the paper's output step", "", 1.0),
+    column("t_s", "time", "s", 1.0, |look| look.time),
+    column("x_m", "x", "mm", 1e-3, |look| look.derivatives()[0][X]),
+    column("vx_m_s", "velocity in x", "m/s", 1.0, |look| look.derivatives()[1][X]),
+    column("ax_m_s2", "acceleration in x", "m/s²", 1.0, |look| look.derivatives()[2][X]),
+    column("beta_rad", "beta", "mrad", 1e-3, |look| look.derivatives()[0][BETA]),
+    column("beta_rate_rad_s", "rate of beta", "rad/s", 1.0, |look| look.derivatives()[1][BETA]),
+    column("beta_accel_rad_s2", "acceleration of beta", "rad/s²", 1.0, |look| look.derivatives()[2][BETA]),
+    column("S1_normal_N", "contact force", "N", 1.0, |look| normal_force(look, 0)),
+    column("S2_normal_N", "contact force", "N", 1.0, |look| normal_force(look, 1)),
+    column("S3_normal_N", "contact force", "N", 1.0, |look| normal_force(look, 2)),
+    column("x_deviation_m", "x less ideal", "mm", 1e-3, |look| look.deviation()[X]),
+    column("beta_deviation_rad", "beta less ideal", "mrad", 1e-3, |look| look.deviation()[BETA]),
+    column("probe_error_m", "tip error", "µm", 1e-6, |look| look.frame.probe_error.map_or(f64::NAN, |e| e.norm())),
+    column("constraint_drift", "largest violation so far", "", 1.0, |look| look.constraint_drift),
+    column("sample", "at the paper's output step", "", 1.0, |look| f64::from(u8::from(look.sample))),
 ];
+
+fn normal_force(look: &Observation, joint: usize) -> f64 {
+    look.frame.joints.get(joint).map_or(f64::NAN, |joint| joint.normal_force.norm())
+}
 
 /// Index of the column called `name`.
 ///
@@ -57,31 +73,6 @@ pub fn derivative(coordinate: Coordinate, nth: usize) -> usize {
 /// One instant of a run, in the order of [`COLUMNS`]; the last is 1 at whole multiples of the paper's output step.
 pub type RecordedRow = [f64; COLUMNS.len()];
 
-pub(super) fn row(look: &Observation) -> RecordedRow {
-    let [c, r, a] = look.derivatives();
-    let deviation = look.deviation();
-    let joints = &look.frame.joints;
-    let force = |j: usize| joints.get(j).map_or(f64::NAN, |j| j.normal_force.norm());
-    let [x, beta] = Coordinate::ALL.map(Coordinate::index);
-    [
-        look.time,
-        c[x],
-        r[x],
-        a[x],
-        c[beta],
-        r[beta],
-        a[beta],
-        force(0),
-        force(1),
-        force(2),
-        deviation[x],
-        deviation[beta],
-        look.frame.probe_error.map_or(f64::NAN, |e| e.norm()),
-        look.constraint_drift,
-        f64::from(u8::from(look.sample)),
-    ]
-}
-
 /// A run of section 4.2 with everything that its figures show.
 #[derive(Clone, Debug)]
 pub struct RecordedRun {
@@ -93,6 +84,8 @@ pub struct RecordedRun {
     pub response: Response,
     /// All instants, in order of time.
     pub rows: Vec<RecordedRow>,
+    /// Its settled motion, if that was taken.
+    pub settled: Option<SettledCurve>,
 }
 
 impl RecordedRun {
@@ -110,10 +103,8 @@ impl RecordedRun {
 }
 
 /// Settled motion of one of the paper's runs over one period.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SettledCurve {
-    /// The run.
-    pub case: Case,
     /// x (m) and beta (rad) at equal drive phases, the same for every run.
     pub coordinates: [Vec<f64>; 2],
     /// Their rates, m/s and rad/s.
@@ -149,6 +140,11 @@ impl SettledPoint {
         extent(all[all.len() / 2..].iter().copied())
     }
 
+    /// Its regime with the period.
+    pub fn regime_word(&self) -> String {
+        self.regime.map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
+    }
+
     /// Drive periods after which it repeats; 0 if it does not.
     pub fn period(&self) -> usize {
         self.regime.map_or(0, Regime::period)
@@ -156,13 +152,13 @@ impl SettledPoint {
 }
 
 /// Minimum and maximum.
-pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
 }
 
 /// Maximum less minimum.
-pub(super) fn extent(values: impl Iterator<Item = f64>) -> f64 {
-    let (least, most) = range(values);
+pub(super) fn extent(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (least, most) = range(values.into_iter());
     most - least
 }
 
@@ -170,6 +166,22 @@ pub(super) fn extent(values: impl Iterator<Item = f64>) -> f64 {
 pub fn exponents(points: &[SettledPoint]) -> (f64, f64) {
     let measured = points.iter().map(|p| p.exponent.0);
     range(measured.filter(|e| e.is_finite()))
+}
+
+/// Word for the regime of a motion that did not reach its end.
+pub const NO_REGIME: &str = "none";
+
+/// Number of points per regime with its period, in order of first occurrence.
+pub fn regime_counts(points: &[SettledPoint]) -> Vec<(String, usize)> {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for point in points {
+        let word = point.regime_word();
+        match counts.iter_mut().find(|(of, _)| *of == word) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((word, 1)),
+        }
+    }
+    counts
 }
 
 /// A sweep with the records of all its points.

@@ -1,207 +1,218 @@
-//! Whether the paper's statements hold here: a verdict by the test of each one in [`PAPER`], with its numbers.
+//! Whether the paper's statements hold here: a verdict by the test of each one in [`PAPER`], with its criterion and its numbers.
 
 use super::Findings;
-use super::record::{RecordedRow, RecordedRun, SettledPoint, column_of, derivative, exponents, extent};
-use crate::paper::{Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test};
+use super::record::{
+    COLUMNS, RecordedRow, RecordedRun, SettledPoint, column_of, derivative, exponents, extent, regime_counts,
+};
+use crate::paper::{Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test};
 use crate::regime::Regime;
 
-/// A change below this fraction of the amplitude counts as none.
-pub const LITTLE: f64 = 0.05;
+/// A change below this fraction of the amplitude counts as none; the criteria call it 5 %.
+const LITTLE: f64 = 0.05;
 
 /// A statement of the paper and this program's verdict.
 #[derive(Clone, Debug)]
 pub struct Statement {
     /// Where the paper makes it, what it says, and its test.
     pub claim: &'static Claim,
-    /// Whether that test is met here.
+    /// Whether the criterion is met here.
     pub confirmed: bool,
+    /// What must hold.
+    pub criterion: &'static str,
     /// The numbers behind the verdict.
-    pub grounds: Grounds,
+    pub evidence: Vec<Reading>,
 }
 
-/// The numbers behind a verdict, in SI units; shares are fractions of 1. The test says what they measure, and in which order.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Grounds {
-    /// A number for each run, or for each thing that the test names.
-    Values(Vec<f64>),
-    /// Two such numbers, or a distance and what share it is.
-    Pairs(Vec<(f64, f64)>),
-    /// A length or angle for each run or point, and the smallest one that counts.
-    Resolved(Vec<f64>, f64),
-    /// For each run the share of its sections that lie near their middle; `None` if they cannot be told apart.
-    Crowds(Vec<Option<f64>>),
-    /// The joints and their largest forces.
-    Joints(Vec<(String, f64)>),
-    /// The regime of every run or point, `None` where it did not reach its end; the smallest and the largest exponent, 1/s.
-    Regimes(Vec<Option<Regime>>, (f64, f64)),
-    /// Number of chaotic points and the largest spread of beta, in either half of the range.
-    Halves([(usize, f64); 2]),
-    /// How many quantities grow, and of how many.
-    Count(usize, usize),
-}
+/// A number behind a verdict: what it is of, its value, NaN if there is none, and its unit.
+pub type Reading = (String, f64, &'static str);
 
 impl Findings {
     /// Every statement of the paper, in its order.
     pub fn statements(&self) -> Vec<Statement> {
         let of = |claim: &'static Claim| {
-            let (confirmed, grounds) = self.judge(&claim.test);
-            Statement { claim, confirmed, grounds }
+            let (confirmed, criterion, evidence) = self.judge(&claim.test);
+            Statement { claim, confirmed, criterion, evidence }
         };
         PAPER.statements.iter().map(of).collect()
     }
 
-    fn judge(&self, test: &Test) -> (bool, Grounds) {
-        use Grounds::{Count, Crowds, Halves, Joints, Pairs, Resolved, Values};
+    /// Whether the criterion of a test is met, the criterion, and the numbers that it is held against.
+    fn judge(&self, test: &Test) -> (bool, &'static str, Vec<Reading>) {
         match *test {
             Test::StaysNearIdeal { coordinate, run } => {
                 let most = self.run(run).response.full.deviation[coordinate.index()];
                 let share = most / coordinate.amplitude(0);
-                (share < LITTLE, Pairs(vec![(most, share)]))
+                let evidence =
+                    vec![micro("at most", most, coordinate), ("of the amplitude".to_owned(), share * 100.0, "%")];
+                (share < LITTLE, "leaves the ideal motion by less than 5 % of its amplitude", evidence)
             }
             Test::Grows { of, with } => {
                 let values = self.values(of, with);
-                (ascending(&values), Values(values))
+                let criterion = "larger at each value than at the one before, in continuous time";
+                (ascending(&values), criterion, each(with, &values, of.unit()))
             }
             Test::AllGrow(series) => {
                 let tests = PAPER.statements.iter().map(|claim| &claim.test);
                 let own = |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
                 let grown: Vec<bool> = tests.filter(own).map(|test| self.judge(test).0).collect();
                 let held = grown.iter().filter(|held| **held).count();
-                (held == grown.len(), Count(held, grown.len()))
+                let evidence = vec![count("that grow", held), count("measured", grown.len())];
+                (held == grown.len(), "every measured quantity of section 4.2 grows at both steps", evidence)
             }
             Test::Exceeds { of, that, over } => {
-                let pairs = self.values(of, over).into_iter();
-                let pairs: Vec<(f64, f64)> = pairs.zip(self.values(that, over)).collect();
-                let larger = pairs.iter().all(|(large, small)| large > small);
-                (larger, Pairs(pairs))
+                let [large, small] = [of, that].map(|quantity| self.values(quantity, over));
+                let larger = large.iter().zip(&small).all(|(large, small)| large > small);
+                let evidence = [each(over, &large, of.unit()), each(over, &small, that.unit())].concat();
+                (larger, "its peak is the larger number, in SI units, at all three values", evidence)
             }
             Test::NoRule { of, with } => {
                 let v = self.values(of, with);
-                ((v[1] - v[0]) * (v[2] - v[1]) < 0.0, Values(v))
+                let extreme = (v[1] - v[0]) * (v[2] - v[1]) < 0.0;
+                (extreme, "the middle value has the largest or the smallest peak", each(with, &v, of.unit()))
             }
             Test::DiffersMore { of, than, with } => {
-                let [this, other] = [of, than].map(|quantity| {
-                    let values = self.values(quantity, with).into_iter();
-                    extent(values.clone()) / (values.sum::<f64>() / 3.0)
+                let shares = [of, than].map(|quantity| {
+                    let values = self.values(quantity, with);
+                    extent(values) / (values.iter().sum::<f64>() / 3.0)
                 });
-                (this > other, Values(vec![this, other]))
+                let evidence = percent([of, than].map(FigureValue::word), &shares);
+                (shares[0] > shares[1], "over the three values it differs by a larger share of its mean", evidence)
             }
             Test::ChangesMoreWith { of, with, than } => {
-                let [this, other] = [with, than].map(|series| extent(self.values(of, series).into_iter()));
-                (this > other, Values(vec![this, other]))
+                let changes = [with, than].map(|series| extent(self.values(of, series)));
+                let evidence = [0, 1].map(|n| ([with, than][n].to_string(), changes[n], of.unit()));
+                let criterion = "it changes more over the three values of this parameter than over those of the other";
+                (changes[0] > changes[1], criterion, evidence.to_vec())
             }
             Test::Steady { after, over } => {
                 let last = self.values(FigureValue::LastSeparation, over);
-                (last.iter().all(|t| *t <= after), Values(last))
+                let steady = last.iter().all(|t| *t <= after);
+                (steady, "no ball leaves its socket after that instant", each(over, &last, "s"))
             }
             Test::Hardest { joint, run } => {
                 let response = &self.run(run).response;
                 let forces = &response.full.normal;
-                let hardest = forces.iter().copied().reduce(f64::max);
-                let holds = forces.get(joint - 1).copied() == hardest;
-                let joints = response.joints.iter().cloned().zip(forces.iter().copied());
-                (holds, Joints(joints.collect()))
+                let hardest = forces.get(joint - 1).copied() == forces.iter().copied().reduce(f64::max);
+                let evidence = response.joints.iter().zip(forces).map(|(name, force)| (name.clone(), *force, "N"));
+                (hardest, "that joint has the largest peak force, in continuous time", evidence.collect())
             }
             Test::Coincide { curves, ideal, ref columns, from } => {
-                let ideal = ideal.then_some(&self.ideal);
+                let ideal = (ideal == Some(true)).then_some(&self.ideal);
                 let curves = self.curves_of(curves).into_iter().chain(ideal);
                 let curves: Vec<Vec<&RecordedRow>> = curves.map(RecordedRun::samples).collect();
-                little(columns.iter().map(|c| apart(&curves, column_of(c), from)))
+                let columns: Vec<usize> = columns.iter().map(|name| column_of(name)).collect();
+                let shares: Vec<f64> = columns.iter().map(|&c| apart(&curves, c, from)).collect();
+                let mut evidence = percent(columns.iter().map(|&c| COLUMNS[c].label), &shares);
+                evidence.push(("from".to_owned(), from, "s"));
+                (little(&shares), "no two curves are further apart than 5 % of the ideal motion's amplitude", evidence)
             }
             Test::FormulationsAgree(ref coordinates) => {
-                let tree = &self.runs[0].response.full;
-                let found = coordinates.iter().map(|&c| {
-                    let apart = self.formulations_apart(c);
-                    (apart, apart / tree.deviation[c.index()])
-                });
-                let found: Vec<(f64, f64)> = found.collect();
-                let near = found.iter().all(|(_, share)| *share < LITTLE);
-                (near, Pairs(found))
+                let apart: Vec<f64> = coordinates.iter().map(|&c| self.formulations_apart(c)).collect();
+                let most = &self.runs[0].response.full.deviation;
+                let shares = coordinates.iter().zip(&apart).map(|(c, apart)| apart / most[c.index()]);
+                let shares: Vec<f64> = shares.collect();
+                let mut evidence = percent(coordinates.iter().map(|c| c.word()), &shares);
+                evidence.extend(coordinates.iter().zip(apart).map(|(&c, apart)| micro(c.word(), apart, c)));
+                let criterion = "tree and lagrange agree within 5 % of the largest deviation from the ideal motion";
+                (little(&shares), criterion, evidence)
             }
             Test::PortraitsCoincide { of, over } => {
                 let (c, loops) = (of as usize, self.loops(over));
                 let values = furthest(&loops.map(|l| &l.coordinates[c])) / of.amplitude(0);
-                let rates = furthest(&loops.map(|l| &l.rates[c])) / of.amplitude(1);
-                little([values.max(rates)])
+                let share = [values.max(furthest(&loops.map(|l| &l.rates[c])) / of.amplitude(1))];
+                let criterion = "no two settled curves are further apart than 5 % of the amplitude at equal phases";
+                (little(&share), criterion, percent(["at most"], &share))
             }
             Test::PortraitsWide { of, over, growing } => {
-                let resolution = self.resolution[of as usize];
-                let widths = self.loops(over).map(|l| l.width[of as usize]).to_vec();
-                let wide = widths.iter().all(|w| *w > resolution);
-                let holds = wide && (!growing || ascending(&widths));
-                (holds, Resolved(widths, resolution))
+                let widths = self.loops(over).map(|l| l.width[of as usize]);
+                let wide = widths.iter().all(|w| *w > self.resolution[of as usize]);
+                let evidence = self.resolved(of, over, &widths);
+                if growing == Some(true) {
+                    let criterion = "successive settled periods differ by more than the resolution, and increasingly";
+                    return (wide && ascending(&widths), criterion, evidence);
+                }
+                (wide, "successive settled periods differ by more than the resolution", evidence)
             }
             Test::SectionsAscend { of, over } => {
-                let resolution = self.resolution[of as usize];
                 let latest: Vec<f64> = self.sections(over).iter().map(|r| r.latest(of)).collect();
-                let further = |pair: &[f64]| pair[1] - pair[0] > resolution;
-                (latest.windows(2).all(further), Resolved(latest, resolution))
+                let further = |pair: &[f64]| pair[1] - pair[0] > self.resolution[of as usize];
+                let evidence = self.resolved(of, over, &latest);
+                (latest.windows(2).all(further), "from value to value it grows by more than the resolution", evidence)
             }
             Test::SectionsSpread { of, over } => {
-                let resolution = self.resolution[of as usize];
                 let spreads = spreads(self.sections(over), of);
-                let wide = spreads.iter().all(|spread| *spread > resolution);
-                (wide && ascending(&spreads), Resolved(spreads, resolution))
+                let wide = spreads.iter().all(|spread| *spread > self.resolution[of as usize]);
+                let evidence = self.resolved(of, over, &spreads);
+                (wide && ascending(&spreads), "their spread is above the resolution and grows", evidence)
             }
             Test::SectionsCrowd(over) => {
                 let runs = self.sections(over).iter();
-                let crowds = runs.map(|run| crowd(run, self.resolution));
-                let crowds: Vec<Option<f64>> = crowds.collect();
-                let dense = crowds.iter().all(|share| share.is_some_and(|s| s > 0.5));
-                (dense, Crowds(crowds))
+                let crowds: Vec<f64> =
+                    runs.map(|run| 100.0 * crowd(run, self.resolution).unwrap_or(f64::NAN)).collect();
+                let criterion = "they can be told apart, and more than half lie within half of the largest distance \
+                                 from their mean, in units of the resolution";
+                (crowds.iter().all(|share| *share > 50.0), criterion, each(over, &crowds, "%"))
             }
             Test::SectionsStay { of, over } => {
                 let points = match of {
                     Sections::Runs => self.sections(over),
                     Sections::Sweep => self.swept(over),
                 };
-                little(Coordinate::ALL.map(|c| {
-                    let latest = points.iter().map(|p| p.latest(c));
-                    extent(latest) / c.amplitude(0)
-                }))
+                let shares = Coordinate::ALL.map(|c| extent(points.iter().map(|p| p.latest(c))) / c.amplitude(0));
+                let evidence = percent(Coordinate::ALL.map(Coordinate::word), &shares);
+                (little(&shares), "they lie within 5 % of the amplitude of each other", evidence)
             }
             Test::SectionsRepeat { of, over } => {
-                let resolution = self.resolution[of as usize];
-                let spreads = spreads(self.swept(over), of);
+                let (resolution, spreads) = (self.resolution[of as usize], spreads(self.swept(over), of));
                 let narrow = spreads.iter().all(|spread| *spread <= resolution);
-                (narrow, Resolved(spreads, resolution))
+                let widest = spreads.iter().copied().fold(0.0, f64::max);
+                let evidence = vec![micro("largest spread", widest, of), micro("resolution", resolution, of)];
+                (narrow, "at every point the latest half of the sections agree within the resolution", evidence)
             }
             Test::QuasiPeriodic(over) => {
                 let runs = self.sections(over);
                 let regular = runs.iter().all(|r| r.regime == Some(Regime::QuasiPeriodic));
-                (regular, regimes(runs))
+                (regular, "exponent not told from 0, regular 0-1 test, no period, in all three runs", regimes(runs))
             }
             Test::AllPeriodic(over) => {
                 let points = self.swept(over);
-                (points.iter().all(|p| p.period() == 1), regimes(points))
+                (points.iter().all(|p| p.period() == 1), "every point is periodic 1", regimes(points))
             }
             Test::PeriodicToChaotic(over) => {
                 let points = self.swept(over);
                 let regular = points.first().is_some_and(|p| p.period() > 0);
-                let chaotic = points.last().is_some_and(is_chaotic);
-                (regular && chaotic, regimes(points))
+                let criterion = "the smallest value is periodic; at the largest the exponent is above its uncertainty";
+                (regular && points.last().is_some_and(is_chaotic), criterion, regimes(points))
             }
             Test::ChaosGrows(over) => {
                 let points = self.swept(over);
                 let (lower, upper) = points.split_at(points.len() / 2);
-                let halves = [lower, upper].map(|half| {
-                    let spreads = spreads(half, Coordinate::Beta);
-                    (chaotic(half), spreads.into_iter().fold(0.0, f64::max))
-                });
-                (halves[1].0 > halves[0].0, Halves(halves))
+                let [below, above] = [lower, upper].map(chaotic);
+                let mut evidence = vec![count("chaotic in the lower half", below), count("in the upper half", above)];
+                for (half, of) in [(lower, "spread in the lower half"), (upper, "in the upper half")] {
+                    let widest = spreads(half, Coordinate::Beta).into_iter().fold(0.0, f64::max);
+                    evidence.push(micro(of, widest, Coordinate::Beta));
+                }
+                (above > below, "more chaotic points in the upper half of the values than in the lower half", evidence)
             }
             Test::ChaosAllOrNone(over) => {
                 let points = self.swept(over);
                 let chaotic = chaotic(points);
-                (chaotic == 0 || chaotic == points.len(), regimes(points))
+                (chaotic == 0 || chaotic == points.len(), "all points are chaotic or none is", regimes(points))
             }
         }
     }
 
+    /// Distances in a coordinate, run by run, and the least that counts.
+    fn resolved(&self, of: Coordinate, over: Series, sizes: &[f64]) -> Vec<Reading> {
+        let runs = over.cases().map(|case| over.run_name(case)).into_iter().zip(sizes);
+        let runs = runs.map(|(name, size)| micro(&name, *size, of));
+        runs.chain([micro("resolution", self.resolution[of as usize], of)]).collect()
+    }
+
     /// A quantity in continuous time, per run.
-    fn values(&self, quantity: FigureValue, series: Series) -> Vec<f64> {
-        let of = |case: Case| quantity.of(&self.run(case).response);
-        series.cases().map(of).to_vec()
+    fn values(&self, quantity: FigureValue, series: Series) -> [f64; 3] {
+        series.cases().map(|case| quantity.of(&self.run(case).response))
     }
 
     fn curves_of(&self, curves: Curves) -> Vec<&RecordedRun> {
@@ -209,14 +220,14 @@ impl Findings {
         match curves {
             Curves::Clearance => series(Series::Clearance),
             Curves::Friction => series(Series::Friction),
-            Curves::Formulations => vec![&self.runs[0], &self.lagrange],
+            Curves::Formulations => vec![&self.runs[0], self.lagrange()],
         }
     }
 
     /// Largest difference between the two formulations in a coordinate at the paper's output step, m or rad.
     pub fn formulations_apart(&self, coordinate: Coordinate) -> f64 {
         let column = derivative(coordinate, 0);
-        let (tree, lagrange) = (self.runs[0].samples(), self.lagrange.samples());
+        let (tree, lagrange) = (self.runs[0].samples(), self.lagrange().samples());
         let pairs = tree.iter().zip(&lagrange);
         pairs.map(|(a, b)| (a[column] - b[column]).abs()).fold(0.0, f64::max)
     }
@@ -256,11 +267,30 @@ fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
     (furthest > 0.5).then(|| within as f64 / distances.len() as f64)
 }
 
+/// A value of each run of a series.
+fn each(series: Series, values: &[f64], unit: &'static str) -> Vec<Reading> {
+    let runs = series.cases().into_iter().zip(values);
+    runs.map(|(case, value)| (series.run_name(case), *value, unit)).collect()
+}
+
+/// Shares, which are fractions of 1.
+fn percent<'a>(of: impl IntoIterator<Item = &'a str>, shares: &[f64]) -> Vec<Reading> {
+    let shares = of.into_iter().zip(shares);
+    shares.map(|(of, share)| (of.to_owned(), share * 100.0, "%")).collect()
+}
+
+/// A distance in a coordinate, m or rad.
+fn micro(of: &str, size: f64, coordinate: Coordinate) -> Reading {
+    (of.to_owned(), size * 1e6, ["µm", "µrad"][coordinate as usize])
+}
+
+fn count(of: &str, number: usize) -> Reading {
+    (of.to_owned(), number as f64, "")
+}
+
 /// Whether none of `shares` counts.
-fn little(shares: impl IntoIterator<Item = f64>) -> (bool, Grounds) {
-    let shares: Vec<f64> = shares.into_iter().collect();
-    let little = shares.iter().all(|share| *share < LITTLE);
-    (little, Grounds::Values(shares))
+fn little(shares: &[f64]) -> bool {
+    shares.iter().all(|share| *share < LITTLE)
 }
 
 fn spreads(points: &[SettledPoint], coordinate: Coordinate) -> Vec<f64> {
@@ -279,9 +309,14 @@ fn ascending(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] < pair[1])
 }
 
-fn regimes(points: &[SettledPoint]) -> Grounds {
-    let regimes = points.iter().map(|p| p.regime).collect();
-    Grounds::Regimes(regimes, exponents(points))
+/// Number of points per regime, and the range of exponents.
+fn regimes(points: &[SettledPoint]) -> Vec<Reading> {
+    let mut counts: Vec<Reading> = regime_counts(points).into_iter().map(|(word, n)| count(&word, n)).collect();
+    let (least, most) = exponents(points);
+    if least <= most {
+        counts.extend([("smallest exponent".to_owned(), least, "1/s"), ("largest exponent".to_owned(), most, "1/s")]);
+    }
+    counts
 }
 
 #[cfg(test)]
@@ -293,25 +328,17 @@ mod tests {
 
     /// The same short run for every case, settled curves at rest, and sweeps of zeros: each test fills in what it needs.
     fn nothing_moves() -> Findings {
-        let work = Agenda::new(Extent {
-            settle: 1,
-            runs: (9, 1),
-            values: [2, 2],
-            sweep: (3, 1),
-            map: [2, 2],
-            map_periods: (2, 1),
-        })
-        .expect("an extent");
+        let (runs, sweep, map_periods) = ((9, 1), (3, 1), (2, 1));
+        let work = Agenda::new(Extent { settle: 1, runs, values: [2, 2], sweep, map: [2, 2], map_periods });
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let response = respond(&scene, 1e-3, 1e-3, |_| (), |_| true).expect("runs");
         let outcome = |job: &ReportJob| match *job {
-            ReportJob::Run(_) => Outcome::Run(Box::new((response.clone(), Vec::new()))),
-            ReportJob::Curve(n) => Outcome::Curve(SettledCurve {
-                case: work.curves[n].0,
-                coordinates: [vec![0.0; 4], vec![0.0; 4]],
-                rates: [vec![0.0; 4], vec![0.0; 4]],
-                width: [0.0; 2],
-            }),
+            ReportJob::Run(n) => {
+                let still = || [vec![0.0; 4], vec![0.0; 4]];
+                let settled = Some(SettledCurve { coordinates: still(), rates: still(), width: [0.0; 2] });
+                let (response, case) = (response.clone(), work.runs[n].case);
+                Outcome::Run(Box::new(RecordedRun { name: String::new(), case, response, rows: Vec::new(), settled }))
+            }
             ReportJob::Block(s, b) => {
                 let sweep = &work.sweeps()[s].sweep;
                 let values = sweep.grid().block(b).len() * sweep.layout().record_length();
@@ -319,21 +346,21 @@ mod tests {
             }
         };
         let outcomes = work.jobs.iter().map(outcome).collect();
-        let mut found = work.gather(outcomes).corrected;
+        let mut found = work.gather(outcomes).models.swap_remove(0);
         found.resolution = [1e-7, 1e-6];
         found
     }
 
-    /// Expected verdicts by place and words of the statement.
-    #[track_caller]
-    fn expect(found: &Findings, verdicts: &[(&str, &str, bool)]) {
-        let statements = found.statements();
-        for (place, says, confirmed) in verdicts {
-            let mut own = statements.iter().filter(|s| s.claim.place.ends_with(place) && s.claim.says.contains(says));
-            let (one, more) = (own.next(), own.next());
-            assert!(one.is_some() && more.is_none(), "{place}, {says}");
-            let verdict = one.map(|s| s.confirmed);
-            assert_eq!(verdict, Some(*confirmed), "{place}, {says}");
+    impl Findings {
+        /// Expects verdicts by place and words of the statement.
+        #[track_caller]
+        fn expect(&self, verdicts: &[(&str, &str, bool)]) {
+            let statements = self.statements();
+            for (place, says, confirmed) in verdicts {
+                let own = |s: &&Statement| s.claim.place.ends_with(place) && s.claim.says.contains(says);
+                let own: Vec<bool> = statements.iter().filter(own).map(|s| s.confirmed).collect();
+                assert_eq!(own, [*confirmed], "{place}, {says}");
+            }
         }
     }
 
@@ -375,39 +402,33 @@ mod tests {
             response.full.deviation[0] = deviation;
             response.full.deviation[4] = deviation;
         }
-        expect(
-            &found,
-            &[
-                // 3 mm of 25 mm.
-                ("Figure 5a", "no obvious deviation", false),
-                ("Figure 5b", "deviation of beta grows", true),
-                ("Figure 11b", "deviation of beta grows", false),
-                ("Figures 8 to 10", "contact force of any joint", false),
-                ("Figures 8 to 10", "last separation", true),
-                ("Figure 8", "S1", true),
-                ("Figure 9", "S2", false),
-                ("Figure 10", "S3", true),
-                ("Figure 15", "S2", false),
-                ("Figure 7", "larger", false),
-                ("Figures 6 to 10", "steady", false),
-                ("Figures 11 to 16", "steady", true),
-                ("Figure 13b", "no rule", false),
-                ("Figure 13", "changes the acceleration", true),
-                ("4.2.2", "main influence", true),
-                ("second conclusion", "with clearance", false),
-            ],
-        );
+        found.expect(&[
+            // 3 mm of 25 mm.
+            ("Figure 5a", "no obvious deviation", false),
+            ("Figure 5b", "deviation of beta grows", true),
+            ("Figure 11b", "deviation of beta grows", false),
+            ("Figures 8 to 10", "contact force of any joint", false),
+            ("Figures 8 to 10", "last separation", true),
+            ("Figure 8", "S1", true),
+            ("Figure 9", "S2", false),
+            ("Figure 10", "S3", true),
+            ("Figure 15", "S2", false),
+            ("Figure 7", "larger", false),
+            ("Figures 6 to 10", "steady", false),
+            ("Figures 11 to 16", "steady", true),
+            ("Figure 13b", "no rule", false),
+            ("Figure 13", "changes the acceleration", true),
+            ("4.2.2", "main influence", true),
+            ("second conclusion", "with clearance", false),
+        ]);
         found.runs[0].response.full.acceleration[4] = 9.0;
         found.runs[1].response.full.normal[0] = 9.0;
         found.runs[4].response.full.acceleration[0] = 99.0;
-        expect(
-            &found,
-            &[
-                ("Figure 13b", "no rule", true),
-                ("Figure 13", "changes the acceleration", false),
-                ("4.2.2", "main influence", false),
-            ],
-        );
+        found.expect(&[
+            ("Figure 13b", "no rule", true),
+            ("Figure 13", "changes the acceleration", false),
+            ("4.2.2", "main influence", false),
+        ]);
     }
 
     #[test]
@@ -425,9 +446,9 @@ mod tests {
             grow(&mut found, case, size);
         }
         let of = "second conclusion";
-        expect(&found, &[(of, "with clearance", true), (of, "with friction", true)]);
+        found.expect(&[(of, "with clearance", true), (of, "with friction", true)]);
         found.runs[2].response.full.rate[0] = 1.0;
-        expect(&found, &[(of, "with clearance", false), (of, "with friction", true)]);
+        found.expect(&[(of, "with clearance", false), (of, "with friction", true)]);
     }
 
     #[test]
@@ -454,30 +475,27 @@ mod tests {
         for (run, (early, late)) in found.runs.iter_mut().zip(off) {
             run.rows = curve(early, late);
         }
-        found.lagrange.rows = curve(0.0, 0.0);
+        found.runs[5].rows = curve(0.0, 0.0);
         found.ideal.rows = curve(0.0, 0.06);
-        expect(
-            &found,
-            &[
-                ("Figure 5b", "coincide", false),
-                ("Figure 6", "coincide", true),
-                // 6 % from the ideal motion, though not from each other.
-                ("Figure 7", "fluctuate", false),
-                ("Figure 11a", "coincide", true),
-                ("Figure 11b", "coincide", true),
-                ("Figure 12", "little effect", true),
-                ("Figure 13", "fluctuate", false),
-                ("Figure 17a and b", "agree", false),
-                ("Figure 17c to f", "agree", true),
-            ],
-        );
+        found.expect(&[
+            ("Figure 5b", "coincide", false),
+            ("Figure 6", "coincide", true),
+            // 6 % from the ideal motion, though not from each other.
+            ("Figure 7", "fluctuate", false),
+            ("Figure 11a", "coincide", true),
+            ("Figure 11b", "coincide", true),
+            ("Figure 12", "little effect", true),
+            ("Figure 13", "fluctuate", false),
+            ("Figure 17a and b", "agree", false),
+            ("Figure 17c to f", "agree", true),
+        ]);
         // The formulations part by 12.5 mm of 100 mm at most.
         for run in &mut found.runs {
             run.response.full.deviation = [0.1; 6];
         }
-        expect(&found, &[("first conclusion", "alike", true)]);
-        found.lagrange.rows = curve(0.5, 0.0);
-        expect(&found, &[("first conclusion", "alike", false)]);
+        found.expect(&[("first conclusion", "alike", true)]);
+        found.runs[5].rows = curve(0.5, 0.0);
+        found.expect(&[("first conclusion", "alike", false)]);
     }
 
     #[test]
@@ -493,17 +511,14 @@ mod tests {
             |regime, width: f64| [1.0, 2.0, 3.0].map(|n| point(n, regime, 0.2 + 0.01 * n, &wide(width * n))).to_vec();
         put(&mut found, "clearance_cold", as_printed.clone());
         put(&mut found, "runs_by_clearance", runs(Regime::QuasiPeriodic, 1e-4));
-        expect(
-            &found,
-            &[
-                ("Figure 20a", "periodic", true),
-                ("Figure 20b", "chaotic", true),
-                ("third conclusion", "larger clearance", true),
-                ("Figure 19a", "further right", true),
-                ("Figure 19a", "quasi-periodic", true),
-                ("Figure 19b", "areas", true),
-            ],
-        );
+        found.expect(&[
+            ("Figure 20a", "periodic", true),
+            ("Figure 20b", "chaotic", true),
+            ("third conclusion", "larger clearance", true),
+            ("Figure 19a", "further right", true),
+            ("Figure 19a", "quasi-periodic", true),
+            ("Figure 19b", "areas", true),
+        ]);
         // All periodic: by clearance all at one place, by friction at places 10 mm of 25 mm apart.
         let still = [0.01, 0.5, 1.0].map(|c| point(c, Regime::Periodic(1), 0.2, &wide(0.0)));
         put(&mut found, "clearance_cold", still.to_vec());
@@ -512,36 +527,30 @@ mod tests {
         let mut apart = still[..2].to_vec();
         apart[1].sections[0] = vec![0.21; 8];
         put(&mut found, "friction_cold", apart);
-        expect(
-            &found,
-            &[
-                ("Figure 20a", "periodic", true),
-                ("Figure 20b", "chaotic", false),
-                ("third conclusion", "larger clearance", false),
-                ("Figure 19a", "further right", false),
-                ("Figure 19a", "quasi-periodic", false),
-                ("Figure 19b", "areas", false),
-                ("Figure 22", "little effect", true),
-                ("Figure 22", "quasi-periodic", false),
-                ("Figure 22", "denser", false),
-                ("Figure 23", "motion is periodic", true),
-                ("Figure 23", "little effect", false),
-                ("third conclusion", "friction has little", true),
-            ],
-        );
+        found.expect(&[
+            ("Figure 20a", "periodic", true),
+            ("Figure 20b", "chaotic", false),
+            ("third conclusion", "larger clearance", false),
+            ("Figure 19a", "further right", false),
+            ("Figure 19a", "quasi-periodic", false),
+            ("Figure 19b", "areas", false),
+            ("Figure 22", "little effect", true),
+            ("Figure 22", "quasi-periodic", false),
+            ("Figure 22", "denser", false),
+            ("Figure 23", "motion is periodic", true),
+            ("Figure 23", "little effect", false),
+            ("third conclusion", "friction has little", true),
+        ]);
         // Chaos at a single friction value, and an x that moves from section to section.
         put(&mut found, "friction_cold", as_printed.clone());
         let mut moving = as_printed;
         moving[2].sections[0] = wide(1e-3).to_vec();
         put(&mut found, "clearance_cold", moving);
-        expect(
-            &found,
-            &[
-                ("third conclusion", "friction has little", false),
-                ("Figure 23", "motion is periodic", false),
-                ("Figure 20a", "periodic", false),
-            ],
-        );
+        found.expect(&[
+            ("third conclusion", "friction has little", false),
+            ("Figure 23", "motion is periodic", false),
+            ("Figure 20a", "periodic", false),
+        ]);
     }
 
     #[test]
@@ -559,23 +568,23 @@ mod tests {
         let mut found = nothing_moves();
         // By clearance 0.2 mm apart and increasingly wide; by friction 4 mm of 25 mm apart.
         let curves = [(0.0, 1e-3), (1e-4, 2e-3), (2e-4, 3e-3), (4e-3, 0.0), (0.0, 1e-3)];
-        for (found, (x, width)) in found.curves.iter_mut().zip(curves) {
-            found.coordinates[0] = vec![x; 4];
-            found.width[1] = width;
-        }
-        expect(
-            &found,
-            &[
-                ("Figure 18a", "coincide", true),
-                ("Figure 18b", "width", true),
-                ("Figure 21a", "coincide", false),
-                ("Figure 21b", "coincide", true),
-                ("Figure 21b", "wide", false),
-            ],
-        );
-        found.curves[1].width[1] = 4e-3;
-        found.curves[3].width[1] = 1e-5;
-        expect(&found, &[("Figure 18b", "width", false), ("Figure 21b", "wide", true)]);
-        assert_eq!(found.loops(Series::Friction)[0].case, PAPER.runs[3]);
+        let settled = |found: &mut Findings, run: usize, (x, width): (f64, f64)| {
+            let curve = found.runs[run].settled.as_mut().expect("given above");
+            curve.coordinates[0] = vec![x; 4];
+            curve.width[1] = width;
+        };
+        (0..).zip(curves).for_each(|(run, curve)| settled(&mut found, run, curve));
+        found.expect(&[
+            ("Figure 18a", "coincide", true),
+            ("Figure 18b", "width", true),
+            ("Figure 21a", "coincide", false),
+            ("Figure 21b", "coincide", true),
+            ("Figure 21b", "wide", false),
+        ]);
+        settled(&mut found, 1, (1e-4, 4e-3));
+        settled(&mut found, 3, (4e-3, 1e-5));
+        found.expect(&[("Figure 18b", "width", false), ("Figure 21b", "wide", true)]);
+        assert_eq!(found.runs[3].case, PAPER.runs[3]);
+        assert_eq!(Some(found.loops(Series::Friction)[0]), found.runs[3].settled.as_ref());
     }
 }

@@ -1,0 +1,285 @@
+//! Tables of the page and of the data files: the paper's numbers and statements beside this program's, and what belongs to a figure.
+
+use crate::analysis::paper::{Agreement, Case, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows};
+use crate::analysis::reproduction::{Findings, RecordedRun, Report, SettledPoint, Statement, exponents, regime_counts};
+use crate::cli::output::significant;
+use crate::cli::tables::{Table, yes};
+
+/// How many of the paper's numbers a model agrees with, is near to, and differs from; how many statements it confirms, and of how
+/// many.
+pub(super) fn score(found: &Findings) -> [usize; 5] {
+    let (compared, statements) = (found.comparisons(), found.statements());
+    let [agree, near, differ] =
+        Agreement::ALL.map(|agreement| compared.iter().filter(|c| c.agreement() == agreement).count());
+    [agree, near, differ, statements.iter().filter(|s| s.confirmed).count(), statements.len()]
+}
+
+/// Four digits, as many as a reader takes in; a dash if there is no number.
+fn shown(value: impl Into<Option<f64>>) -> String {
+    let value = value.into().filter(|value| !value.is_nan());
+    value.map_or_else(|| "\u{2013}".to_owned(), |value| significant(value, 4))
+}
+
+/// A distance in micrometres or microradians.
+fn micro(value: f64) -> String {
+    shown(value * 1e6)
+}
+
+/// Two decimals, or two digits of a small number.
+fn ratio(value: f64) -> String {
+    if value < 0.1 { significant(value, 2) } else { format!("{value:.2}") }
+}
+
+/// Clearance and friction of the run, as tables name it.
+fn run_of(comparison: &Comparison) -> String {
+    let Case { clearance, friction } = comparison.published.case;
+    format!("{clearance} mm, {friction}")
+}
+
+/// The tables that belong to a figure.
+pub(super) fn of_figure(figure: &Figure, comparisons: &[Comparison], found: &Findings) -> Vec<Table> {
+    let own: Vec<&Comparison> = comparisons.iter().filter(|c| figure.contains(&c.published.figure)).collect();
+    let more = match figure.shows {
+        Shows::Verification(_) => Some(verification(found)),
+        Shows::Drift => Some(drift(found)),
+        Shows::Sections(series) => Some(sections(found, series)),
+        Shows::Bifurcation(series) => Some(branches(found, series)),
+        Shows::Probe => Some(probe(found)),
+        _ => (!figure.strongest_of.is_empty()).then(|| strongest(comparisons, &figure.strongest_of)),
+    };
+    (!own.is_empty()).then(|| numbers(&own)).into_iter().chain(more).collect()
+}
+
+fn numbers(rows: &[&Comparison]) -> Table {
+    let row = |c: &&Comparison| {
+        vec![
+            c.published.figure.clone(),
+            run_of(c),
+            format!("{} ({})", c.published.quantity, c.published.quantity.unit()),
+            shown(c.published.value),
+            shown(c.full),
+            ratio(c.ratio()),
+            shown(c.sampled),
+            c.sampled_ratio().map_or_else(|| shown(None), ratio),
+            c.agreement().to_string(),
+        ]
+    };
+    let heads = "Figure | Clearance, friction .run | Quantity .what | Paper .n | Here .n | Ratio .n | At 1 ms .n | Ratio .n | Verdict .verdict";
+    Table::new(heads, rows.iter().map(row))
+}
+
+/// The largest force of any joint, which depends less on which joint happens to be hit first.
+fn strongest(comparisons: &[Comparison], figures: &[String]) -> Table {
+    let row = |figure: &String| {
+        let own = comparisons.iter().filter(|c| c.published.figure == *figure);
+        let own: Vec<_> = own.filter(|c| FigureValue::NORMAL.contains(&c.published.quantity)).collect();
+        let most = |of: fn(&Comparison) -> f64| own.iter().map(|c| of(c)).fold(0.0, f64::max);
+        let (paper, here) = (most(|c| c.published.value), most(|c| c.full));
+        let agreement = Agreement::of(here / paper).to_string();
+        Some(vec![figure.clone(), run_of(own.first()?), shown(paper), shown(here), ratio(here / paper), agreement])
+    };
+    let heads = "Figure | Clearance, friction .run | Paper (N) .n | Here (N) .n | Ratio .n | Verdict .verdict";
+    let table = Table::new(heads, figures.iter().filter_map(row));
+    table.titled("The largest contact force of any joint, whichever it is:")
+}
+
+fn verification(found: &Findings) -> Table {
+    let row = |figure: &str, quantity: FigureValue, paper: [Option<f64>; 2]| {
+        let mut row = vec![figure.to_owned(), format!("{quantity} ({})", quantity.unit())];
+        row.extend(paper.map(shown));
+        for run in [&found.runs[0], found.lagrange()] {
+            row.extend([shown(quantity.of(&run.response)), shown(quantity.sampled(&run.response))]);
+        }
+        row
+    };
+    let peaks = PAPER.verification.iter().map(|v| row(&v.figure, v.quantity, [Some(v.own), Some(v.commercial)]));
+    let forces = FigureValue::NORMAL.map(|quantity| row("", quantity, [None, None]));
+    let heads = "Figure | Quantity .what | Paper, own .n | Paper, commercial .n | Tree .n | Tree at 1 ms .n | Lagrange .n | Lagrange at 1 ms .n";
+    let title = "The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:";
+    Table::new(heads, peaks.chain(forces)).titled(title)
+}
+
+fn drift(found: &Findings) -> Table {
+    let [x, beta] = Coordinate::ALL.map(|c| found.formulations_apart(c));
+    let rows = [
+        ("Difference of the formulations in x", x, "µm"),
+        ("Difference of the formulations in beta", beta, "µrad"),
+        ("Violation of a constraint of the lagrange form", found.lagrange().response.constraint_drift, "µm, µrad"),
+    ];
+    let rows = rows.map(|(what, size, unit)| vec![what.to_owned(), micro(size), unit.to_owned()]);
+    Table::new("Quantity | At most .n | Unit", rows)
+}
+
+fn sections(found: &Findings, series: Series) -> Table {
+    let row = |run: &SettledPoint| {
+        let exponent = format!("{} ± {}", shown(run.exponent.0), significant(run.exponent.1, 2));
+        let mut row = vec![series.name(shown(run.value)), run.regime_word(), exponent];
+        for c in Coordinate::ALL {
+            row.extend([format!("{:.4}", run.latest(c) * 1e3), significant(run.spread(c) * 1e6, 2)]);
+        }
+        row
+    };
+    let heads =
+        "Run | Regime | Exponent (1/s) .n | x (mm) .n | Spread of x (µm) .n | β (mrad) .n | Spread of β (µrad) .n";
+    Table::new(heads, found.sections(series).iter().map(row))
+}
+
+/// How far the branches that follow the motion are from the cold starts, at most.
+fn branches(found: &Findings, series: Series) -> Table {
+    let [cold, up, down] = found.branches(series);
+    let row = |name: &str, other: &[SettledPoint]| {
+        let most = Coordinate::ALL.map(|c| {
+            let pairs = cold.iter().zip(other);
+            pairs.map(|(a, b)| (a.latest(c) - b.latest(c)).abs()).fold(0.0, f64::max)
+        });
+        let within = (0..2).all(|c| most[c] <= found.resolution[c]);
+        vec![name.to_owned(), cold.len().to_string(), micro(most[0]), micro(most[1]), yes(!within)]
+    };
+    let [x, beta] = found.resolution.map(micro);
+    let resolution = vec!["resolution".to_owned(), String::new(), x, beta, String::new()];
+    let heads =
+        "Branch | Values .n | Distance from the cold start in x (µm) .n | In β (µrad) .n | Hysteresis, or a transient";
+    Table::new(heads, [row("followed upward", up), row("followed downward", down), resolution])
+}
+
+fn probe(found: &Findings) -> Table {
+    let data = found.cold(Series::Clearance);
+    let [largest, rms] = ["probe_error_max_um", "probe_error_rms_um"].map(|name| data.values(name));
+    let rows = 10.min(data.points.len());
+    let row = |n: usize| {
+        let k = n * (data.points.len() - 1) / (rows - 1).max(1);
+        let clearance = data.points[k].value;
+        vec![shown(clearance), shown(largest[k]), shown(rms[k]), significant(largest[k] / (clearance * 1e3), 3)]
+    };
+    let heads = "Clearance (mm) .n | Largest error (µm) .n | Root mean square (µm) .n | Largest error / clearance .n";
+    Table::new(heads, (0..rows).map(row))
+}
+
+fn evidence(statement: &Statement) -> String {
+    let words = statement.evidence.iter().map(|(of, value, unit)| match value.is_nan() {
+        true => format!("{of}: none"),
+        false => format!("{of}: {} {unit}", significant(*value, 7)).trim_end().to_owned(),
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+fn verdict(statement: &Statement) -> String {
+    if statement.confirmed { "confirmed" } else { "not confirmed" }.to_owned()
+}
+
+/// What the paper says in words, with the criterion and the numbers behind the verdict, under `heads`.
+pub(super) fn statements(heads: &str, found: &Findings) -> Table {
+    let row = |s: &Statement| {
+        vec![s.claim.place.clone(), s.claim.says.clone(), s.criterion.to_owned(), verdict(s), evidence(s)]
+    };
+    Table::new(heads, found.statements().iter().map(row))
+}
+
+/// Statements whose verdict changes with (13) as printed.
+pub(super) fn turned(report: &Report) -> Table {
+    let [corrected, printed] = report.complete().map(Findings::statements);
+    let both = corrected.iter().zip(&printed).filter(|(a, b)| a.confirmed != b.confirmed);
+    let row = |(a, b): (&Statement, &Statement)| {
+        vec![a.claim.place.clone(), a.claim.says.clone(), verdict(a), evidence(a), verdict(b), evidence(b)]
+    };
+    let table = Table::new("Place | Statement | As corrected | Evidence | (13) as printed | Evidence", both.map(row));
+    table.titled("Statements of the paper that come out otherwise with (13) as printed:")
+}
+
+/// Mean of x in trajectory (59), m.
+const MEAN_X: f64 = 0.203;
+/// Largest ratio to the paper's settling and rates that counts as near.
+const NEAR: f64 = 1.25;
+
+/// What is compared by clearance: a heading, the value for a run and its sections, and the paper's quantity if it prints one.
+type Measure = (&'static str, fn(&RecordedRun, &SettledPoint) -> f64, Option<FigureValue>);
+
+const MEASURES: [Measure; 6] = {
+    use Coordinate::{Beta, X};
+    use FigureValue::{LastSeparation, RateBeta};
+    [
+        ("Section in x, from 203 mm (µm)", |_, s| (s.latest(X) - MEAN_X) * 1e6, None),
+        ("Spread of the sections in x (µm)", |_, s| s.spread(X) * 1e6, None),
+        ("Spread of the sections in β (µrad)", |_, s| s.spread(Beta) * 1e6, None),
+        ("Largest Lyapunov exponent (1/s)", |_, s| s.exponent.0, None),
+        ("Last separation in the first period (s)", |run, _| LastSeparation.of(&run.response), Some(LastSeparation)),
+        ("Largest angular rate of β (rad/s)", |run, _| RateBeta.of(&run.response), Some(RateBeta)),
+    ]
+};
+
+/// A measure of a model at each clearance.
+fn measured(found: &Findings, (_, of, _): &Measure) -> [f64; 3] {
+    let (cases, sections) = (Series::Clearance.cases(), found.sections(Series::Clearance));
+    std::array::from_fn(|k| of(found.run(cases[k]), &sections[k]))
+}
+
+/// The paper's values of a measure; the first if it prints two.
+fn printed((_, _, quantity): &Measure) -> Option<[f64; 3]> {
+    let of = |case| PAPER.numbers.iter().find(|p| p.case == case && Some(p.quantity) == *quantity);
+    let [a, b, c] = Series::Clearance.cases().map(|case| of(case).map(|p| p.value));
+    Some([a?, b?, c?])
+}
+
+/// The measures of all models, and of the paper.
+pub(super) fn by_clearance(report: &Report) -> Table {
+    let mut rows = Vec::new();
+    for measure in &MEASURES {
+        let paper = printed(measure).map(|values| ("the paper", values));
+        let models = report.models.iter().map(|found| (found.variant.title.as_str(), measured(found, measure)));
+        for (model, values) in paper.into_iter().chain(models) {
+            rows.push([&[measure.0.to_owned(), model.to_owned()], &values.map(shown)[..]].concat());
+        }
+    }
+    let heads = Series::Clearance.cases().map(|case| Series::Clearance.run_name(case));
+    Table::new(&format!("Quantity .what | Model | {} .n", heads.join(" .n | ")), rows)
+}
+
+/// Both sweeps of both models.
+pub(super) fn sweeps(report: &Report) -> Table {
+    let mut rows = Vec::new();
+    for series in Series::ALL {
+        let ([from, to], unit) = (series.row().range, &series.row().unit);
+        for found in report.complete() {
+            let points = found.swept(series);
+            let (least, most) = exponents(points);
+            let regimes = regime_counts(points).into_iter().map(|(word, n)| format!("{n} {word}"));
+            let mut row = vec![
+                format!("{series}, {from} to {to} {unit}").trim_end().to_owned(),
+                found.variant.title.clone(),
+                regimes.collect::<Vec<_>>().join(", "),
+                format!("{} to {}", shown(least), shown(most)),
+            ];
+            row.extend(Coordinate::ALL.map(|c| micro(points.iter().map(|p| p.spread(c)).fold(0.0, f64::max))));
+            rows.push(row);
+        }
+    }
+    let heads =
+        "Sweep | Model | Regimes | Exponents (1/s) .n | Widest spread of x (µm) .n | Widest spread of β (µrad) .n";
+    Table::new(heads, rows)
+}
+
+/// Each model against the paper: whether its sections scatter, and whether its impacts last as long and turn the platform as fast.
+pub(super) fn models(report: &Report) -> Table {
+    let apart = |found: &Findings| {
+        let runs = found.sections(Series::Clearance).iter();
+        runs.filter(|run| run.spread(Coordinate::Beta) > found.resolution[1]).count()
+    };
+    let before = apart(&report.models[0]);
+    let row = |(n, found): (usize, &Findings)| {
+        // Combinations lack the runs of most numbers and statements.
+        let score = if n < 2 { score(found).map(|count| count.to_string()) } else { [const { String::new() }; 5] };
+        let off = |measure: &Measure| {
+            let ratios = measured(found, measure).into_iter().zip(printed(measure)?).map(|(own, paper)| own / paper);
+            Some(ratios.map(|ratio| ratio.max(1.0 / ratio)).fold(1.0, f64::max))
+        };
+        let offs: Vec<f64> = MEASURES.iter().filter_map(off).collect();
+        let mut row = vec![found.variant.title.clone()];
+        row.extend_from_slice(&score[..4]);
+        row.extend([format!("{} of 3", apart(found)), yes(apart(found) > before)]);
+        row.extend(offs.iter().map(|off| significant(*off, 3)));
+        row.push(yes(offs.iter().all(|off| *off < NEAR)));
+        row
+    };
+    let heads = "Model | Numbers within 10 % .n | Within a factor of 2 .n | Further off .n | Statements confirmed .n | Sections in β told apart .n | More than as corrected | Ratio of the last separation .n | Ratio of the rate of β .n | Both within a quarter";
+    Table::new(heads, report.models.iter().enumerate().map(row))
+}

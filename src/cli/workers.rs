@@ -1,0 +1,54 @@
+//! Independent jobs on several threads, for sweeps and for the paper's runs.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::{sync::mpsc, thread};
+
+use super::{Failure, interrupt};
+
+/// Runs `work` for each job of `todo`, and hands the results to `receive` on this thread in the order in which they come.
+/// After Ctrl-C or a failure no further job begins. `work` is given a function that says whether to go on, and returns `None`
+/// if it did not.
+///
+/// # Errors
+/// Of the jobs that failed, or whose result was refused by `receive`, the first in the order of `todo`.
+pub fn run_jobs<T: Send>(
+    todo: &[usize],
+    threads: usize,
+    work: impl Fn(usize, &dyn Fn() -> bool) -> Option<Result<T, Failure>> + Sync,
+    mut receive: impl FnMut(usize, T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let next = AtomicUsize::new(0);
+    let stop = AtomicBool::new(false);
+    let go_on = || !(stop.load(Ordering::Relaxed) || interrupt::asked());
+    let worker = |send: mpsc::SyncSender<(usize, Result<T, Failure>)>| {
+        while let Some(&job) = todo.get(next.fetch_add(1, Ordering::Relaxed)).filter(|_| go_on()) {
+            let Some(result) = work(job, &go_on) else {
+                return;
+            };
+            // The receiver outlives the threads.
+            let _ = send.send((job, result));
+        }
+    };
+    let mut failed: Option<(usize, Failure)> = None;
+    thread::scope(|scope| {
+        let (send, results) = mpsc::sync_channel(threads);
+        for _ in 0..threads.min(todo.len()) {
+            let send = send.clone();
+            scope.spawn(|| worker(send));
+        }
+        drop(send);
+        for (job, result) in results {
+            let received = match result {
+                Ok(result) if failed.is_none() => receive(job, result),
+                result => result.map(|_| ()),
+            };
+            if let Err(failure) = received {
+                stop.store(true, Ordering::Relaxed);
+                if failed.as_ref().is_none_or(|(first, _)| job < *first) {
+                    failed = Some((job, failure));
+                }
+            }
+        }
+    });
+    failed.map_or(Ok(()), |(_, failure)| Err(failure))
+}
