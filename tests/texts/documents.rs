@@ -160,21 +160,21 @@ fn the_page_of_the_trade_has_the_headings_and_diagrams_that_the_command_writes()
     }
 }
 
+/// The pages in `docs/`, by their paths from the root.
+fn pages() -> Vec<String> {
+    let entries = fs::read_dir(root().join("docs")).expect("the folder of documents");
+    let names = entries.map(|entry| entry.expect("an entry").file_name().into_string().expect("ASCII"));
+    names.filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}")).collect()
+}
+
 /// Every file that a document names is there.
 #[test]
 fn documents_name_files_that_exist() {
-    for document in [
-        "README.md",
-        "ARCHITECTURE.md",
-        "CHANGELOG.md",
-        "docs/numerics.md",
-        "docs/limits.md",
-        "docs/scene-format.md",
-        "docs/tradeoff.md",
-        "docs/sweeps.md",
-        "docs/cluster.md",
-    ] {
-        let text = read(document);
+    let pages = pages();
+    assert!(pages.len() > 10, "{pages:?}");
+    let documents = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md"].map(str::to_owned);
+    for document in documents.into_iter().chain(pages) {
+        let text = read(&document);
         for word in text.split(['`', '(', ')']) {
             let kept = ["src/", "crates/", "docs/", "assets/", "tests/", "benches/", "examples/", "shaders/"]
                 .iter()
@@ -184,6 +184,44 @@ fn documents_name_files_that_exist() {
             }
         }
     }
+}
+
+#[test]
+fn the_first_page_lists_every_document() {
+    let readme = read("README.md");
+    for page in pages() {
+        assert!(readme.contains(&format!("[`{page}`]({page})")), "README.md does not list {page}");
+    }
+}
+
+/// Commands and options in the blocks of shell of README.md and `docs/` are those of the program.
+#[test]
+fn documents_use_commands_and_options_that_exist() {
+    let mut checked = 0;
+    for document in pages().into_iter().chain(["README.md".to_owned()]) {
+        let page = read(&document);
+        let blocks = page.split("```sh\n").skip(1).filter_map(|rest| rest.split("```").next());
+        for line in blocks.flat_map(str::lines) {
+            let line = line.split(" #").next().unwrap_or(line);
+            let is_program = |word: &str| ["./run", "jointplay", "target/release/jointplay"].contains(&word);
+            let mut words = line.split_whitespace().skip_while(|word| !is_program(word));
+            // `web` is a command of the script.
+            let (Some(_), Some(command)) = (words.next(), words.next().filter(|word| *word != "web")) else {
+                continue;
+            };
+            let help = std::process::Command::new(env!("CARGO_BIN_EXE_jointplay")).args([command, "--help"]).output();
+            let help = help.expect("the program starts");
+            assert!(help.status.success(), "{document}: {line}");
+            let help = String::from_utf8(help.stdout).expect("UTF-8");
+            for option in words.filter(|word| word.starts_with("--")) {
+                let name = option.split('=').next().unwrap_or(option);
+                let known = help.split([' ', ',', '\n']).any(|word| word == name);
+                assert!(known, "{document}: `{line}`: {name}");
+            }
+            checked += 1;
+        }
+    }
+    assert!(checked > 30, "only {checked} commands found: does the search still work?");
 }
 
 #[test]
