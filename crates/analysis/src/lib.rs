@@ -1,6 +1,38 @@
-//! Results computed from whole runs: cost and error of the methods, cost of the parts of the model, responses beside the
-//! ideal motion, Poincaré sections, Lyapunov exponents, regimes, sweeps, the paper's section 4, cases with known answers. Starts no threads, and
-//! its clock comes from outside ([`RunContext`]).
+//! Results computed from whole runs. Starts no threads, and its clock comes from outside ([`RunContext`]).
+//!
+//! - Sweeps: [`grid`] says which values, [`sweep`] runs them, [`point`] what is recorded of each; [`sweep_task`] and [`task`] are the
+//!   same as plain data for a thread or a worker.
+//! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
+//! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`speed`], [`presets`], [`model_costs`].
+//! - The paper's section 4 ([`paper`], [`reproduction`]), responses beside the ideal motion ([`response`]), and cases with known
+//!   answers ([`validation`]).
+//!
+//! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
+//!
+//! ```
+//! use jointplay_analysis::grid::{Grid, ParameterRange, Start};
+//! use jointplay_analysis::point::Plan;
+//! use jointplay_analysis::sweep::Sweep;
+//! use jointplay_scene::Scene;
+//!
+//! let scene = Scene::load("slider-crank-driven", &[])?;
+//! let clearance = ParameterRange::parse(&scene, "contact.clearance=0.1mm..0.3mm:2")?;
+//! let grid = Grid::new(&scene, vec![clearance], Start::Cold)?;
+//! let plan = Plan { periods: 4, discard: 1, phase: 0.0, exponent: false };
+//! let sweep = Sweep::new(scene, grid, plan)?;
+//! for block in 0..sweep.grid().blocks() {
+//!     let mut run = sweep.begin(block);
+//!     while !run.is_done() {
+//!         run.advance(10_000);
+//!     }
+//!     for (point, result) in run.finished() {
+//!         let result = result.as_ref().expect("it starts");
+//!         println!("{}: {}, {:.1} N", sweep.describe(*point), result.regime, result.joints[1].peak);
+//!         assert!(result.joints[1].peak > 5.0);
+//!     }
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod beginning;
 mod cost;

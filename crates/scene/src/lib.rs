@@ -1,4 +1,30 @@
-//! Scenes as data: what a mechanism consists of, its file format, and the single table of its parameters.
+//! Scenes as data: a text file, the machine that it describes, and the single table of its parameters.
+//!
+//! [`Scene::load`] reads a built-in scene or a file, [`Scene::parse`] a text. Errors name line, key and what is allowed
+//! ([`SceneError`]). A [`Scene`] holds a [`Machine`], which is all that a simulation needs, and
+//! changes it by key ([`Scene::set`]); [`table()`] lists the keys. A [`LiveScene`] changes parameters while it runs.
+//!
+//! ```
+//! use jointplay_physics::simulate::Effect;
+//! use jointplay_scene::{LiveScene, Scene};
+//!
+//! let mut scene = Scene::load("pendulum", &[])?;
+//! scene.set("contact.clearance", "0.2 mm")?;
+//! assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.2e-3);
+//! let error = scene.set("contact.clearence", "0.2 mm").unwrap_err();
+//! assert!(error.to_string().contains("did you mean `contact.clearance`?"));
+//!
+//! let mut live = LiveScene::new(&scene)?;
+//! live.advance_to(0.1)?;
+//! assert_eq!(live.set("contact.friction", "0.3")?, Effect::Now);
+//! // Without play the ball joint is a constraint: other equations, from the next reset on.
+//! assert_eq!(live.set("contact.clearance", "0 mm")?, Effect::AtReset);
+//! live.reset()?;
+//! assert_eq!(live.running().machine.ball_joints[0].contact.clearance, 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The rest of this page is the manual of the file format.
 //!
 #![doc = include_str!("../../../docs/scene-format.md")]
 

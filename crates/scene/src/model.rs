@@ -105,7 +105,7 @@ pub struct ViewSettings {
     pub isometric: Option<(f64, f64)>,
     /// Simulated seconds per second that a window begins with; `None` lets it choose.
     pub time_scale: Option<f64>,
-    /// Plots that a window begins with, each one of [`PLOT_WORDS`]; `None` at first lets it choose.
+    /// Plots that a window begins with, each one of [`PLOT_WORDS`](jointplay_physics::simulate::PLOT_WORDS); `None` at first lets it choose.
     pub plots: [Option<&'static str>; MOST_PLOTS],
 }
 

@@ -43,8 +43,13 @@ pub struct Joint {
 impl Joint {
     /// Leaves body `child` free, at rest in the world's origin.
     pub fn free(child: usize) -> Self {
+        Self::free_at(child, Vec3::zeros())
+    }
+
+    /// Leaves body `child` free, at rest in `position`, m, with its axes along those of the world.
+    pub fn free_at(child: usize, position: Vec3) -> Self {
         let start = JointStart::Pose {
-            position: Vec3::zeros(),
+            position,
             rotation: Quat::identity(),
             velocity: Vec3::zeros(),
             angular_velocity: Vec3::zeros(),
@@ -78,6 +83,16 @@ impl Joint {
             start: JointStart::Scalar { position: 0.0, velocity: 0.0 },
             drawn: true,
         }
+    }
+
+    /// The same joint, whose first coordinate follows `drive`.
+    pub fn with_drive(self, drive: Drive) -> Self {
+        Self { drive: Some(drive), ..self }
+    }
+
+    /// The same joint of one coordinate, which starts at `position` (m or rad) with the rate `velocity`.
+    pub fn with_start(self, position: f64, velocity: f64) -> Self {
+        Self { start: JointStart::Scalar { position, velocity }, ..self }
     }
 
     /// The points that it connects: the parent's, then the child's.
@@ -241,5 +256,11 @@ impl BallJoint {
     /// With the default contact, and its socket drawn open towards -z.
     pub fn new(name: &str, socket: Attachment, ball: Attachment) -> Self {
         Self { name: name.to_owned(), socket, ball, opening: -Vec3::z(), contact: contact::Parameters::default() }
+    }
+
+    /// The same joint with a radial clearance of `clearance`, m; 0 makes it ideal.
+    pub fn with_clearance(mut self, clearance: f64) -> Self {
+        self.contact.clearance = clearance;
+        self
     }
 }
