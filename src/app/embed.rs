@@ -93,7 +93,7 @@ impl App {
         }
         let panels = self.embedded.clone();
         let mut link = self.link();
-        link.embedded = Some(panels.unwrap_or_else(|| Embedded::with_controls()));
+        link.embedded = Some(panels.unwrap_or_else(Embedded::with_controls));
         let (fragment, _) = link.format_short(self.player.pending())?;
         let text = |text: &str| {
             let text = text.replace('&', "&amp;").replace('"', "&quot;");

@@ -248,7 +248,7 @@ impl Plots {
             egui::containers::menu::MenuButton::new("Choose plots")
                 .config(menu)
                 .ui(ui, |ui| layout::entries(ui, |ui| self.menu(ui, player)));
-            ui.label("PlotWindow");
+            ui.label("Window");
             ComboBox::from_id_salt("window")
                 .width(110.0)
                 .selected_text(self.window_label())
@@ -269,7 +269,7 @@ impl Plots {
                     "Simulated time that the plots show. Over a plot: wheel or pinch for nearer, drag to shift, click to put \
                      an instant on show, double-click for the window chosen here",
                 )
-                .accessible_name("PlotWindow");
+                .accessible_name("Window");
             self.comparison.ui(ui, player);
         });
     }

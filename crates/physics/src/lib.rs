@@ -14,16 +14,14 @@
 //! use jointplay_physics::simulate::{Frame, Simulation};
 //!
 //! let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
-//! machine.bodies.push(Body::new("bob", 0.4, Mat3::identity() * 1e-3));
-//! machine.joints.push(Joint::free(0));
-//! let mut joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(0, Vec3::zeros()));
-//! joint.contact.clearance = 0.2e-3;
-//! machine.ball_joints.push(joint);
+//! let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
+//! let joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
+//! machine.ball_joints.push(joint.with_clearance(0.2e-3));
 //!
 //! let mut simulation = Simulation::new(&machine)?;
 //! simulation.advance_to(0.1)?;
 //! let mut frame = Frame::default();
-//! simulation.sample(0.1, &mut frame);
+//! simulation.sample_now(&mut frame);
 //! // It has fallen through the play, struck the wall, and bounces there.
 //! assert!(frame.bodies[0].position.norm() < 0.21e-3);
 //! assert!(simulation.statistics().impacts[0] > 1);

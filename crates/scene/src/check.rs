@@ -31,6 +31,8 @@ impl Scene {
                 let title = if of_form { keys[2] } else { keys[0] };
                 (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
+            // A scene file is read into a machine whose parts fit together.
+            MechanismError::Machine(_) => ("body".to_owned(), Vec::new()),
             MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
         };
         self.start_error(&title, &keys, error.to_string())

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{BallJoint, Doubt, ElementKind, Machine, Warning};
+use super::{BallJoint, Doubt, ElementKind, JointCoordinate, Machine, Warning};
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use crate::units::{Dimension, format_quantity, unit_names};
@@ -29,7 +29,114 @@ const RESTITUTION_ERROR: f64 = 0.02;
 /// A slide's stop counts as a ball this many times as large as its depth.
 const OF_A_DEPTH: f64 = 50.0;
 
+/// An inertia is symmetric to this fraction of its largest component.
+const ROUNDING: f64 = 1e-9;
+
+/// What a machine that was built in code lacks; a scene file says it with its line.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineFault {
+    /// No body.
+    #[error("a machine needs at least one body")]
+    Empty,
+    /// Not one joint for each body, in body order.
+    #[error(
+        "body {body} needs the joint on which it hangs at the same index of `joints`, with `child` = {body} (counted from 0)"
+    )]
+    Joints {
+        /// Index.
+        body: usize,
+    },
+    /// A parent that does not come before its child.
+    #[error("the parent of body {body} must come before it (counted from 0)")]
+    Order {
+        /// Index of the child.
+        body: usize,
+    },
+    /// A point on a body that does not exist.
+    #[error("{what} holds body {body}, of {bodies} (counted from 0)")]
+    NoBody {
+        /// What holds it.
+        what: String,
+        /// Index.
+        body: usize,
+        /// Number of bodies.
+        bodies: usize,
+    },
+    /// A coordinate of a joint that does not have it.
+    #[error("force element {element} acts on a coordinate that no joint has")]
+    NoCoordinate {
+        /// Its name.
+        element: String,
+    },
+    /// A body without inertia.
+    #[error("body {body}: mass must be above 0 kg, and the inertia symmetric and positive definite")]
+    Inertia {
+        /// Its name.
+        body: String,
+    },
+    /// Contact parameters that contradict one another.
+    #[error("{joint}: {fault}")]
+    Contact {
+        /// Name of the ball joint; of the machine as a whole, "contact".
+        joint: String,
+        /// The contradiction.
+        fault: ContactFault,
+    },
+}
+
 impl Machine {
+    /// Whether its parts fit together, as those of every scene file do.
+    ///
+    /// # Errors
+    /// The first that does not.
+    pub fn check(&self) -> Result<(), MachineFault> {
+        let bodies = self.bodies.len();
+        if bodies == 0 {
+            return Err(MachineFault::Empty);
+        }
+        let exists = |what: &str, body: Option<usize>| match body {
+            Some(body) if body >= bodies => Err(MachineFault::NoBody { what: what.to_owned(), body, bodies }),
+            _ => Ok(()),
+        };
+        for (index, body) in self.bodies.iter().enumerate() {
+            if self.joints.get(index).is_none_or(|joint| joint.child != index) {
+                return Err(MachineFault::Joints { body: index });
+            }
+            let skew = (body.inertia - body.inertia.transpose()).amax();
+            let symmetric = skew <= ROUNDING * body.inertia.amax();
+            let definite = symmetric && body.inertia.symmetric_eigenvalues().min() > 0.0;
+            if !(body.mass > 0.0 && body.mass.is_finite() && definite) {
+                return Err(MachineFault::Inertia { body: body.name.clone() });
+            }
+        }
+        if let Some(extra) = self.joints.get(bodies) {
+            return exists(&extra.name, Some(bodies));
+        }
+        let late = self.joints.iter().find(|joint| joint.parent.is_some_and(|parent| parent >= joint.child));
+        late.map_or(Ok(()), |joint| Err(MachineFault::Order { body: joint.child }))?;
+        for joint in &self.closing_joints {
+            exists(&joint.name, joint.parent.max(Some(joint.child)))?;
+        }
+        for joint in &self.ball_joints {
+            exists(&joint.name, joint.socket.body.max(joint.ball.body))?;
+        }
+        for element in &self.elements {
+            element.points.iter().try_for_each(|point| exists(&element.name, point.body))?;
+            let has = |on: JointCoordinate| {
+                let joint = self.kinematic_joints().nth(on.joint);
+                joint.is_some_and(|joint| joint.kind.freedoms().contains(&on.freedom))
+            };
+            if element.coordinate().is_some_and(|on| !has(on)) {
+                return Err(MachineFault::NoCoordinate { element: element.name.clone() });
+            }
+        }
+        exists("output", Some(self.output.body))?;
+        self.check_contacts().map_err(|conflict| {
+            let joint = conflict.joint.map_or("contact", |joint| &self.ball_joints[joint].name);
+            MachineFault::Contact { joint: joint.to_owned(), fault: conflict.fault }
+        })
+    }
+
     /// Length that a relative tolerance multiplies, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
     /// most 1 m. A joint that closes a loop counts as a ball joint of the scene's radius.
     pub fn length_scale(&self) -> f64 {
@@ -217,7 +324,7 @@ impl Machine {
 }
 
 /// Two contact parameters that are inconsistent.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ContactFault {
     /// A ball that does not fit into its socket.
     #[error(
@@ -287,7 +394,43 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::{Attachment, Body, Joint, Mat3, Vec3};
+    use crate::mechanism::MechanismError;
     use crate::scene::{Scene, built_in_text};
+    use crate::simulate::Simulation;
+
+    /// A bob in a socket, changed.
+    fn fault(change: impl FnOnce(&mut Machine)) -> Option<MachineFault> {
+        let mut machine = Machine::default();
+        let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
+        let [socket, ball] = [Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros())];
+        machine.ball_joints.push(BallJoint::new("S1", socket, ball));
+        change(&mut machine);
+        let found = machine.check().err();
+        // Nothing panics, and a simulation says the same.
+        let started = Simulation::new(&machine).err().map(|error| error.0);
+        assert_eq!(started, found.clone().map(MechanismError::Machine));
+        found
+    }
+
+    #[test]
+    fn a_machine_built_in_code_is_checked_before_it_runs() {
+        assert_eq!(fault(|_| ()), None);
+        assert_eq!(fault(|machine| *machine = Machine::default()), Some(MachineFault::Empty));
+        assert_eq!(fault(|machine| machine.joints.clear()), Some(MachineFault::Joints { body: 0 }));
+        assert_eq!(fault(|machine| machine.joints[0].parent = Some(0)), Some(MachineFault::Order { body: 0 }));
+        let beyond = |what: &str| Some(MachineFault::NoBody { what: what.to_owned(), body: 3, bodies: 1 });
+        assert_eq!(fault(|machine| machine.ball_joints[0].ball.body = Some(3)), beyond("S1"));
+        assert_eq!(fault(|machine| machine.output.body = 3), beyond("output"));
+        for mass in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(fault(|machine| machine.bodies[0].mass = mass), Some(MachineFault::Inertia { .. })));
+        }
+        for inertia in [Mat3::zeros(), -Mat3::identity(), Mat3::new(1.0, 0.1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)] {
+            assert!(matches!(fault(|machine| machine.bodies[0].inertia = inertia), Some(MachineFault::Inertia { .. })));
+        }
+        let wide = fault(|machine| machine.ball_joints[0].contact.clearance = 1.0);
+        assert!(matches!(wide, Some(MachineFault::Contact { joint, .. }) if joint == "S1"));
+    }
 
     /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
     fn doubted(sections: &str) -> Option<f64> {

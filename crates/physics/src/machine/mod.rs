@@ -14,7 +14,7 @@ mod settings;
 mod solid;
 
 pub use body::*;
-pub use check::{ContactConflict, ContactFault, least_impact_steps};
+pub use check::{ContactConflict, ContactFault, MachineFault, least_impact_steps};
 pub use doubts::*;
 pub use drive::*;
 pub use element::*;
@@ -88,6 +88,14 @@ impl Default for Machine {
 }
 
 impl Machine {
+    /// Adds a body with the joint on which it hangs, whose `child` it becomes; its index. Parents come before children.
+    pub fn add_body(&mut self, body: Body, joint: Joint) -> usize {
+        let child = self.bodies.len();
+        self.bodies.push(body);
+        self.joints.push(Joint { child, ..joint });
+        child
+    }
+
     /// Names of the joints at which trees are cut, in the order in which they are counted: ball joints, then joints that close
     /// loops.
     pub fn cut_joints(&self) -> impl Iterator<Item = &str> {

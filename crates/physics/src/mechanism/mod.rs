@@ -53,7 +53,7 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::machine::{Formulation, Machine, StartRule, Vec3};
+use crate::machine::{Formulation, Machine, MachineFault, StartRule, Vec3};
 use crate::units::format_quantity_digits;
 use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
@@ -67,6 +67,9 @@ use tree::Tree;
 /// Why a scene's equations cannot be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MechanismError {
+    /// A machine whose parts do not fit together.
+    #[error("{0}")]
+    Machine(#[from] MachineFault),
     /// A rod cannot reach its slider somewhere along the trajectory.
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
@@ -298,6 +301,7 @@ impl Mechanism {
     /// A trajectory that the rods cannot reach; equations that would be too costly; for a settled start, a machine that does not
     /// start without play.
     pub fn new(machine: &Machine) -> Result<Self, MechanismError> {
+        machine.check()?;
         let model = Arc::new(Model::new(machine));
         if let Some(form) = &model.closed_form {
             form.check()?;

@@ -16,6 +16,11 @@ impl Simulation {
         if self.sampled[j].0 > found.0 { self.sampled[j] } else { found }
     }
 
+    /// Everything at the latest state.
+    pub fn sample_now(&mut self, out: &mut Frame) {
+        self.sample(self.time(), out);
+    }
+
     /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
     /// Allocates only while `out` is too small.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
