@@ -1,8 +1,8 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
-//! Physics, scene files and analysis are crates of their own, which this one re-exports. Above them, each using only what stands before
-//! it (`ARCHITECTURE.md`): [`files`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`], and the entries [`cli`],
-//! `main.rs` and [`web`].
+//! Physics, scene files and analysis are separate crates, re-exported here. Above them are the following modules, each using
+//! only those before it (`ARCHITECTURE.md`): [`files`], [`chart`], [`film`] and [`view`], [`render`] and [`session`], [`app`],
+//! and the entries [`cli`], `main.rs` and [`web`].
 
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -14,7 +14,7 @@ pub use jointplay_scene::mesh;
 
 #[cfg(feature = "gui")]
 pub mod app;
-// The page draws its plots itself, and downloads nothing that it does not use.
+// The page draws its plots itself and should not download unused code.
 #[cfg(not(target_arch = "wasm32"))]
 pub mod chart;
 #[cfg(not(target_arch = "wasm32"))]

@@ -6,7 +6,7 @@ use jointplay::scene::{visible, visible_line};
 #[cfg(not(target_arch = "wasm32"))]
 fn main() -> std::process::ExitCode {
     if std::env::var_os("RUST_LOG").is_some() {
-        // What is logged may hold words of a scene.
+        // Log messages may contain text of a scene.
         env_logger::Builder::from_default_env()
             .format(|out, record| {
                 use std::io::Write;
@@ -26,7 +26,7 @@ fn main() -> std::process::ExitCode {
 #[cfg(target_arch = "wasm32")]
 fn main() {}
 
-/// A panic is a mistake in the program: one line that says so, and where, instead of a trace.
+/// Reports a panic, which is a bug in the program, in one line with its location instead of a trace.
 #[cfg(not(target_arch = "wasm32"))]
 fn explain_panics() {
     use std::io::Write;

@@ -1,4 +1,4 @@
-//! How far the displayed numbers can be trusted: the measured accuracy of the preset, and how the running scene does.
+//! Reliability of the displayed numbers: measured accuracy of the preset, and indicators of the running scene.
 
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 
@@ -12,24 +12,24 @@ use crate::analysis::task::{Job, Message};
 use crate::machine::Preset;
 use crate::simulate::Impact;
 
-/// Width of the names, points.
+/// Width of the labels, points.
 const LABELS: f32 = 138.0;
-/// Height of a row, points, and of the space for doubts, lines.
+/// Height of a row, points, and lines reserved for doubts.
 const ROW: f32 = 20.0;
 const DOUBTS: usize = 3;
-/// Width of the button that starts and ends a measurement, points; fixed, so that it does not move.
+/// Width of the measure button, points; fixed, so that it does not move.
 const MEASURE: f32 = 130.0;
-/// Shown where there has been no impact yet.
+/// Placeholder before the first impact.
 const NONE: &str = "—";
-/// Fewer steps than this do not resolve an impact.
+/// Minimum number of steps to resolve an impact.
 const STEPS_OF_AN_IMPACT: u64 = 10;
-/// Error beyond which a measured preset is doubtful.
+/// Error above which a measured preset is doubtful.
 const DOUBTFUL_ERROR: f64 = 0.05;
-/// Energy residual, of what the machine held and lost, beyond which the balance is doubtful.
+/// Energy residual, relative to stored and dissipated energy, above which the balance is doubtful.
 const BALANCED: f64 = 1e-3;
 
-/// A row: label, value, whether the value is doubtful, and its tooltip. The rows are always the same, so that nothing moves
-/// while the scene plays.
+/// A row: label, value, whether the value is doubtful, and tooltip. The set of rows is fixed, so that nothing moves during
+/// playback.
 struct AccuracyLine {
     label: &'static str,
     value: String,
@@ -39,7 +39,7 @@ struct AccuracyLine {
 
 impl AccuracyLine {
     fn ui(&self, ui: &mut Ui) {
-        // No control: it needs no height for fingers.
+        // Not a control; needs no touch height.
         ui.spacing_mut().interact_size.y = ROW;
         ui.horizontal(|ui| {
             ui.allocate_ui(vec2(LABELS, ROW), |ui| {
@@ -105,7 +105,7 @@ impl Accuracy {
         false
     }
 
-    /// Everything below the choice of the preset.
+    /// The panel below the selection of the preset.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
         let preset = preset_of(player);
         let mut list = vec![solver(player, preset)];
@@ -220,7 +220,7 @@ impl Accuracy {
     }
 }
 
-/// The preset whose method and tolerance (fixed step) are in force, whether or not it was chosen by name.
+/// The preset that matches the present method and tolerance (or fixed step), whether or not it was chosen by name.
 pub fn preset_of(player: &Player) -> Option<Preset> {
     let solver = &player.pending().machine.solver;
     let is = |preset: &Preset| {
@@ -232,7 +232,7 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     chosen.or_else(|| Preset::ALL.into_iter().find(is))
 }
 
-/// The scene with everything that determines its motion, without solver and view settings.
+/// The scene without solver and view settings, i.e. the model whose motion is computed.
 fn model_of(player: &Player) -> SceneSource {
     let mut scene = SceneSource::of(player.pending());
     let kept = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
@@ -274,7 +274,7 @@ fn capacity(player: &Player) -> AccuracyLine {
     }
 }
 
-/// The latest impact: where it was, how finely it was resolved, and its restitution.
+/// The latest impact: ball joint, resolution, and restitution.
 fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let impact = player.impact_record().last_ended(player.pacer.shown(), f64::INFINITY);
     let row = |label, value: Option<String>, doubtful, help: String| AccuracyLine {
@@ -287,7 +287,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         .map_or_else(|| "none yet".to_owned(), |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)));
     let ratio = |impact: &Impact| {
         let [given, asked] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
-        // Only an undisturbed impact can be compared with what was asked for.
+        // Only an undisturbed impact is comparable with the requested value.
         if impact.has_own_restitution() { format!("{given}, asked {asked}") } else { given }
     };
     let law = impact.map_or_else(String::new, |impact| {
@@ -316,7 +316,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         row(
             "Measured restitution",
             impact.map(ratio),
-            // It yields the restitution of its law, unless the steps were too long.
+            // It has the law's restitution unless the steps were too long.
             impact.is_some_and(|impact| impact.has_own_restitution() && (impact.achieved() - impact.law).abs() > 0.02),
             format!(
                 "Separation speed over approach speed of the latest impact, and what was asked for if it was undisturbed.{law} \
@@ -326,7 +326,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     ]
 }
 
-/// Kind of an impact: only an undisturbed one has the restitution of its law.
+/// Kind of an impact; only an undisturbed one has its law's restitution.
 fn kind(impact: &Impact) -> &'static str {
     match (impact.disturbed, impact.floored, impact.is_soft()) {
         (true, ..) => "disturbed",

@@ -1,25 +1,25 @@
-//! What the mechanism is doing, in sentences for users who do not see the picture.
+//! Spoken descriptions of the mechanism's state, for users who cannot see the picture.
 
 use super::player::Player;
 use super::value;
 use crate::simulate::ContactState;
 use crate::units::format_quantity_digits;
 
-/// Least time between two reports unless something happens, s.
+/// Least time between two reports without an event, s.
 const INTERVAL: f64 = 1.0;
-/// Most ball joints reported one by one; of more, only counts.
+/// Most ball joints reported individually; beyond that, only counts are reported.
 const MOST_JOINTS: usize = 6;
 
-/// Makes a report about once a second, and at once when something happens.
+/// Reports about once a second, and immediately after an event.
 #[derive(Debug, Default)]
 pub struct Announcer {
     text: String,
-    /// The same without the impacts.
+    /// The report without impacts.
     standing: String,
-    /// What counts as an event when it changes.
+    /// A change of this text is an event.
     occasion: String,
     reported: f64,
-    /// Whether the latest report is about one.
+    /// Whether the latest report is about an event.
     event: bool,
     /// Strongest impact since the last report: ball joint, N, s.
     strongest: Option<(usize, f64, f64)>,
@@ -31,12 +31,12 @@ impl Announcer {
         &self.text
     }
 
-    /// Whether the latest report was made because something happened, not because time has passed.
+    /// Whether an event caused the latest report, rather than elapsed time.
     pub fn is_event(&self) -> bool {
         self.event
     }
 
-    /// Takes a frame into account.
+    /// Records the impacts of a frame.
     pub fn observe(&mut self, player: &Player) {
         for (joint, peak) in player.peaks().iter().enumerate() {
             if peak.normal > self.strongest.map_or(0.0, |(_, force, _)| force) {
@@ -45,8 +45,8 @@ impl Announcer {
         }
     }
 
-    /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did and, if one is due later, after how long to
-    /// ask again. `news` is what the application itself has to say.
+    /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did, and the time until the next check if a
+    /// report is due later. `news` is the application's own message.
     pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
         let occasion =
             format!("{} {} {} {news}", player.running().name, player.is_playing(), player.stopped().is_some());
@@ -202,7 +202,7 @@ mod tests {
         for _ in 0..40 {
             rests.advance(1.0 / 60.0);
         }
-        // On a slow machine a frame may fall short of its target.
+        // A frame on a slow machine may fall short of its target time.
         while !rests.has_settled() {
             rests.advance(1.0 / 60.0);
         }

@@ -1,5 +1,5 @@
-//! The window for the class: what a presentation shows, in a second window, while the controls stay in the first. It takes no input
-//! but keys and a double-click, and changes nothing of the run.
+//! The audience window: a second window that shows the presentation while the controls stay in the first. It accepts only keys
+//! and a double-click, and does not affect the run.
 
 use eframe::egui::{
     self, CentralPanel, ComboBox, Panel, PointerButton, Ui, ViewportBuilder, ViewportCommand, ViewportId, vec2,
@@ -8,17 +8,17 @@ use eframe::egui::{
 use super::keys::Action;
 use super::{App, keys, present, theme};
 
-/// Size with which it opens, points at zoom 1.
+/// Initial size, points at zoom 1.
 const SIZE: egui::Vec2 = vec2(1280.0, 720.0);
 
-/// The window as it was at its latest frame.
+/// State of the window in its latest frame.
 pub struct Audience {
     /// Its height, points at zoom 1.
     height: f32,
     fills_screen: bool,
 }
 
-/// What a frame of it has found.
+/// Results of a frame.
 struct Seen {
     height: f32,
     closed: bool,
@@ -26,12 +26,12 @@ struct Seen {
     keys: Vec<Action>,
 }
 
-/// Its name among the windows.
+/// Its viewport ID.
 fn id() -> ViewportId {
     ViewportId::from_hash_of("window for the class")
 }
 
-/// Chooses which plot it shows, of those with these `titles`.
+/// Selects the plot of the window from those with these `titles`.
 pub fn choose_plot(ui: &mut Ui, titles: &[String], chosen: &mut Option<usize>) {
     ui.label("For the class");
     let title = |index: Option<usize>| index.and_then(|index| titles.get(index)).map_or("None", |title| title);
@@ -49,7 +49,7 @@ pub fn choose_plot(ui: &mut Ui, titles: &[String], chosen: &mut Option<usize>) {
 }
 
 impl App {
-    /// Opens or closes the window for the class.
+    /// Opens or closes the audience window.
     pub fn show_audience(&mut self, on: bool) {
         self.audience = on.then_some(Audience { height: SIZE.y, fills_screen: false });
     }
@@ -59,7 +59,7 @@ impl App {
         self.audience.is_some()
     }
 
-    /// The menu entry, where the platform has several windows. Returns whether it was clicked.
+    /// Menu entry, on platforms with several windows. Returns whether it was clicked.
     pub(super) fn audience_entry(&mut self, ui: &mut Ui) -> bool {
         let help = "A second window for the projector: picture, time, impact and one plot in large type. A double-click on it, or \
                     F5, fills its screen";
@@ -71,20 +71,20 @@ impl App {
         clicked
     }
 
-    /// Shows the window, if it is open.
+    /// Shows the window if it is open.
     pub(super) fn audience_ui(&mut self, ctx: &egui::Context) {
         let Some(audience) = &self.audience else {
             return;
         };
         let zoom = present::legible(audience.height);
-        // In points of the zoom at which it opens; another size would resize the window.
+        // In points at the initial zoom; a changed size would resize the window.
         let size = SIZE / present::legible(SIZE.y);
         let builder = ViewportBuilder::default()
             .with_title("Jointplay: window for the class")
             .with_app_id("jointplay")
             .with_inner_size(size)
             .with_min_inner_size(size / 4.0);
-        // egui has one zoom for all windows. This one is drawn at once, with a zoom of its own, which no key changes.
+        // egui has one zoom for all windows. This window is drawn immediately with its own zoom, which keys do not change.
         let own = ctx.options(|options| (options.zoom_factor, options.zoom_with_keyboard));
         ctx.options_mut(|options| (options.zoom_factor, options.zoom_with_keyboard) = (zoom, false));
         let seen = ctx.show_viewport_immediate(id(), builder, |ui, _| self.audience_contents(ui));
@@ -100,7 +100,7 @@ impl App {
             match key {
                 Action::Present => self.fill_class_screen(ctx),
                 Action::Plots => self.turn_plot(),
-                // Leaves the whole screen, as in the first window.
+                // Leaves full screen, as in the first window.
                 Action::Close if self.audience.as_ref().is_some_and(|audience| audience.fills_screen) => {
                     self.fill_class_screen(ctx);
                 }
@@ -123,7 +123,7 @@ impl App {
         }
     }
 
-    /// All that is in it.
+    /// Contents of the window.
     fn audience_contents(&mut self, ui: &mut Ui) -> Seen {
         let ctx = ui.ctx().clone();
         let seen = ctx.input(|input| {

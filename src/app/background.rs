@@ -1,4 +1,4 @@
-//! A computation on a thread of its own.
+//! A computation on its own thread.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -11,19 +11,19 @@ use web_time::Instant;
 use super::host::Running;
 use crate::analysis::task::{Job, Message, perform};
 
-/// How long it computes before it rests, if it is to.
+/// Computing time between two rests, if the thread must rest.
 const SPELL: Duration = Duration::from_millis(40);
 
-/// A thread that computes a job. Dropping it ends the computation.
+/// A thread that runs a job. Dropping it cancels the job.
 pub struct Thread {
     messages: Option<Receiver<Message>>,
     cancelled: Arc<AtomicBool>,
-    /// Bits of the multiple of the time computed that it rests.
+    /// Rest as a multiple of the computing time (`f64` bits).
     rest: Arc<AtomicU64>,
 }
 
 impl Thread {
-    /// Starts `job`; `None` if the system provides no thread.
+    /// Starts `job`; `None` if the system cannot create a thread.
     pub fn start(job: Job) -> Option<Self> {
         let (sender, messages) = channel();
         let cancelled = Arc::new(AtomicBool::new(false));
@@ -35,7 +35,7 @@ impl Thread {
             let mut clock = move || start.elapsed().as_secs_f64();
             let mut spell = start;
             perform(&job, &mut clock, &mut |message| {
-                // Nobody listens any more: the same as cancelled.
+                // A closed receiver counts as cancellation.
                 if asked.load(Ordering::Relaxed) || sender.send(message).is_err() {
                     return ControlFlow::Break(());
                 }
@@ -66,7 +66,7 @@ impl Running for Thread {
             Err(TryRecvError::Empty) => None,
             Err(TryRecvError::Disconnected) => {
                 self.messages = None;
-                // A thread that ends without a final message was cancelled or has failed.
+                // A thread that ended without a final message was cancelled or has failed.
                 let cancelled = self.cancelled.load(Ordering::Relaxed);
                 (!cancelled).then(|| Message::Failed("the computation stopped unexpectedly".to_owned()))
             }

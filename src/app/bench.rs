@@ -37,14 +37,14 @@ impl Bench {
         self.sweep.update(host)
     }
 
-    /// Takes a frame at `now`, s; `moves`: whether the picture moves by itself.
+    /// Reports a frame at time `now`, s; `moves`: whether the picture is animated.
     pub fn seen(&mut self, now: f64, moves: bool) {
         self.sweep.seen(now, moves);
     }
 
-    /// Starts a ready sweep over `scene`, which is the one on show.
+    /// Starts a ready sweep over the displayed `scene`.
     pub(super) fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
-        // Its diagram is in the coordinate of the machine's travel.
+        // The diagram shows the coordinate along the machine's travel.
         self.coordinate = Coordinate::default();
         self.sweep.start(ready, scene);
     }
@@ -59,17 +59,17 @@ impl Bench {
         self.sweep.is_running()
     }
 
-    /// What share of the diagram was in sight when it was last drawn, 0 to 1.
+    /// Fraction of the diagram that was visible when it was last drawn, 0 to 1.
     pub fn diagram_seen(&self) -> f32 {
         self.sweep.diagram().seen()
     }
 
-    /// Where the diagram last drew a kept section of a point, points of the screen.
+    /// Screen position, points, where the diagram last drew a retained section of a point.
     pub fn place(&self, index: usize, section: usize) -> Option<eframe::egui::Pos2> {
         self.sweep.diagram().place(index, section)
     }
 
-    /// The distance of the twin run alone, if there is one.
+    /// Distance plot of the twin run, if there is one.
     pub(super) fn twin_ui(ui: &mut Ui, player: &Player) {
         if let Some(twin) = player.twin() {
             let title = ui.text_style_height(&eframe::egui::TextStyle::Small) + 2.0 * ui.spacing().item_spacing.y;
@@ -77,7 +77,7 @@ impl Bench {
         }
     }
 
-    /// The whole bench; returns what was asked of the run.
+    /// The whole bench; returns the user's request to the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
         const TITLE: &str = "Chaos bench";
         let title = ui.horizontal_wrapped(|ui| {

@@ -1,4 +1,4 @@
-//! What the window does with the runs kept from before a change: keeping, saving, and the picture of one beside the machine.
+//! Reference runs recorded before a change, as the window handles them: retain, save, and show beside the current machine.
 
 use eframe::egui::{self, Button, Rect, Ui, pos2, vec2};
 
@@ -7,7 +7,7 @@ use super::compare::Comparison;
 use super::files::record_files;
 use super::viewport::Viewport;
 
-/// The two halves of `area`: what was before, and what is now.
+/// The two halves of `area`: the machine before the change, and the current one.
 fn halves(area: Rect) -> (Rect, Rect) {
     let middle = area.center();
     if area.width() >= area.height() {
@@ -18,8 +18,8 @@ fn halves(area: Rect) -> (Rect, Rect) {
 }
 
 impl App {
-    /// Keeps the run as it was before a change that was just made, unless a lesson is under way, which speaks of its own plots.
-    /// `is_over`: the gesture that made it has ended.
+    /// Retains the run from before the latest change, except during a lesson, whose text refers to its own plots. `is_over`: the
+    /// gesture that caused the change has ended.
     pub(super) fn compare(&mut self, is_over: bool) {
         let comparison = &mut self.plots.comparison;
         let wanted = comparison.is_on() && self.course.is_none();
@@ -32,12 +32,12 @@ impl App {
         }
     }
 
-    /// The runs kept from before a change.
+    /// The runs from before a change.
     pub fn comparison(&self) -> &Comparison {
         &self.plots.comparison
     }
 
-    /// Saves the record of a kept run, if that was asked for.
+    /// Saves the record of a reference run on request.
     pub(super) fn save_kept(&mut self) {
         if let Some(kept) = self.plots.comparison.take_to_save() {
             let files = record_files(kept.run());
@@ -45,8 +45,8 @@ impl App {
         }
     }
 
-    /// Takes the kept runs on, and the picture of the one that is shown, `dt` seconds after the last frame. Returns whether one of
-    /// them still lags behind.
+    /// Advances the reference runs, and the picture of the displayed one, by `dt` seconds. Returns whether one of them still lags
+    /// behind.
     pub(super) fn advance_kept(&mut self, dt: f32) -> bool {
         let Self { plots, player, beside, .. } = self;
         let before = plots.comparison.beside().map(|(kept, _)| kept.run().pacer.shown());
@@ -60,7 +60,7 @@ impl App {
         lags
     }
 
-    /// Shows the machine before beside the one now, if that is asked for; returns what is left of `area`.
+    /// Shows the machine before the change beside the current one on request; returns the remaining part of `area`.
     pub(super) fn picture_before(&mut self, ui: &mut Ui, area: Rect, plain: bool) -> Rect {
         let Self { plots, player, viewport, beside, .. } = self;
         let Some((kept, number)) = plots.comparison.beside() else {
@@ -92,7 +92,7 @@ impl App {
         viewport.look_as(picture);
         picture.take_clicked();
         if let Some(pull) = picture.take_pull() {
-            // What cannot be pulled stays as it is.
+            // A body that cannot be pulled stays unchanged.
             let _ = kept.run_mut().pull(pull);
         }
         if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show the present machine alone").clicked() {

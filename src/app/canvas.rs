@@ -1,4 +1,4 @@
-//! Frames of an interface painted to a texture and read back: beside a window, on its device, or without one.
+//! Frames of an interface painted to a texture and read back: on the device of a window, or without a window.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -15,9 +15,9 @@ use crate::render::{self, Arrival, Image, Readback, RenderError, check_size, dev
 /// Time between two passes, s.
 const FRAME: f64 = 1.0 / 60.0;
 
-/// An egui context and a device, without a window.
+/// An egui context with a device, without a window.
 pub struct Canvas {
-    /// What is drawn in it.
+    /// The egui context.
     pub ctx: egui::Context,
     /// Time of its last pass, s.
     pub time: f64,
@@ -25,7 +25,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A canvas that draws with `state`, which is its own.
+    /// A canvas that owns `state`.
     pub fn new(state: RenderState) -> Self {
         render::install(&state);
         let ctx = egui::Context::default();
@@ -33,24 +33,24 @@ impl Canvas {
         Self { ctx, time: 0.0, state }
     }
 
-    /// A canvas on the device of a window; it shares none of the window's textures and pipelines.
+    /// A canvas on a window's device; it shares no textures or pipelines with the window.
     pub fn beside(window: &RenderState) -> Self {
-        // Pixels are read back as red, green, blue, whatever the order in the window.
+        // Pixels are read back as RGBA, whatever the window's format.
         let target_format = wgpu::TextureFormat::Rgba8Unorm;
         let renderer = egui_wgpu::Renderer::new(&window.device, target_format, RendererOptions::PREDICTABLE);
         Self::new(RenderState { renderer: Arc::new(RwLock::new(renderer)), target_format, ..window.clone() })
     }
 
-    /// The device.
+    /// The render state.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn state(&self) -> &RenderState {
         &self.state
     }
 
-    /// One pass over an interface of `size` pixels, `scale` pixels to a point.
+    /// One pass over an interface of `size` pixels at `scale` pixels per point.
     ///
     /// # Errors
-    /// A size that cannot be drawn.
+    /// The size cannot be drawn.
     pub fn pass(
         &mut self,
         size: [u32; 2],
@@ -84,7 +84,7 @@ impl Canvas {
         }
     }
 
-    /// The commands that draw a pass, and the texture that they draw on.
+    /// The commands that draw a pass, and their target texture.
     pub fn encode(
         &mut self,
         output: egui::FullOutput,
@@ -135,7 +135,7 @@ impl Canvas {
     /// Draws a pass and starts reading it back.
     pub fn paint(&mut self, output: egui::FullOutput, size: [u32; 2], scale: f32) -> Pending {
         let device = self.state.device.clone();
-        // Otherwise a picture too large for the adapter's memory would end the program.
+        // Without these scopes, a picture that exceeds the adapter's memory would abort the program.
         let short = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let wrong = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let (mut commands, texture) = self.encode(output, size, scale);
@@ -158,12 +158,12 @@ pub struct Pending {
     device: wgpu::Device,
     readback: Readback,
     arrival: Arrival,
-    /// Errors that the device may report.
+    /// Error scopes of the device.
     faults: Vec<Fault>,
 }
 
 impl Pending {
-    /// The picture once it is there; does not block.
+    /// The picture once it is available; does not block.
     pub fn take(&mut self) -> Option<Result<Image, RenderError>> {
         if let Err(error) = self.device.poll(wgpu::PollType::Poll) {
             return Some(Err(device_error(error)));
@@ -196,7 +196,7 @@ impl Pending {
         }
     }
 
-    /// Waits for the picture.
+    /// Blocks until the picture is available.
     ///
     /// # Errors
     /// The device fails.

@@ -1,4 +1,4 @@
-//! The system's own dialogs for files. They run beside the window, which goes on.
+//! The system's file dialogs. They do not block the window.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -7,49 +7,49 @@ use std::sync::{Arc, OnceLock};
 use eframe::egui;
 use rfd::{AsyncFileDialog, FileHandle};
 
-/// What a dialog asks for.
+/// A dialog to show.
 enum Question {
     Open,
-    /// The file that is suggested.
+    /// The suggested file name.
     Save(String),
 }
 
-/// What was chosen in a dialog.
+/// The result of a dialog.
 pub enum Answer {
     /// A file to open.
     Open(PathBuf),
-    /// Where a file is to be saved; the dialog has asked whether it may be replaced.
+    /// Path to save to; the dialog has confirmed replacing an existing file.
     Save(PathBuf),
-    /// Nothing.
+    /// The dialog was cancelled.
     Cancelled,
 }
 
-/// The dialogs of the system, one at a time.
+/// The system's dialogs, one at a time.
 pub struct Chooser {
-    /// Whether there are any; not known at first.
+    /// Whether the system has dialogs; unset until known.
     available: Arc<OnceLock<bool>>,
     question: Option<Question>,
     answer: Option<Receiver<Answer>>,
 }
 
 impl Chooser {
-    /// Finds out, beside the window, whether the system has dialogs.
+    /// Checks in the background whether the system has dialogs.
     pub fn new() -> Self {
         let available = Arc::new(OnceLock::new());
         let found = available.clone();
         std::thread::spawn(move || {
-            // Nobody else sets it.
+            // No other thread sets it.
             let _ = found.set(has_dialogs());
         });
         Self { available, question: None, answer: None }
     }
 
-    /// Asks for a file to open; false where there is no dialog, or none is known of yet.
+    /// Requests a dialog to open a file; false if there is none or availability is not known yet.
     pub fn open(&mut self) -> bool {
         self.ask(Question::Open)
     }
 
-    /// Asks where to save a file, with `name` suggested; false as by [`Self::open`].
+    /// Requests a dialog to save a file with the suggested `name`; false as for [`Self::open`].
     pub fn save(&mut self, name: &str) -> bool {
         self.ask(Question::Save(name.to_owned()))
     }
@@ -62,7 +62,7 @@ impl Chooser {
         has
     }
 
-    /// Shows the dialog asked for, over the window `frame`; returns what was chosen in the one before.
+    /// Shows the requested dialog over the window `frame`; returns the result of the previous one.
     pub fn poll(&mut self, ctx: &egui::Context, frame: &eframe::Frame) -> Option<Answer> {
         if let Some(question) = self.question.take() {
             self.show(question, ctx, frame);
@@ -78,7 +78,7 @@ impl Chooser {
 
     fn show(&mut self, question: Question, ctx: &egui::Context, frame: &eframe::Frame) {
         let mut dialog = AsyncFileDialog::new().set_parent(frame);
-        // As names without folders are understood.
+        // Names without folders are relative to the working directory.
         if let Ok(folder) = std::env::current_dir() {
             dialog = dialog.set_directory(folder);
         }
@@ -90,7 +90,7 @@ impl Chooser {
             let _ = send.send(chosen.map_or(Answer::Cancelled, answer));
             ctx.request_repaint();
         };
-        // Some systems want the dialog from the thread of the window; its answer is waited for on another.
+        // Some systems require the dialog on the window's thread; another thread waits for the answer.
         match question {
             Question::Open => {
                 let chosen = dialog.set_title("Open a scene").add_filter("Scenes", &["toml"]).pick_file();
@@ -107,23 +107,23 @@ impl Chooser {
     }
 }
 
-/// Whether the system has dialogs for files: where the desktop portal answers for them, or `zenity` is installed.
+/// Whether the system has file dialogs: the desktop portal offers them, or `zenity` is installed.
 #[cfg(all(unix, not(target_os = "macos")))]
 fn has_dialogs() -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     pollster::block_on(has_portal()).is_ok() || std::env::split_paths(&path).any(|at| at.join("zenity").is_file())
 }
 
-/// Whether the system has dialogs for files.
+/// The system always has file dialogs.
 #[cfg(not(all(unix, not(target_os = "macos"))))]
 fn has_dialogs() -> bool {
     true
 }
 
-/// Asks the portal for the version of its file chooser. A portal without a desktop behind it has none.
+/// Queries the version of the portal's file chooser. A portal without a desktop backend has none.
 #[cfg(all(unix, not(target_os = "macos")))]
 async fn has_portal() -> zbus::Result<()> {
-    /// How long the portal may take to start, s.
+    /// Timeout for starting the portal, s.
     const PATIENCE: u64 = 5;
     let bus = zbus::connection::Builder::session()?;
     let bus = bus.method_timeout(std::time::Duration::from_secs(PATIENCE)).build().await?;

@@ -1,33 +1,33 @@
-//! Impacts as sound: which clicks a frame has, and their samples.
+//! Impacts as sound: the clicks of a frame, and their samples.
 //!
-//! A click follows its impact in three ways. It sounds at the instant at which the contact ended, as far into the frame as that
-//! instant is into the window of the run that the frame shows. Its pitch is that of a vibration of which the contact lasted
-//! half a period; the time is the run's own, so that slow motion spreads the clicks but leaves each as it is. Its loudness is a
-//! power below one of its impulse, so that soft impacts are heard beside hard ones.
+//! An impact determines its click in three ways. Onset: the instant at which contact ended, with the same offset in the frame as
+//! in the frame's time window of the run. Pitch: that of a vibration whose half period is the contact duration; since this is
+//! simulated time, slow motion spreads the clicks but does not change them. Loudness: a power below one of the impulse, so that
+//! soft impacts are audible beside hard ones.
 
 use crate::scene::Scene;
 use crate::simulate::Impact;
 
-/// Lowest and highest pitch, Hz: what small loudspeakers give and most ears hear.
+/// Lowest and highest pitch, Hz: the range of small loudspeakers and most ears.
 pub const PITCHES: (f64, f64) = (150.0, 8000.0);
-/// Speed at which all the mass of the scene would have to meet a wall to be as loud as a click can be, m/s.
+/// Wall impact speed of the scene's total mass that gives full loudness, m/s.
 const LOUDEST_SPEED: f64 = 0.1;
-/// Power of the impulse that the loudness follows: ten times the impulse is two and a half times as loud.
+/// Exponent of the loudness over the impulse: ten times the impulse is two and a half times as loud.
 const COMPRESSION: f64 = 0.4;
-/// Amplitude of the loudest click, as a share of what a device takes: several may sound at once.
+/// Amplitude of the loudest click relative to the device's full scale; leaves headroom for several at once.
 const AMPLITUDE: f64 = 0.4;
-/// Most clicks of a frame; of more the loudest.
+/// Most clicks per frame; the loudest are played.
 pub const MOST_CLICKS: usize = 8;
-/// Vibrations until the amplitude has fallen to 1/e, and the least time for that, s.
+/// Vibrations until the amplitude has decayed to 1/e, and the shortest decay time, s.
 const VIBRATIONS: f64 = 3.0;
 const SHORTEST_DECAY: f64 = 4e-3;
-/// Share of its amplitude at which a click ends.
+/// Relative amplitude at which a click ends.
 const SILENCE: f64 = 3e-3;
 
-/// What is heard of one impact.
+/// Sound of one impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Click {
-    /// When, from the beginning of the frame, s.
+    /// Onset after the start of the frame, s.
     pub after: f64,
     /// Frequency, Hz.
     pub pitch: f64,
@@ -35,32 +35,32 @@ pub struct Click {
     pub loudness: f64,
 }
 
-/// A window of the run, and the time that it is given.
+/// A time window of the run, and its duration on screen.
 #[derive(Clone, Copy, Debug)]
 pub struct TimeWindow {
-    /// From after this instant, s.
+    /// Exclusive start, s.
     pub from: f64,
-    /// Up to this one, s.
+    /// Inclusive end, s.
     pub to: f64,
-    /// Seconds that it is shown for.
+    /// Display duration, s.
     pub lasts: f64,
 }
 
-/// Impulse of the blow, N s, from what the run knows of `impact`: the mass behind it from the elastic energy at the deepest point
-/// after Hertz, no more than `mass`, kg, which is all there is. What the balls press on each other while they stay together is no
-/// part of it: a ball that came down softly and leaves after a second makes no bang.
+/// Impulse of the blow, N s, from the record of `impact`. The effective mass follows from the elastic energy at the deepest point
+/// after Hertz, and is at most `mass`, kg, the total. Forces during lasting contact are excluded: a ball that settles softly and
+/// leaves after a second makes no bang.
 pub fn impulse(impact: &Impact, mass: f64) -> f64 {
     let energy = 0.4 * impact.peak * impact.deepest;
     let behind = 2.0 * energy / (impact.approach_speed * impact.approach_speed);
     behind.min(mass) * (impact.approach_speed + impact.separation_speed)
 }
 
-/// Mass of all bodies, kg.
+/// Total mass of the bodies, kg.
 pub fn mass(scene: &Scene) -> f64 {
     scene.machine.bodies.iter().map(|body| body.mass).sum()
 }
 
-/// Writes the clicks of the `impacts` that ended within `window` to `out`, in their order; `mass` is that of all bodies, kg.
+/// Writes the clicks of the `impacts` that ended within `window` to `out` in order; `mass` is the total mass, kg.
 pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, window: &TimeWindow, mass: f64, out: &mut Vec<Click>) {
     out.clear();
     let within = |impact: &&Impact| window.from < impact.end && impact.end <= window.to;
@@ -81,10 +81,10 @@ pub fn clicks<'a>(impacts: impl Iterator<Item = &'a Impact>, window: &TimeWindow
     }
 }
 
-/// The samples of a click: a vibration that fades.
+/// The samples of a click: a decaying vibration.
 #[derive(Clone, Copy, Debug)]
 pub struct Voice {
-    /// The next sample is `turn` times the last less `fade` times the one before.
+    /// Recurrence: next sample = `turn` × last − `fade` × the one before.
     turn: f64,
     fade: f64,
     last: f64,
@@ -93,9 +93,9 @@ pub struct Voice {
 }
 
 impl Voice {
-    /// Of `click`, `rate` samples a second.
+    /// The samples of `click` at `rate` samples per second.
     pub fn new(click: &Click, rate: f64) -> Self {
-        // A device too slow for the pitch gets the highest that it has.
+        // The pitch is limited by the device's sample rate.
         let pitch = click.pitch.min(0.45 * rate);
         let decay = (VIBRATIONS / pitch).max(SHORTEST_DECAY);
         let angle = std::f64::consts::TAU * pitch / rate;
@@ -104,7 +104,7 @@ impl Voice {
             turn: 2.0 * kept * libm::cos(angle),
             fade: kept * kept,
             last: 0.0,
-            // So that the next sample is that of the sine.
+            // Makes the next sample that of the sine.
             before: -AMPLITUDE * click.loudness * libm::sin(angle) / kept,
             left: (-libm::log(SILENCE) * decay * rate) as usize,
         }
@@ -134,7 +134,7 @@ mod tests {
     const RATE: f64 = 48_000.0;
 
     fn impact(end: f64, lasted: f64, speed: f64) -> Impact {
-        // Half a kilogram that comes back as it came.
+        // Elastic impact of half a kilogram.
         let deepest = 10e-6;
         Impact {
             start: end - lasted,
@@ -162,7 +162,7 @@ mod tests {
         let heard = of(&impacts, SECOND);
         let times: Vec<f64> = heard.iter().map(|click| click.after).collect();
         assert_eq!(times, [0.0125, 0.05]);
-        // What one window leaves, the next has: none twice, none lost.
+        // Adjacent windows neither repeat nor lose an impact.
         let next = TimeWindow { from: 2.0, to: 3.0, ..SECOND };
         assert_eq!(of(&impacts, next).len(), 1);
         let nothing = TimeWindow { to: 1.0, ..SECOND };
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn the_loudness_rises_with_the_impulse_by_less_and_has_an_end() {
         let loudness = |speed: f64| of(&[impact(1.5, 1e-4, speed)], SECOND)[0].loudness;
-        // 0.5 kg at 0.01 m/s and back, of 5 kg at 0.1 m/s.
+        // 0.5 kg rebounding at 0.01 m/s, relative to 5 kg at 0.1 m/s.
         assert!((loudness(0.01) - 0.02_f64.powf(0.4)).abs() < 1e-12);
         assert!((loudness(0.1) / loudness(0.01) - 10_f64.powf(0.4)).abs() < 1e-9);
         assert_eq!(loudness(100.0), 1.0);
@@ -216,7 +216,7 @@ mod tests {
         while compared < 5 {
             simulation.step().expect("runs");
             let (from, to) = (simulation.step_start(), simulation.time());
-            // The force over the step, by Simpson's rule.
+            // Integral of the force over the step by Simpson's rule.
             let parts = 8;
             let width = (to - from) / f64::from(parts);
             for part in 0..=parts {
@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Share of the energy of `samples` within 20 % of `pitch`, Hz, and where the spectrum is largest.
+    /// Fraction of the energy of `samples` within 20 % of `pitch`, Hz, and the frequency of the spectrum's maximum.
     fn spectrum(samples: &[f32], pitch: f64) -> (f64, f64) {
         let (mut near, mut all, mut best) = (0.0, 0.0, (0.0, 0.0));
         let step = 5.0;
@@ -273,7 +273,7 @@ mod tests {
             let (near, peak) = spectrum(&samples, pitch);
             assert!(near > 0.7, "{pitch} Hz: {near}");
             assert!((peak / pitch - 1.0).abs() < 0.05, "{pitch} Hz: {peak} Hz");
-            // The closed form of a sine that fades, at every sample.
+            // Closed form of a decaying sine at every sample.
             let decay = (VIBRATIONS / pitch).max(SHORTEST_DECAY) * RATE;
             for (n, sample) in samples.iter().enumerate() {
                 let (n, angle) = (n as f64, std::f64::consts::TAU * pitch / RATE);
@@ -283,7 +283,7 @@ mod tests {
             assert!(samples.len() as f64 <= 0.3 * RATE);
             let last = samples.last().copied().unwrap_or(1.0);
             assert!(f64::from(last.abs()) <= 1.1 * SILENCE * AMPLITUDE);
-            // A quarter of the energy at half the loudness.
+            // Half the loudness has a quarter of the energy.
             let energy = |loudness| -> f64 {
                 let voice = Voice::new(&Click { loudness, ..click }, RATE);
                 voice.map(|sample| f64::from(sample) * f64::from(sample)).sum()

@@ -1,48 +1,48 @@
-//! Before and after: runs kept as they were before a change of a parameter. They go on beside the run, their curves stay in grey in
-//! the plots, and one of them can be shown beside the picture, at the same instant and from the same side.
+//! Before and after: copies of the run from before a parameter change. They are stepped along with the run; the plots show their
+//! curves in grey, and one can be displayed beside the picture at the same instant and from the same camera.
 
 use eframe::egui::{self, Color32, RichText, TextEdit, Ui, vec2};
 
 use super::player::Player;
 use super::{layout, value};
 
-/// Most runs pinned. One more is the latest before a change.
+/// Most pinned runs, in addition to the latest run before a change.
 const MOST_PINNED: usize = 3;
-/// Stepping time per frame for all of them, as a share of the frame, and at least, s: while the run plays, and while one of them is
-/// waited for.
+/// Stepping time per frame for all of them: fraction of the frame time, and least value, s, during playback and while waiting for
+/// one of them.
 const SHARE: f64 = 0.2;
 const LEAST_BUDGET: f64 = 3e-3;
-/// However slow frames are: the interface still answers.
+/// Upper limit at low frame rates; keeps the interface responsive.
 const MOST_BUDGET: f64 = 16e-3;
 const WAITED_FOR: f64 = 3.0;
-/// Part of a member's colour in the grey of its curve before: enough to tell members apart.
+/// Share of a member's colour in the grey of its old curve: enough to distinguish members.
 const HUE: f32 = 0.3;
-/// Length of the dashes of pinned curves, points.
+/// Dash lengths of pinned curves, points.
 const DASHES: [f32; MOST_PINNED] = [8.0, 4.0, 2.0];
 /// Least width of a name in a legend, points.
 const LEAST_LEGEND: f32 = 30.0;
-/// How their lines look, in a legend.
+/// Line symbols in a legend.
 const LINES: [&str; 1 + MOST_PINNED] = ["—", "– –", "- -", "· ·"];
-/// Greys of the latest and of the pinned curves, 0 the background.
+/// Grey levels of the latest and the pinned curves; 0 is the background.
 const GREYS: [f32; 1 + MOST_PINNED] = [0.55, 0.7, 0.6, 0.5];
 
-/// A run as it was before a change.
+/// A run from before a change.
 pub struct Kept {
     /// The parameter that was changed.
     key: String,
-    /// The name that the user gave it.
+    /// Name given by the user.
     name: Option<String>,
-    /// 0: the latest, which the next change replaces; otherwise pinned.
+    /// 0 for the latest, which the next change replaces; otherwise pinned.
     place: usize,
     /// Whether its curves are shown.
     pub shown: bool,
     run: Box<Player>,
-    /// Of all that were ever kept.
+    /// Serial number.
     number: u64,
 }
 
 impl Kept {
-    /// Its name; by default the parameter that was changed with its value in this run.
+    /// Its name; by default the changed parameter with its value in this run.
     pub fn name(&self) -> String {
         let given = self.name.as_ref().filter(|name| !name.trim().is_empty());
         given.cloned().unwrap_or_else(|| named(&self.run, &self.key))
@@ -53,34 +53,34 @@ impl Kept {
         &self.run
     }
 
-    /// The same, to drive it.
+    /// The run, mutable.
     pub(super) fn run_mut(&mut self) -> &mut Player {
         &mut self.run
     }
 
-    /// The parameter that was changed with its value in the run of `player`.
+    /// The changed parameter with its value in the run of `player`.
     pub(super) fn named_in(&self, player: &Player) -> String {
         named(player, &self.key)
     }
 
-    /// Colour of the curve that is drawn in `colour` now.
+    /// Grey of the old curve whose current version has `colour`.
     pub fn colour(&self, colour: Color32, dark: bool) -> Color32 {
         let level = GREYS[self.place];
         let grey = Color32::from_gray((255.0 * if dark { level } else { 1.0 - level }) as u8);
         grey.lerp_to_gamma(colour, HUE)
     }
 
-    /// Length of its dashes, points; `None` for a full line.
+    /// Dash length of its curves, points; `None` for a solid line.
     pub fn dashes(&self) -> Option<f32> {
         self.place.checked_sub(1).map(|pinned| DASHES[pinned])
     }
 
-    /// Whether it has yet to come to the instant that `player` shows.
+    /// Whether it has not reached the instant displayed by `player`.
     fn lags(&self, player: &Player) -> bool {
         self.run.reached() < player.pacer.shown() && self.run.stopped().is_none()
     }
 
-    /// Where its record has what `player` records at `channel`.
+    /// Index in its record of the quantity that `player` records at `channel`.
     pub fn channel(&self, player: &Player, channel: usize) -> Option<usize> {
         let (own, other) = (&self.run, player.channels());
         if let Some(wanted) = other.list().get(channel) {
@@ -91,7 +91,7 @@ impl Kept {
         Some(own.picked().start + same)
     }
 
-    /// How it differs from the run of `player`, a line for each parameter.
+    /// Differences from the run of `player`, one line per parameter.
     fn differences(&self, player: &Player) -> String {
         let all = value::differences(self.run.running(), player.running(), &[]);
         let ends = self.run.stopped().map(|stopped| format!("It {stopped}"));
@@ -100,20 +100,20 @@ impl Kept {
     }
 }
 
-/// The parameter `key` of what runs, with its value.
+/// The parameter `key` of the running scene, with its value.
 fn named(run: &Player, key: &str) -> String {
     value::named(run.running(), key).map_or_else(|| key.to_owned(), |(name, value)| format!("{name}: {value}"))
 }
 
-/// The kept runs.
+/// The runs from before changes.
 pub struct Comparison {
-    /// Whether the run before a change is kept.
+    /// Whether the run before a change is retained.
     on: bool,
     kept: Vec<Kept>,
-    /// Place of the one shown beside the picture, and of the one whose record is to be saved.
+    /// Place of the run displayed beside the picture, and of the run whose record is to be saved.
     beside: Option<usize>,
     to_save: Option<usize>,
-    /// How many were ever kept.
+    /// Number of runs so far.
     count: u64,
 }
 
@@ -123,7 +123,7 @@ impl Default for Comparison {
     }
 }
 
-/// What the user asks for in the menu.
+/// A request from the menu.
 enum Wish {
     Pin,
     Save,
@@ -131,40 +131,40 @@ enum Wish {
 }
 
 impl Comparison {
-    /// Forgets all runs: another scene is shown.
+    /// Discards all runs for a new scene.
     pub fn clear(&mut self) {
         (self.kept, self.beside) = (Vec::new(), None);
     }
 
-    /// Whether the run before a change is kept.
+    /// Whether the run before a change is retained.
     pub fn is_on(&self) -> bool {
         self.on
     }
 
-    /// Keeps `run`, as it was before `key` was changed, in place of the latest.
+    /// Stores `run`, from before `key` was changed, as the latest.
     pub fn add(&mut self, run: Box<Player>, key: String) {
         self.kept.retain(|kept| kept.place != 0);
         self.kept.insert(0, Kept { key, name: None, place: 0, shown: true, run, number: self.count });
         self.count += 1;
     }
 
-    /// The kept runs, the latest first.
+    /// The stored runs, latest first.
     pub fn kept(&self) -> &[Kept] {
         &self.kept
     }
 
-    /// Those whose curves are shown.
+    /// The runs with visible curves.
     pub fn shown(&self) -> impl Iterator<Item = &Kept> {
         self.kept.iter().filter(|kept| kept.shown)
     }
 
-    /// Whether the run that is shown beside the one of `player` has yet to come to the instant on show.
+    /// Whether the run displayed beside that of `player` has not reached the displayed instant.
     pub fn is_waited_for(&self, player: &Player) -> bool {
         let beside = self.kept.iter().find(|kept| Some(kept.place) == self.beside);
         beside.is_some_and(|kept| kept.lags(player))
     }
 
-    /// Takes the runs to where `player` is, in a frame of `dt` seconds; returns whether one of them still lags behind.
+    /// Advances the runs to the time of `player` in a frame of `dt` seconds; returns whether one of them still lags behind.
     pub fn advance(&mut self, player: &Player, dt: f64) -> bool {
         let waited = !player.is_playing() || self.is_waited_for(player);
         let budget = (SHARE * dt).max(LEAST_BUDGET) * if waited { WAITED_FOR } else { 1.0 };
@@ -176,7 +176,7 @@ impl Comparison {
         lags
     }
 
-    /// The same within `budget`, s, between two frames, or as part of one.
+    /// The same with a time `budget`, s, between frames or within one.
     pub fn follow(&mut self, player: &Player, budget: f64) -> bool {
         let start = (player.clock)();
         let may_step = || (player.clock)() - start < budget;
@@ -196,7 +196,7 @@ impl Comparison {
         lags
     }
 
-    /// The run begins anew. What was recorded under other parameters than now is not what this start gives.
+    /// Follows a reset: a run whose parameters have changed since its start is restarted, because its record is no longer valid.
     pub fn reset(&mut self) {
         self.kept.retain_mut(|kept| kept.run.is_as_started() || kept.run.reset().is_ok());
         for kept in &mut self.kept {
@@ -217,7 +217,7 @@ impl Comparison {
             }
             kept.place = place;
         }
-        // What is no longer pinned replaces the latest.
+        // An unpinned run becomes the latest.
         if place == Some(0) {
             let kept = self.kept.remove(at);
             self.kept.retain(|kept| kept.place != 0);
@@ -225,7 +225,7 @@ impl Comparison {
         }
     }
 
-    /// What the grey curves of a plot are, in what is left of a row `height` points high.
+    /// Legend of a plot's grey curves, in the rest of a row `height` points high.
     pub fn legend(&mut self, ui: &mut Ui, player: &Player, height: f32, plot: &str) {
         let dark = ui.visuals().dark_mode;
         let count = self.kept.len().max(1) as f32;
@@ -324,12 +324,12 @@ impl Comparison {
         }
     }
 
-    /// Shows the machine now alone again.
+    /// Displays the current machine alone again.
     pub(super) fn show_alone(&mut self) {
         self.beside = None;
     }
 
-    /// The run whose machine is to be shown beside the one now, and its number.
+    /// The run whose machine is displayed beside the current one, and its number.
     pub fn beside(&mut self) -> Option<(&mut Kept, u64)> {
         let place = self.beside?;
         let kept = self.kept.iter_mut().find(|kept| kept.place == place)?;
@@ -337,7 +337,7 @@ impl Comparison {
         Some((kept, number))
     }
 
-    /// The run whose record is to be saved.
+    /// The run whose record is to be saved; clears the request.
     pub fn take_to_save(&mut self) -> Option<&Kept> {
         let place = self.to_save.take()?;
         self.kept.iter().find(|kept| kept.place == place)

@@ -1,5 +1,5 @@
-//! Controls for the scene's parameters, built from the parameter table: the three most important first, those of one joint
-//! below, the rest collapsed by group.
+//! Controls of the scene's parameters, built from the parameter table: the three most important first, then those of a single
+//! joint, and the rest collapsed by group.
 
 use std::collections::HashMap;
 
@@ -16,12 +16,12 @@ use crate::scene::{Kind, Parameter, SceneError, Scope, SetError, Value};
 use crate::simulate::Effect;
 use crate::units::{format_quantity_digits, from_display, to_display};
 
-/// Shown with the accuracy that it gives.
+/// Shown with its resulting accuracy.
 const PRESET: &str = "solver.preset";
 /// Parameters shown first.
 const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
 
-/// From this width on a slider for fingers has its value beside it, points.
+/// Width from which a touch slider has its value beside it, points.
 const BESIDE: f32 = 220.0;
 /// Side of the undo button, points.
 const UNDO: f32 = 22.0;
@@ -29,7 +29,7 @@ const UNDO: f32 = 22.0;
 const ENTRY: f32 = 84.0;
 const MARGIN: i8 = 6;
 
-/// State of the controls outside the simulation: half-typed values and their errors.
+/// State of the controls outside the simulation: partially typed values and their errors.
 #[derive(Default)]
 pub struct Controls {
     drafts: HashMap<String, Draft>,
@@ -42,12 +42,12 @@ struct Draft {
     error: Option<String>,
 }
 
-/// One parameter as it stands.
+/// A parameter with its current value.
 struct Row<'a> {
     parameter: &'static Parameter,
-    /// The scene's, or a joint's own.
+    /// Key of the scene's value, or of a joint's own value.
     key: &'a str,
-    /// For screen readers.
+    /// Accessible name.
     name: String,
     now: Value,
 }
@@ -59,18 +59,18 @@ impl Row<'_> {
 }
 
 impl Controls {
-    /// Forgets half-typed values, e.g. for a new scene.
+    /// Discards partially typed values and other state, e.g. for a new scene.
     pub fn clear(&mut self) {
         self.drafts.clear();
         self.joint = 0;
     }
 
-    /// Forgets half-typed values alone.
+    /// Discards only partially typed values.
     pub fn forget_drafts(&mut self) {
         self.drafts.clear();
     }
 
-    /// What the scene is called.
+    /// Title of the scene.
     pub fn title(&self, ui: &mut Ui, player: &Player) {
         let title = &player.running().title;
         let label = ui.label(RichText::new(title).small().weak());
@@ -79,7 +79,7 @@ impl Controls {
         ui.add_space(2.0);
     }
 
-    /// All controls, one under the other.
+    /// All controls.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
         self.few(ui, player);
         let table = player.pending().parameters();
@@ -108,7 +108,7 @@ impl Controls {
         }
     }
 
-    /// The most important ones.
+    /// The most important controls.
     pub fn few(&mut self, ui: &mut Ui, player: &mut Player) {
         spoken::landmark(ui, "Parameters");
         let table = player.pending().parameters();
@@ -118,7 +118,7 @@ impl Controls {
                 ui.add_space(4.0);
             }
         }
-        // What the scene's author chose to be changed.
+        // Parameters defined by the scene's author.
         for parameter in table.iter().filter(|p| p.scope == Scope::Own) {
             self.control(ui, player, parameter, parameter.key);
             ui.add_space(4.0);
@@ -138,7 +138,7 @@ impl Controls {
             .on_hover_text("How far the numbers can be trusted. Method, step and tolerance are set under Solver.");
     }
 
-    /// Contact parameters of one ball joint, which override the scene's.
+    /// Contact parameters of a ball joint, which override those of the scene.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
         let names: Vec<String> = player.pending().machine.ball_joints.iter().map(|j| j.name.clone()).collect();
         if names.is_empty() {
@@ -167,9 +167,9 @@ impl Controls {
         header.header_response.on_hover_text("Values of one ball joint only; they override those of the whole scene.");
     }
 
-    /// One parameter under `key`, which may be a joint's own.
+    /// Control of a parameter under `key`, which may belong to a joint.
     fn control(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str) {
-        // A key that the scene no longer has (a shorter chain) has no control.
+        // A key missing in the scene (e.g. after shortening a chain) has no control.
         let Ok(now) = player.pending().get(key) else {
             return;
         };
@@ -205,7 +205,7 @@ impl Controls {
             return;
         };
         if theme::has_fingers(ui) && ui.available_width() > BESIDE {
-            // Side by side, so that a phone shows three of them.
+            // Slider and value share a row, so that a phone shows three controls.
             ui.spacing_mut().item_spacing.y = 0.0;
             label(ui, player, row);
             let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
@@ -226,7 +226,7 @@ impl Controls {
         self.slider(ui, player, row, si);
     }
 
-    /// As wide as there is room; `si`: where its handle is.
+    /// A slider of the available width; `si` is the position of its handle.
     fn slider(&mut self, ui: &mut Ui, player: &mut Player, row: &Row, si: f64) {
         let Kind::Number { display, slider, logarithmic, .. } = row.parameter.kind else {
             return;
@@ -234,7 +234,7 @@ impl Controls {
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
         ui.spacing_mut().slider_width = ui.available_width().max(40.0);
-        // Moved, it steps to round values; of a logarithmic one to three digits.
+        // Dragging steps through round values; on a logarithmic scale, through values of three digits.
         let decimals = if logarithmic { None } else { Some(value::decimals(greatest - least)) };
         let slider = Slider::new(&mut shown, least..=greatest)
             .logarithmic(logarithmic)
@@ -258,7 +258,7 @@ impl Controls {
             this.default_button(ui, player, row);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
-            // Method and tolerance may match a preset that was not named, or differ from the one that was.
+            // Method and tolerance may match a preset that was not selected by name, or differ from the selected one.
             let (now, text) = match (row.key, accuracy::preset_of(player)) {
                 (PRESET, Some(preset)) => (Value::Choice(preset.word()), preset.word().to_owned()),
                 (PRESET, None) => (Value::Unset, "custom".to_owned()),
@@ -301,7 +301,7 @@ impl Controls {
         });
     }
 
-    /// Name on the left, and what `rest` adds from the right; on a line below if fewer than `room` points are left for it.
+    /// Name on the left, and the widgets of `rest` from the right; on a line below if fewer than `room` points are left for them.
     fn heading(
         &mut self,
         ui: &mut Ui,
@@ -329,7 +329,7 @@ impl Controls {
         }
     }
 
-    /// Text field; unreadable input stays to be corrected.
+    /// Text field; invalid input remains for correction.
     fn entry(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let shown = row.shown();
         let mut text = self.drafts.get(row.key).map_or_else(|| shown.clone(), |draft| draft.text.clone());
@@ -362,7 +362,7 @@ impl Controls {
 
     fn default_button(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let size = theme::side(ui, UNDO);
-        // Keep the space where there is nothing to undo, so that rows stay aligned.
+        // Reserves the space without a button, so that rows stay aligned.
         let Some(original) = player.original(row.key).filter(|original| *original != row.now) else {
             ui.allocate_space(egui::Vec2::splat(size));
             return;
@@ -380,14 +380,14 @@ impl Controls {
         self.settle(key, text, done);
     }
 
-    /// An accepted value clears its draft; a rejected one stays, with the reason.
+    /// Clears the draft of an accepted value; a rejected one remains, with the reason.
     fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SetError>) {
         match done {
             Ok(Effect::Now | Effect::AtReset) => {
                 self.drafts.remove(key);
             }
             Err(error) => {
-                // The control shows which key it is.
+                // The message omits the key, which the control shows.
                 let reason = match error {
                     SetError::Scene(SceneError { value: Some(value), message, .. }) => {
                         format!("{value}: {message}")
@@ -402,24 +402,24 @@ impl Controls {
     }
 }
 
-/// The parameter's name.
+/// Label of the parameter.
 fn label(ui: &mut Ui, player: &Player, row: &Row) {
     let name = RichText::new(row.parameter.label);
     let label = ui.label(if FIRST.contains(&row.key) { name.strong() } else { name });
     tooltip(ui, &label, player, row);
 }
 
-/// The font of the text, smaller if it does not fit into `room` (points): a unit that is cut off reads as another unit.
+/// Body font, reduced so that the text fits into `room` (points): a truncated unit reads as another unit.
 fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
     let body = egui::TextStyle::Body.resolve(ui.style());
     let colour = ui.visuals().text_color();
     let width = ui.painter().layout_no_wrap(text.to_owned(), body.clone(), colour).size().x;
-    // Rounded down to half a point, so that glyphs of few sizes are cached.
+    // Rounded down to half points, which limits the number of cached glyph sizes.
     let size = (2.0 * body.size * (room / width).clamp(0.7, 1.0)).floor() / 2.0;
     FontId::new(size, body.family)
 }
 
-/// Tooltip of a control, above or below it within its panel: the control in use and the picture stay visible.
+/// Tooltip above or below a control within its panel: the control in use and the picture stay visible.
 fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
     let Row { parameter, key, .. } = row;
     const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
@@ -478,7 +478,7 @@ mod tests {
             let (size, across) = width("0.568462 mm");
             assert!((10.0..14.0).contains(&size) && across <= room, "{size} {across}");
         });
-        // Nothing is drawn.
+        // Nothing is uploaded.
         output.textures_delta.clear();
     }
 }

@@ -1,5 +1,5 @@
-//! Curves of recorded quantities, drawn so that no coloured pixel stands for a value that was not recorded: each pixel column
-//! is filled from the least to the greatest value in it. Lines with mitred joins would overshoot at every peak.
+//! Curves of recorded quantities, drawn so that no coloured pixel represents a value that was not recorded: each pixel column is
+//! filled from the least to the greatest value in it. Lines with mitred joins would overshoot at every peak.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -11,16 +11,16 @@ use crate::simulate::Bin;
 
 /// Width of a curve, points.
 pub const WIDTH: f32 = 1.4;
-/// Length of a dash of one colour where curves coincide, points.
+/// Length of the dashes where curves coincide and alternate, points.
 pub const DASH: f32 = 6.0;
 
 /// Most pixels over which a steep curve fades into the next column.
 const SOFTEST: f32 = 6.0;
 
-/// One curve: what was recorded, in SI units.
+/// A recorded curve in SI units.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
-    /// In order of time.
+    /// Bins in order of time.
     pub bins: Vec<Bin>,
     /// Its colour.
     pub colour: Color32,
@@ -35,25 +35,25 @@ impl Trace {
     }
 }
 
-/// Curves over one time axis. None hides another: in a pixel column the taller is drawn behind the shorter, and curves that
-/// coincide alternate.
+/// Curves over a common time axis. None hides another: in a pixel column, taller curves are drawn behind shorter ones, and
+/// coincident curves alternate.
 pub struct Curves<'a> {
     base: PlotItemBase,
     traces: &'a [Trace],
     /// Unit of the time axis in s, and of the value axis in SI units.
     units: [f64; 2],
     width: f32,
-    /// Length of its dashes, points; `None` for full lines.
+    /// Dash length, points; `None` for solid lines.
     dashes: Option<f32>,
 }
 
 impl<'a> Curves<'a> {
-    /// Curves over axes with the given `units`: of time in s, and of the value in SI units.
+    /// Curves over axes with the given `units`: time unit in s, and value unit in SI units.
     pub fn new(traces: &'a [Trace], units: [f64; 2]) -> Self {
         Self { base: PlotItemBase::new("curves".to_owned()), traces, units, width: WIDTH, dashes: None }
     }
 
-    /// In dashes of `length` points, `width` points thick.
+    /// Uses dashes `length` points long and `width` points thick.
     pub fn dashed(mut self, width: f32, length: f32) -> Self {
         (self.width, self.dashes) = (width, Some(length));
         self
@@ -71,7 +71,7 @@ impl<'a> Curves<'a> {
         ];
         let first = (frame.left() * scale).floor() as i64;
         let count = ((frame.right() * scale).ceil() as i64 - first).max(0) as usize;
-        // Far outside is as good as outside.
+        // Points far outside are clipped just beyond the frame.
         let (top, bottom) = (frame.top() - frame.height(), frame.bottom() + frame.height());
         let clip = (f64::from(top * scale), f64::from(bottom * scale));
         let place = |time: f64, value: f64| {
@@ -93,7 +93,7 @@ impl<'a> Curves<'a> {
                 let gap = (column as f32 / (length * scale).max(1.0)) as usize % 2 == 1;
                 here.retain(|(_, bar)| !gap || bar.height() > 3.0 * width);
             }
-            // Curves that run side by side keep their order, whichever is steeper just here.
+            // Parallel curves keep their order, whichever is steeper in this column.
             let rank = |bar: &Bar| {
                 if bar.height() > 3.0 * width { bar.height() } else { 0.0 }
             };
@@ -114,13 +114,13 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Paints the pixel column at `x`: one bar, or several that coincide and alternate along it.
+/// Paints the pixel column at `x`: one bar, or several coincident bars that alternate along it.
 fn paint(mesh: &mut Mesh, x: f32, scale: f32, dash: f32, group: &[(usize, Bar)], colour: impl Fn(usize) -> Color32) {
     if let [(index, bar)] = group {
         bar.paint(mesh, x, scale, (f32::NEG_INFINITY, f32::INFINITY), colour(*index));
         return;
     }
-    // Alternate along the longer side, so that level and steep stretches look alike.
+    // Alternates along the longer side, so that level and steep parts look alike.
     let turn = |piece: i64| group[piece.rem_euclid(group.len() as i64) as usize];
     let tallest = group.iter().map(|(_, bar)| bar.height()).fold(0.0, f32::max);
     if tallest <= 0.5 * dash {
@@ -157,7 +157,7 @@ impl Span {
     }
 }
 
-/// Spans of the pixel columns from `first` on for a curve through `bins`; `place` maps time and value to pixels.
+/// Spans of the `count` pixel columns from `first` for a curve through `bins`; `place` maps time and value to pixels.
 fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: usize) -> Vec<Span> {
     let mut spans = vec![Span::NOTHING; count];
     let column = |x: f64| {
@@ -174,7 +174,7 @@ fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: 
             span.reach(if right >= xb { yb } else { ya + (right - xa) * slope });
         }
     };
-    // The pen passes through every bin: from its junction with the one before, over its middle, to its junction with the next.
+    // The pen passes through every bin: from its junction with the previous bin, over its middle, to its junction with the next.
     let mut pen: Option<(f64, f64)> = None;
     let mut extremes: Vec<(f64, f64)> = Vec::new();
     for (index, bin) in bins.iter().enumerate() {
@@ -184,7 +184,7 @@ fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: 
         }
         let next = bins.get(index + 1).filter(|next| next.from == bin.to);
         let exit = next.map(|next| {
-            // The middle of their overlap, or of the gap between them.
+            // Middle of their overlap, or of the gap between them.
             0.5 * (bin.least.max(next.least) + bin.greatest.min(next.greatest))
         });
         let wanted = match (pen, exit) {
@@ -216,7 +216,7 @@ fn spans(bins: &[Bin], place: impl Fn(f64, f64) -> [f64; 2], first: i64, count: 
     spans
 }
 
-/// A painted column: full colour between its ends, each of which fades over the given number of pixels around it.
+/// A painted column: full colour between its ends; each end fades over the given number of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bar {
     top: f32,
@@ -232,12 +232,12 @@ impl Bar {
         self.bottom - self.top
     }
 
-    /// Whether the two would hide each other.
+    /// Whether the two bars would hide each other.
     fn coincides(&self, other: &Self) -> bool {
         (self.top - other.top).abs() < 1.0 && (self.bottom - other.bottom).abs() < 1.0
     }
 
-    /// Adds it to `mesh`, clipped to the range between two heights (pixels).
+    /// Adds the bar to `mesh`, clipped to the range between two heights (pixels).
     fn paint(&self, mesh: &mut Mesh, x: f32, scale: f32, (low, high): (f32, f32), colour: Color32) {
         let profile = [
             (self.top - 0.5 * self.soft_top, 0.0),
@@ -265,10 +265,9 @@ impl Bar {
     }
 }
 
-/// The bars of a curve: `width` pixels thick where it is level, and as wide where it is steep; never a pixel beyond its own
-/// peaks and troughs.
+/// The bars of a curve: `width` pixels thick in level and steep parts alike, and never beyond its own peaks and troughs.
 fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
-    // Whole columns on either side, and the rest of the width as softer ends.
+    // Full columns on either side; the rest of the width softens the ends.
     let beside = (0.5 * (width - 1.0) + 0.25).floor().max(0.0) as usize;
     let rest = (width - 2.0 * beside as f32 - 1.0).max(0.0);
     let wide = |at: usize| {
@@ -284,7 +283,7 @@ fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
         }
         let before = at.checked_sub(1).map_or(Span::NOTHING, |at| wide[at]);
         let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::NOTHING));
-        // How far the curve continues beyond this column, limited to its slope here.
+        // Extent of the curve beyond this column, limited to its slope here.
         let goes_on = |by: f32| by.clamp(0.0, (bottom - top).min(SOFTEST));
         let (up, down) = (goes_on(top - around.top), goes_on(around.bottom - bottom));
         let more = |beyond: f32| (0.5 * rest * beyond).min(1.0);
@@ -329,7 +328,7 @@ impl PlotItem for Curves<'_> {
     }
 }
 
-/// Points for the hit test, joined by a line if it has a width; its sharp corners are cut off.
+/// Points for the hit test, connected by a line if it has a width; sharp corners are split.
 pub struct Path<'a> {
     base: PlotItemBase,
     points: &'a [PlotPoint],
@@ -338,7 +337,7 @@ pub struct Path<'a> {
 }
 
 impl<'a> Path<'a> {
-    /// The readings of a curve that is drawn by [`Curves`].
+    /// Hit-test points of a curve drawn by [`Curves`].
     pub fn readings(name: &str, points: &'a [PlotPoint], colour: Color32) -> Self {
         Self::line(name, points, colour, 0.0)
     }
@@ -385,7 +384,7 @@ impl PlotItem for Path<'_> {
     }
 }
 
-/// Splits a line at its sharp corners, so that no join sticks out.
+/// Splits a line at sharp corners, so that no mitre overshoots.
 fn parts(points: impl Iterator<Item = Pos2>) -> Vec<Vec<Pos2>> {
     /// Least cosine of the turning angle at which a join is smooth.
     const SMOOTH: f32 = 0.8;

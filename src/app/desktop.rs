@@ -18,7 +18,7 @@ use crate::analysis::task::Job;
 use crate::files::{FileError, OutputFile, publish};
 use crate::scene::{largest_file, too_large};
 
-/// Files of the desktop.
+/// The desktop host.
 #[derive(Default)]
 pub struct DesktopHost {
     opened: VecDeque<Vec<OpenedFile>>,
@@ -27,23 +27,23 @@ pub struct DesktopHost {
     speaker: Option<Speaker>,
     page: String,
     chooser: Option<Chooser>,
-    /// The file that may be replaced, as its dialog has asked.
+    /// The file whose replacement the dialog has confirmed.
     replaced: Option<PathBuf>,
 }
 
 impl DesktopHost {
-    /// Links are appended to the address `page`; with "" they have none.
+    /// Links are appended to the address `page`; "" gives the fragment alone.
     pub fn new(page: String) -> Self {
         Self { page, ..Self::default() }
     }
 
-    /// With the dialogs of the system for files, where it has any.
+    /// Uses the system's file dialogs, if there are any.
     pub fn with_dialogs(self) -> Self {
         Self { chooser: Some(Chooser::new()), ..self }
     }
 }
 
-/// Reads a file that was chosen or dropped, unless it is too large.
+/// Reads a chosen or dropped file, unless it is too large.
 fn read(path: &Path, bytes: impl FnOnce() -> Result<Vec<u8>, String>) -> OpenedFile {
     let name = path.display().to_string();
     let size = path.metadata().map_or(0, |file| file.len());
@@ -71,7 +71,7 @@ impl Host for DesktopHost {
             error @ FileError::Cannot { .. } => error.to_string(),
         };
         let mut filled = Vec::new();
-        // What made a file goes with it.
+        // The confirmation for a file also covers its provenance files.
         let replaced = self.replaced.take();
         let replace = files.first().is_some_and(|first| replaced.as_deref() == Some(Path::new(&first.name)));
         for file in files {
@@ -132,7 +132,7 @@ impl Host for DesktopHost {
     }
 
     fn workers(&self) -> usize {
-        // One core draws and steps.
+        // One core is left for drawing and stepping.
         let cores = std::thread::available_parallelism();
         cores.map_or(1, |cores| (cores.get() - 1).max(1))
     }

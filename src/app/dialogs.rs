@@ -1,4 +1,4 @@
-//! The list of keys, the about box, the field that opens a file, the link with its QR code.
+//! Dialogs: list of keys, about box, file opening, link with QR code, and others.
 
 use eframe::egui::{self, Id, Label, Modal, RichText, ScrollArea, TextEdit, Ui};
 
@@ -13,13 +13,13 @@ use code::SharedLink;
 
 mod code;
 
-/// Least width of a column of the list of keys, and that of the keys in it, points.
+/// Least width of a column of the list of keys, and width of its keys, points.
 const COLUMN: f32 = 340.0;
 const KEYS: f32 = 126.0;
-/// Below this width of a column, points, keys and their descriptions are stacked.
+/// Column width below which keys and descriptions are stacked, points.
 const NARROW: f32 = 300.0;
 
-/// Which dialog is open.
+/// The open dialog.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Dialog {
     /// List of keys.
@@ -33,7 +33,7 @@ pub enum Dialog {
         /// Why it could not be opened.
         error: Option<String>,
     },
-    /// Saves files: the path of the first as typed so far and its error.
+    /// Saves files: the path of the first file as typed so far, and its error.
     Save {
         /// Path.
         path: String,
@@ -42,28 +42,28 @@ pub enum Dialog {
         /// Why they could not be saved.
         error: Option<String>,
     },
-    /// Shows a link as a QR code, and asks for the address that it lacks.
+    /// Shows a link as a QR code, and asks for a missing address.
     Link(SharedLink),
-    /// Asks what a film is to be.
+    /// Settings of a film.
     Film {
-        /// As chosen so far.
+        /// Settings so far.
         wanted: Wanted,
     },
-    /// Runs to a section of a sweep that was not made of the displayed scene.
+    /// Runs to a section of a sweep whose scene differs from the displayed one.
     Load {
         /// The run to the section.
         load: Box<Load>,
-        /// What it would change, one phrase each.
+        /// Resulting changes, one phrase each.
         changes: Vec<String>,
     },
-    /// Starts a ready sweep, whose scene replaces one that was changed.
+    /// Starts a ready sweep whose scene replaces a modified one.
     Ready {
         /// The sweep.
         sweep: &'static ReadySweep,
-        /// The changes that would be lost, one phrase each.
+        /// Changes that would be lost, one phrase each.
         lost: Vec<String>,
     },
-    /// Starts as if for the first time.
+    /// Resets everything to first-start settings.
     #[cfg(not(target_arch = "wasm32"))]
     StartAsNew,
 }
@@ -84,7 +84,7 @@ impl Dialog {
         }
     }
 
-    /// Label of its button and the answer it gives; `None` if there is nothing to answer, or nothing typed yet.
+    /// Label of its button and the answer; `None` if there is nothing to answer or no text yet.
     fn answer(&self) -> Option<(&'static str, Option<Answer>)> {
         let typed = |path: &str| Some(path.trim().to_owned()).filter(|path| !path.is_empty());
         match self {
@@ -104,7 +104,7 @@ impl Dialog {
     }
 }
 
-/// What a dialog asks for.
+/// Answer of a dialog.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// Close the dialog.
@@ -121,7 +121,7 @@ pub enum Answer {
     Load,
     /// Replace the scene and start the sweep.
     Sweep,
-    /// Forget everything and start as new.
+    /// Erase all settings and start as new.
     #[cfg(not(target_arch = "wasm32"))]
     StartAsNew,
 }
@@ -129,7 +129,7 @@ pub enum Answer {
 /// Shows `dialog`.
 pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &str) -> Option<Answer> {
     let mut answer = None;
-    // Title, buttons and frame stay visible on a low screen and in a dialog whose text grows.
+    // Title, buttons and frame stay visible on a low screen and when the text grows.
     let most = (ctx.content_rect().height() - 140.0).max(80.0);
     let width = match dialog {
         Dialog::Link(_) => most.clamp(200.0, 720.0),
@@ -187,7 +187,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
     answer
 }
 
-/// The list of keys: groups in as many columns as there is room for.
+/// The list of keys: groups in as many columns as fit.
 fn help(ui: &mut Ui) -> bool {
     ui.spacing_mut().interact_size.y = 18.0;
     ui.spacing_mut().item_spacing.y = 4.0;
@@ -214,7 +214,7 @@ fn key_row(ui: &mut Ui, key: &str, help: &str) {
     let key = Label::new(RichText::new(key).strong()).wrap();
     let help = Label::new(help).wrap();
     if ui.available_width() < NARROW {
-        // Stacked, since otherwise the longer half of each line would be cut off.
+        // Stacked, since the longer part of each line would be cut off otherwise.
         ui.add(key);
         ui.indent("help", |ui| ui.add(help));
         return;
@@ -281,7 +281,7 @@ fn list(ui: &mut Ui, words: &str, changes: &[String]) -> bool {
     false
 }
 
-/// The text field, with its error below; returns whether Enter was pressed.
+/// The text field with its error below; returns whether Enter was pressed.
 fn path_field(ui: &mut Ui, path: &mut String, hint: &str, error: Option<&str>) -> bool {
     let field = ui.add(TextEdit::singleline(path).desired_width(f32::INFINITY).hint_text(hint));
     let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));

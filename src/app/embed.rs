@@ -1,4 +1,4 @@
-//! The window within another page: the picture with a bar to play it, and the panels that its link asks for.
+//! The window embedded in another page: the picture with a transport bar, and the panels requested by its link.
 
 use eframe::egui::{self, Frame, Panel, ScrollArea, Ui};
 
@@ -14,12 +14,12 @@ const BELOW: f32 = 0.4;
 const FRAME: [u32; 2] = [800, 500];
 
 impl App {
-    /// The panels of an embedded window; `None` for a window of its own.
+    /// Panels of an embedded window; `None` for a stand-alone window.
     pub fn embedded(&self) -> Option<&Embedded> {
         self.embedded.as_ref()
     }
 
-    /// The whole of an embedded window.
+    /// The complete interface of an embedded window.
     pub(super) fn embedded_ui(&mut self, ui: &mut Ui, bar: Frame) {
         let Some(panels) = self.embedded.clone() else {
             return;
@@ -81,10 +81,10 @@ impl App {
         self.central(ui, asked);
     }
 
-    /// The line of HTML that shows this state in a frame of another page, with the three most important controls.
+    /// An HTML line that embeds this state in another page, with the three most important controls.
     ///
     /// # Errors
-    /// Text: there is no page, or the state does not fit in a link.
+    /// A message: there is no page, or the state does not fit in a link.
     pub fn embedding(&self) -> Result<String, String> {
         let address = self.page_address();
         if address.is_empty() {

@@ -1,5 +1,5 @@
-//! Where a parameter enters the equations, as its tooltip says it: the law by name, its formula, and the paper's number, or the
-//! publication of a law that the paper does not use.
+//! Place of a parameter in the equations, for its tooltip: name of the law, formula, and the paper's equation number or, for a
+//! law not used in the paper, its publication.
 
 use crate::contact::{FrictionLaw, NormalLaw, Parameters};
 use crate::scene::Scene;
@@ -11,14 +11,14 @@ const CORRECTION: &str = "c_d = 0 up to v0, (v - v0) / (v1 - v0) up to v1, then 
 /// The paper.
 const PAPER: &str = "Sheng & Chen (2024)";
 
-/// A law as a tooltip states it.
+/// A law as shown in a tooltip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stated {
     /// Name of the law.
     pub law: &'static str,
     /// Its formula.
     pub formula: &'static str,
-    /// Where it is published, if not in the paper.
+    /// Publication, if other than the paper.
     pub elsewhere: Option<&'static str>,
 }
 
@@ -28,7 +28,7 @@ impl Stated {
     }
 }
 
-/// The law of `scene` that the parameter `key` enters, where it is one of a contact.
+/// The law of `scene` that uses the parameter `key`; `None` unless it is a contact parameter.
 pub fn law(key: &str, scene: &Scene) -> Option<Stated> {
     let (group, last) = key.rsplit_once('.')?;
     let contact = match group.strip_prefix("joint.") {
@@ -56,7 +56,7 @@ fn law_of(last: &str, contact: &Parameters) -> Option<Stated> {
     })
 }
 
-/// The damping factors are those of `contact::damping_factor`.
+/// The damping factors match `contact::damping_factor`.
 fn normal(law: NormalLaw) -> Stated {
     let (law, formula, elsewhere) = match law {
         NormalLaw::LankaraniNikravesh => (
@@ -86,7 +86,7 @@ fn normal(law: NormalLaw) -> Stated {
     Stated { law, formula, elsewhere }
 }
 
-/// The row of a parameter, `Paper eqs. (9), (10)`, with the paper named: `Sheng & Chen (2024), eqs. 9, 10`.
+/// The source of a parameter, `Paper eqs. (9), (10)`, with the paper's name: `Sheng & Chen (2024), eqs. 9, 10`.
 pub fn source(equation: &str) -> String {
     let named = equation.replace("Paper eq", &format!("{PAPER}, eq")).replace("paper eq", &format!("{PAPER}, eq"));
     let mut out = String::with_capacity(named.len());
@@ -157,7 +157,7 @@ mod tests {
                 assert!(condition.abs() < 1e-12 && stated.formula.contains("χ (1 + e) = ln((1 + χ) / (1 - e χ))"));
                 continue;
             }
-            // Written as a file's expression.
+            // Rewritten in the expression syntax of scene files.
             let text = factor.trim().trim_end_matches('·').replace('¾', "0.75").replace("e²", "e^2");
             let text = text.replace(" (", " * (");
             let value = evaluate(&text, &[("e", Quantity::new(ce, Dimension::None))]).expect("arithmetic").value();

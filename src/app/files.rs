@@ -1,4 +1,4 @@
-//! Links and files, in and out.
+//! Import and export of links and files.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,15 +17,15 @@ use crate::session::link::{Link, SceneText, is_link};
 use crate::session::replay::Verdict;
 use crate::simulate::Channel;
 
-/// Rows of a saved record.
+/// Number of rows in a saved record.
 const ROWS: usize = 1000;
-/// Endings of what is dropped by mistake.
+/// Extensions of pictures, which are dropped by mistake.
 const PICTURES: [&str; 8] = [".png", ".jpg", ".jpeg", ".gif", ".webp", ".svg", ".mp4", ".webm"];
 /// Media type of scene files.
 pub(super) const SCENE_TYPE: &str = "application/toml";
 
 impl App {
-    /// Gives the application the services of the platform it runs on.
+    /// Sets the platform services.
     pub fn set_host(&mut self, host: Box<dyn Host>) {
         self.host = host;
     }
@@ -71,20 +71,20 @@ impl App {
         }
     }
 
-    /// The present state as a URL fragment of any length, without the `#`, for a page that has to restart.
-    /// [`super::AppOptions::from_link`] reads it back.
+    /// The present state as a URL fragment of any length, without the `#`, for a page that must restart.
+    /// [`super::AppOptions::from_link`] restores it.
     pub fn share_state(&self) -> String {
         self.link().format()
     }
 
-    /// The same where it also brings back what no address holds: a large scene, many changes, the files that a scene names.
-    /// [`super::AppOptions::from_link`] reads it back.
+    /// The state including contents too large for an address: a large scene, many changes, files referenced by a scene.
+    /// [`super::AppOptions::from_link`] restores it.
     pub fn session(&self) -> String {
         self.link().keep()
     }
 
-    /// Whether the changes to a scene of the user's own, none of the built-in ones, would be lost with this window: not if they are in
-    /// a file or came with a link. `None` as long as nothing was changed or saved since the link that it was opened with.
+    /// Whether closing this window would lose changes to the user's own scene: not for built-in scenes, nor for changes saved in
+    /// a file or received with a link. `None` until something is changed or saved after opening a link.
     pub fn unsaved(&self) -> Option<bool> {
         let wanted = self.player.pending();
         if matches!(SceneText::of(wanted), SceneText::BuiltIn(_)) {
@@ -94,12 +94,12 @@ impl App {
         (changed || self.scene_file.is_in_file()).then_some(changed)
     }
 
-    /// Address of the page to which links are appended; "" for none.
+    /// Address of the page for links; "" for none.
     pub(super) fn page_address(&self) -> String {
         if self.page.is_empty() { self.host.address() } else { self.page.clone() }
     }
 
-    /// Copies a link to the present state; where there is no address for it, asks for one first.
+    /// Copies a link to the present state; asks for an address first if none is known.
     pub fn copy_link(&mut self, ctx: &egui::Context) {
         let address = self.page_address();
         if address.is_empty() {
@@ -123,20 +123,20 @@ impl App {
         self.say("Link copied".to_owned());
     }
 
-    /// Tells the user something, for a few seconds.
+    /// Shows a message for a few seconds.
     pub fn say(&mut self, text: String) {
         self.notice = Some(Notice::new(text));
     }
 
-    /// Opens the text of a scene file; on an error the running scene stays, the reason is shown and returned.
+    /// Opens a scene file from its content; on an error the running scene stays, and the reason is shown and returned.
     ///
     /// # Errors
-    /// No text, or no scene.
+    /// The content is not text or not a valid scene.
     pub fn open_bytes(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), String> {
         self.open_given(name, bytes, &Given::new())
     }
 
-    /// The same for one that may name the files `given` with it.
+    /// The same for a scene that may refer to the files `given` with it.
     fn open_given(&mut self, name: &str, bytes: Vec<u8>, given: &Given) -> Result<(), String> {
         let opened = String::from_utf8(bytes)
             .map_err(|_| format!("{name}: not a text file"))
@@ -146,14 +146,14 @@ impl App {
         opened
     }
 
-    /// Lets the user choose a scene file.
+    /// Opens the dialog for a scene file.
     pub(super) fn choose_file(&mut self) {
         if !self.host.pick_file() {
             self.ask_what_to_open();
         }
     }
 
-    /// Asks for a link, a file or a built-in scene.
+    /// Opens the dialog for a link, a file or a built-in scene.
     pub(super) fn ask_what_to_open(&mut self) {
         self.dialog = Some(Dialog::Open { path: String::new(), error: None });
     }
@@ -171,12 +171,12 @@ impl App {
             text.filter(|text| is_link(text))
         });
         if let Some(link) = pasted {
-            // The reason is shown.
+            // The error is already shown.
             let _ = self.open_link(ctx, &link);
         }
     }
 
-    /// Takes files that were dropped, or chosen earlier.
+    /// Receives dropped or previously chosen files.
     pub(super) fn receive_files(&mut self, ctx: &egui::Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         if !dropped.is_empty() {
@@ -190,7 +190,7 @@ impl App {
         }
     }
 
-    /// Opens files that were chosen or dropped at once: a scene, and those that it names.
+    /// Opens files that were chosen or dropped together: a scene, and those it refers to.
     fn open_together(&mut self, files: Vec<OpenedFile>) -> Result<(), String> {
         let is_picture = |file: &&OpenedFile| {
             file.content.is_ok() && PICTURES.iter().any(|ending| file.name.to_lowercase().ends_with(ending))
@@ -218,7 +218,7 @@ impl App {
         Ok(())
     }
 
-    /// Gives files to the host, or asks for a path first.
+    /// Passes files to the host, or asks for a path first.
     pub(super) fn save(&mut self, files: Vec<SaveFile>) {
         #[cfg(not(target_arch = "wasm32"))]
         if let Some(first) = files.first()
@@ -244,7 +244,7 @@ impl App {
         }
     }
 
-    /// Saves files under the path that was chosen for them.
+    /// Saves files under the path chosen for them.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn receive_path(&mut self, ctx: &egui::Context, frame: &eframe::Frame) {
         if let Some(chosen) = self.host.picked_path(ctx, frame) {
@@ -255,13 +255,13 @@ impl App {
         }
     }
 
-    /// The answer to [`Dialog::Save`].
+    /// Saves files under the path from [`Dialog::Save`].
     pub(super) fn save_as(&mut self, path: String, files: Vec<SaveFile>) {
         let suggested = files.first().map_or(String::new(), |f| f.name.clone());
         let renamed: Vec<SaveFile> = files
             .iter()
             .map(|file| SaveFile {
-                // Companion files are named after the first.
+                // Companion files are renamed along with the first.
                 name: file.name.replacen(&suggested, &path, 1),
                 ..file.clone()
             })
@@ -279,7 +279,7 @@ impl App {
         }
     }
 
-    /// Saves the scene file with the changes in it.
+    /// Saves the scene file including changes.
     pub fn save_scene(&mut self) {
         let scene = self.player.pending();
         match scene.to_toml() {
@@ -291,7 +291,7 @@ impl App {
         }
     }
 
-    /// The changes are in a file now, if the scene is among `files`.
+    /// Marks the changes as saved if the scene is among `files`.
     fn note_saved(&mut self, files: &[SaveFile]) {
         if files.iter().any(|file| file.mime == SCENE_TYPE) {
             let changes = self.player.pending().changes.clone();
@@ -299,25 +299,25 @@ impl App {
         }
     }
 
-    /// Saves what the plots recorded.
+    /// Saves the record of the plots.
     pub fn save_record(&mut self) {
         self.save(record_files(&self.player));
     }
 
-    /// Description of a picture, stored in it.
+    /// Description embedded in a picture.
     pub(super) fn describe(&self) -> String {
         describe(&self.player)
     }
 
-    /// Scene and time, for the names of files.
+    /// File name stem: scene and time.
     pub(super) fn file_stem(&self) -> String {
         file_stem(&self.player)
     }
 
-    /// What the application itself has to say, in a sentence; "" for nothing.
+    /// The application's current message in one sentence; "" for none.
     pub(super) fn news(&self) -> String {
         if let Some(problem) = &self.problem {
-            // The rest is the line of the file with a mark under it.
+            // The other lines show the position in the file.
             return problem.lines().next().unwrap_or("").to_owned();
         }
         if self.film.is_some() {
@@ -337,8 +337,7 @@ impl App {
     }
 }
 
-/// Which of these files, names and contents, is the scene: the only one, or of those that end in `.toml` the last that no other
-/// one includes.
+/// Index of the scene among these files (name, content): the only file, or the last `.toml` file that no other file includes.
 fn scene_among(files: &[(String, Vec<u8>)]) -> Option<usize> {
     if files.len() == 1 {
         return Some(0);
@@ -355,17 +354,17 @@ fn scene_among(files: &[(String, Vec<u8>)]) -> Option<usize> {
     found.copied()
 }
 
-/// A file's name without its folders.
+/// File name without folders.
 fn own_name(name: &str) -> &str {
     Path::new(name).file_name().and_then(|own| own.to_str()).unwrap_or(name)
 }
 
-/// Whether a verdict needs no answer: it is shown for some seconds, not until it is dismissed.
+/// Whether a verdict needs no action; it then disappears after some seconds.
 pub fn is_right(verdict: &Verdict) -> bool {
     matches!(verdict, Verdict::Agrees(_) | Verdict::Reached)
 }
 
-/// A verdict in a sentence.
+/// Message of a verdict.
 pub fn verdict_words(verdict: &Verdict) -> String {
     match verdict {
         Verdict::Agrees(hash) => format!("State reproduced: hash {hash:016x} agrees"),
@@ -381,12 +380,12 @@ pub fn verdict_words(verdict: &Verdict) -> String {
     }
 }
 
-/// Scene and time, for the names of files.
+/// File name stem: scene and time.
 fn file_stem(player: &Player) -> String {
     format!("{}-{:.3}ms", player.running().name, player.pacer.shown() * 1e3)
 }
 
-/// The record of a run, and what made it.
+/// Files with the record of a run and its metadata.
 pub(super) fn record_files(player: &Player) -> Vec<SaveFile> {
     let name = format!("{}.csv", file_stem(player));
     let (rows, meta) = (record_csv(player), meta(player, []));
@@ -396,13 +395,13 @@ pub(super) fn record_files(player: &Player) -> Vec<SaveFile> {
     ]
 }
 
-/// The record as a table: time, then the least and the greatest value of each channel since the row before; SI units.
+/// The record as CSV: time, then least and greatest value of each channel since the previous row; SI units.
 fn record_csv(player: &Player) -> String {
     let mut text = String::from("t_s");
     let channels = player.channels();
     let columns = channels.list().iter().map(Channel::column);
     let picked = channels.picked().iter().map(|channel| &*channel.column);
-    // A picked channel may be one that is recorded anyway.
+    // A picked channel may also be recorded by default.
     let places = (0..channels.len()).chain(player.picked());
     let mut written: Vec<(&str, usize)> = Vec::new();
     for (column, place) in columns.chain(picked).zip(places) {
@@ -419,7 +418,7 @@ fn record_csv(player: &Player) -> String {
         let _ = write!(text, "{time:.9e}");
         for (least, greatest) in written.iter().map(|(_, place)| &values[*place]) {
             if least > greatest {
-                // Nothing was recorded for it here.
+                // The channel has no record here.
                 text.push_str(",NaN,NaN");
                 continue;
             }
@@ -430,7 +429,7 @@ fn record_csv(player: &Player) -> String {
     text
 }
 
-/// Metadata: what made the record, and `more` about what is in it.
+/// Metadata: the origin of the record, and `more` about its contents.
 pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Value); N]) -> String {
     let scene = player.running();
     let changed: Map<String, serde_json::Value> =
@@ -446,7 +445,7 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         "step_s": scene.machine.solver.step,
         "tolerance": scene.machine.solver.tolerance,
         "time_s": player.pacer.shown(),
-        // The state is that at the end of the latest step.
+        // The hash refers to the end of the latest step.
         "state_time_s": player.simulation().time(),
         "state_hash": format!("{:016x}", player.simulation().state_hash()),
     });
@@ -462,7 +461,7 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         };
         meta["link"] = json!(link.format());
     } else {
-        // A link carries one text.
+        // A link can carry only one text.
         let texts = wanted.source.beside.iter();
         let texts = texts.map(|(name, text)| (name.clone(), json!(**text)));
         meta["scene_text"] = json!(wanted.source.text);
@@ -474,7 +473,7 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
     format!("{meta:#}\n")
 }
 
-/// Description of a picture, stored in it.
+/// Description embedded in a picture.
 fn describe(player: &Player) -> String {
     let mut words = format!(
         "{} at t = {}, state hash {:016x}",
@@ -503,7 +502,7 @@ mod tests {
         let mut player = player("spcmm");
         player.run_to(9e-3);
         player.advance(0.0);
-        // The end of the record is shown now.
+        // Displays the end of the record.
         player.single_step();
         let text = record_csv(&player);
         let mut lines = text.lines();

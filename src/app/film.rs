@@ -1,5 +1,5 @@
-//! Films of a stretch of the timeline. Each frame is an instant of the run, reached by stepping and drawn off screen like a
-//! picture to save: how long that takes does not show. Afterwards the run stands where it stood.
+//! Films of a time window. Each frame is an instant of the run, reached by stepping and drawn off screen like a saved picture, so
+//! the film does not depend on computing speed. Afterwards the run returns to its previous instant.
 
 use eframe::egui::{self, ComboBox, DragValue, RichText, Ui};
 
@@ -22,7 +22,7 @@ const RATES: [f64; 4] = [15.0, 25.0, 30.0, 60.0];
 /// Most frames of a film: more than five minutes at the highest rate.
 const MOST_FRAMES: f64 = 20_000.0;
 
-/// What the next film is to be.
+/// Settings of the next film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wanted {
     /// First and last instant, s.
@@ -33,19 +33,19 @@ pub struct Wanted {
     pub rate: f64,
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// With the plots below the view.
+    /// Whether the plots appear below the view.
     pub plots: bool,
-    /// Kind of file.
+    /// File format.
     pub format: Format,
 }
 
 impl Wanted {
-    /// What was shown so far of a run that plays at `scale`.
+    /// The run from 0 to `reached`, s, at time scale `scale`.
     pub fn all(reached: f64, scale: f64) -> Self {
         Self { span: [0.0, reached], scale, rate: 30.0, size: SIZES[1].0, plots: false, format: Format::Mp4 }
     }
 
-    /// Number of frames: both ends count, as with `render --duration`.
+    /// Number of frames; both ends count, as in `render --duration`.
     fn frames(&self) -> f64 {
         let [from, to] = self.span;
         ((to - from) / self.scale * self.rate * (1.0 + 1e-9)).floor() + 1.0
@@ -57,7 +57,7 @@ impl Wanted {
         (from + k as f64 * self.scale / self.rate).min(to)
     }
 
-    /// Why it cannot be made, in words.
+    /// Why the film cannot be made, as a message.
     pub fn objection(&self) -> Option<String> {
         if self.span[0] == self.span[1] {
             return Some("The time range is empty: play the run first, or choose another range".to_owned());
@@ -81,20 +81,20 @@ pub struct Making {
     film: Film,
     canvas: Canvas,
     pending: Option<Pending>,
-    /// The frame that is drawn next.
+    /// Index of the next frame.
     next: u64,
-    /// How the run was before: instant shown, s, time scale, and whether it played.
+    /// State of the run before: displayed instant, s, time scale, and whether it played.
     before: (f64, f64, bool),
 }
 
 impl Making {
-    /// How much is done, 0 to 1.
+    /// Progress, 0 to 1.
     pub fn fraction(&self) -> f32 {
         (self.film.frames() as f64 / self.wanted.frames()) as f32
     }
 }
 
-/// The settings.
+/// Controls of the settings.
 pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
     egui::Grid::new("film").num_columns(2).show(ui, |ui| {
         let ends = [
@@ -159,7 +159,7 @@ pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
     false
 }
 
-/// A list of `options` for `value`.
+/// A combo box of `options` for `value`.
 fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut T, options: &[(T, String)]) {
     let chosen = options.iter().find(|(option, _)| option == value);
     ComboBox::from_id_salt(name)
@@ -175,7 +175,7 @@ fn choice<T: Copy + PartialEq>(ui: &mut Ui, name: &str, help: &str, value: &mut 
 }
 
 impl App {
-    /// What the next film is to be: what was shown so far, unless it was chosen otherwise before.
+    /// Settings of the next film: the run so far, unless chosen otherwise before.
     pub(super) fn film_to_make(&self) -> Wanted {
         let reached = self.player.reached();
         let all = Wanted::all(reached, self.player.pacer.scale());
@@ -187,10 +187,10 @@ impl App {
         wanted
     }
 
-    /// Begins to make the film; it is saved when it is complete.
+    /// Starts making the film; it is saved when complete.
     ///
     /// # Errors
-    /// What cannot be made, in words.
+    /// Why it cannot be made, as a message.
     pub fn make_film(&mut self, wanted: Wanted) -> Result<(), String> {
         if let Some(objection) = wanted.objection() {
             return Err(format!("No film: {objection}"));
@@ -201,7 +201,7 @@ impl App {
         let pacer = &self.player.pacer;
         let before = (pacer.shown(), pacer.scale(), self.player.is_playing());
         let canvas = Canvas::beside(state);
-        // Impacts glow as long as they do where a run plays at this scale.
+        // Impacts glow as long as in playback at this scale.
         self.player.pacer.set_scale(wanted.scale);
         self.player.go_to(wanted.span[0]);
         self.viewport.arrive(&self.player);
@@ -215,14 +215,14 @@ impl App {
         Some(self.film.as_ref()?.fraction())
     }
 
-    /// Gives up the film; nothing of it is left.
+    /// Cancels the film; no file remains.
     pub(super) fn cancel_film(&mut self) {
         if let Some(making) = self.film.take() {
             self.return_from_film(making.before);
         }
     }
 
-    /// The run as it was: instant shown, s, time scale, and whether it played.
+    /// Restores the run: displayed instant, s, time scale, and whether it played.
     fn return_from_film(&mut self, (shown, scale, playing): (f64, f64, bool)) {
         self.player.pacer.set_scale(scale);
         self.player.go_to(shown);
@@ -230,7 +230,7 @@ impl App {
         self.viewport.arrive(&self.player);
     }
 
-    /// Draws the next frame, or takes the one that was drawn; never waits for it.
+    /// Draws the next frame or collects a finished one; does not block.
     pub(super) fn advance_film(&mut self, ctx: &egui::Context) {
         let Some(mut making) = self.film.take() else {
             return;
@@ -256,7 +256,7 @@ impl App {
         }
     }
 
-    /// One turn of `making`; returns whether frames are missing.
+    /// One pass over `making`; returns whether frames are missing.
     fn film_on(&mut self, ctx: &egui::Context, making: &mut Making) -> Result<bool, String> {
         if let Some(pending) = &mut making.pending {
             let Some(image) = pending.take() else {
@@ -272,7 +272,7 @@ impl App {
         }
         let instant = making.wanted.instant(making.next);
         self.player.go_to(instant);
-        // The peaks since the frame before.
+        // Collects the peaks since the previous frame.
         self.player.advance(0.0);
         self.viewport.advance(&self.player, (1.0 / making.wanted.rate) as f32);
         let contents = if making.wanted.plots { Contents::Plots } else { Contents::View };

@@ -1,4 +1,4 @@
-//! The ghosts of the 3D view, the twin run and the ideal motion, and their notes.
+//! The ghosts of the 3D view (twin run, ideal motion) and their notes.
 
 use eframe::egui::Ui;
 
@@ -15,7 +15,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
         notes.push(format!("{ghost}{near}"));
     };
     let now = player.frame().time;
-    // A twin that starts at the end of the displayed step has not started yet.
+    // A twin that starts at the end of the displayed step is not visible yet.
     if let Some(twin) = player.twin().filter(|twin| twin.frame().time <= now) {
         let apart = view.add_ghost(shot, twin.frame(), Ghost::Twin, list);
         note("violet ghost: the twin run", apart);
@@ -40,7 +40,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
 }
 
 impl App {
-    /// Shows or hides the ideal ghost; says why if there is none.
+    /// Shows or hides the ideal ghost; reports why if there is none.
     pub fn show_ideal(&mut self, on: bool) {
         self.player.set_ideal(on);
         if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
@@ -48,7 +48,7 @@ impl App {
         }
     }
 
-    /// Its switch in the menu of the view.
+    /// Switch for the ideal ghost in the view menu.
     pub(super) fn ideal_switch(&mut self, ui: &mut Ui) {
         let mut on = self.player.ideal().is_some();
         let help = "The same machine with every ball joint closed, at the same drives and gravity, drawn pale over the \

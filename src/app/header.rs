@@ -1,4 +1,4 @@
-//! The bar at the top, its menus, and the strips below it.
+//! The top bar with its menus, and the message strips below it.
 
 use std::sync::LazyLock;
 
@@ -13,13 +13,13 @@ use super::{layout, opening, spoken, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 use crate::session::replay::Verdict;
 
-/// Width of the window from which the header has room for the program's name, points.
+/// Window width from which the header shows the program's name, points.
 const NAMED: f32 = 900.0;
 
 /// Width of the list of scenes, points.
 const SCENES: f32 = 560.0;
 
-/// What the list says of a built-in scene.
+/// Entry of a built-in scene in the list.
 struct AboutScene {
     name: &'static str,
     title: String,
@@ -38,7 +38,7 @@ static ABOUT_SCENES: LazyLock<Vec<AboutScene>> = LazyLock::new(|| {
 });
 
 impl AboutScene {
-    /// Its entry in the list: picture, title, and the sentence below it.
+    /// Draws the entry: picture, title, and the sentence below it.
     fn entry(&self, ui: &mut Ui, picture: Atom<'_>, chosen: bool, width: f32) -> egui::Response {
         let mut words = LayoutJob::default();
         let format = |style: TextStyle, colour| TextFormat::simple(style.resolve(ui.style()), colour);
@@ -59,7 +59,7 @@ impl App {
     pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
         spoken::landmark(ui, "Scene and files");
         ui.horizontal(|ui| {
-            // In a narrow window its buttons need the room.
+            // In a narrow window the buttons need the space.
             if !compact && ui.available_width() > NAMED {
                 ui.label(RichText::new("Jointplay").heading().strong());
                 ui.add_space(8.0);
@@ -110,7 +110,7 @@ impl App {
                 if ui.button("?").on_hover_text("Keys (?)").accessible_name("Keys").clicked() {
                     self.dialog = Some(Dialog::Help);
                 }
-                // What does not fit is left out rather than laid over the rest; the theme also has a key.
+                // Omitted rather than overlapped if it does not fit; the theme also has a key.
                 let room = ui.available_width();
                 if room > 80.0 && ui.button("About").clicked() {
                     self.dialog = Some(Dialog::About);
@@ -128,7 +128,7 @@ impl App {
         ComboBox::from_id_salt("scene")
             .width(if compact { 150.0 } else { 170.0 })
             .truncate()
-            // All scenes, where the window is high enough for them; otherwise the list scrolls.
+            // Shows all scenes if the window is high enough; otherwise the list scrolls.
             .height(0.85 * ui.ctx().content_rect().height())
             .selected_text(&name)
             .show_ui(ui, |ui| {
@@ -136,10 +136,10 @@ impl App {
                 let other = ui.selectable_label(false, "Link…").on_hover_text(help);
                 link = other.clicked();
                 ui.separator();
-                // Beside a narrow window's edges.
+                // Stays within the edges of a narrow window.
                 let width = SCENES.min(ui.ctx().content_rect().width() - 60.0);
                 ui.set_width(width);
-                // On another canvas than the window's its pictures are not known.
+                // Textures of the window are invalid on another canvas.
                 let graphics = self.graphics.as_ref().filter(|_| !self.picture.is_drawn());
                 for scene in &*ABOUT_SCENES {
                     let load = || Scene::load(scene.name, &[]).ok();
@@ -168,7 +168,7 @@ impl App {
         }
     }
 
-    /// What the menu offers on the desktop.
+    /// Desktop-only menu entries.
     #[cfg(not(target_arch = "wasm32"))]
     fn desktop_entries(&mut self, ui: &mut Ui) {
         self.recent_entries(ui);
@@ -227,7 +227,7 @@ impl App {
         }
     }
 
-    /// Everything that does not fit into a small header.
+    /// Menu of a small header, with everything that does not fit into the bar.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
         theme::tighten(ui);
@@ -236,7 +236,7 @@ impl App {
         self.desktop_entries(ui);
         self.link_button(ui);
         self.code_button(ui);
-        // Folded, so that what follows is in sight, too.
+        // Collapsed, so that the following entries are visible.
         ui.collapsing("Lessons", |ui| self.lesson_menu(ui));
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
@@ -254,18 +254,18 @@ impl App {
         }
     }
 
-    /// Whether [`Self::strips`] has anything to say.
+    /// Whether [`Self::strips`] has messages.
     pub(super) fn has_messages(&self) -> bool {
         self.problem.is_some() || self.shows_verdict() || self.is_under_way() || self.tells_changes()
     }
 
-    /// Whether the scene is the one that a visitor meets, and nobody has said that this is understood.
+    /// Whether the first-time scene is displayed and its notice not yet dismissed.
     fn tells_changes(&self) -> bool {
         let here = self.embedded().is_none() && self.course().is_none() && !self.is_presenting();
         here && !self.changes_seen && opening::is_rattling(self.player.pending())
     }
 
-    /// Says with which changes the window began; one click takes them back.
+    /// Notice of the changes the window started with; one click reverts them.
     fn changes_strip(&mut self, ui: &mut Ui) {
         let words = "Driven at 6 Hz; in the paper at 0.5 Hz.";
         let row = plate(ui, ui.visuals().weak_text_color()).show(ui, |ui| {
@@ -291,7 +291,7 @@ impl App {
         }
     }
 
-    /// Whether the verdict on a link is on show. In a frame of another page all its room belongs to the machine.
+    /// Whether the verdict on a link is displayed. An embedded window omits verdicts that need no action, to save space.
     fn shows_verdict(&self) -> bool {
         let framed = self.embedded().is_some();
         let told = self.verdict.as_ref().is_some_and(|verdict| !(framed && is_right(verdict)));
@@ -339,13 +339,14 @@ impl App {
     }
 }
 
-/// The plate behind a message, opaque.
+/// The opaque background of a message.
 fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
     let fill = ui.visuals().panel_fill.lerp_to_gamma(colour, 0.14);
     Frame::new().fill(fill).corner_radius(6.0).inner_margin(egui::Margin::symmetric(12, 8))
 }
 
-/// Progress of a run to its target; returns whether it is to stop: label and tooltip of that button.
+/// Progress of a run to its target; returns whether it was cancelled. The last argument is the label and tooltip of the stop
+/// button.
 fn under_way(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)) -> bool {
     let plate = plate(ui, ui.visuals().panel_fill);
     let row = plate.show(ui, |ui| {
@@ -360,7 +361,7 @@ fn under_way(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)
     row.inner
 }
 
-/// A coloured strip with a sentence; returns whether it was dismissed.
+/// A coloured strip with a message; returns whether it was dismissed.
 fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
     let shown = plate(ui, colour).show(ui, |ui| {
         let narrow = ui.available_width() < 520.0;
@@ -370,7 +371,7 @@ fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
             return ui.button("Dismiss").clicked();
         }
         ui.horizontal_top(|ui| {
-            // Room for the button and the gap before it.
+            // Space for the button and the gap before it.
             let room = ui.available_width() - 90.0;
             ui.vertical(|ui| {
                 ui.set_width(room);
@@ -383,7 +384,7 @@ fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
     shown.inner
 }
 
-/// Light, dark or as the system asks.
+/// Selection of the theme: light, dark or system.
 fn theme_box(ui: &mut Ui) {
     let label = |preference| match preference {
         ThemePreference::System => "System theme",

@@ -16,7 +16,7 @@ use crate::view::{DrawList, Theme};
 /// An egui context and a device without a window.
 pub struct Headless {
     canvas: Canvas,
-    /// Where the labels of the latest picture stand: those of the next stay there.
+    /// Label positions of the latest picture; the next picture reuses them.
     places: Places,
 }
 
@@ -24,7 +24,7 @@ impl Headless {
     /// Opens the best adapter: a GPU, else software Vulkan, else GL.
     ///
     /// # Errors
-    /// No adapter at all.
+    /// There is no adapter.
     pub fn new() -> Result<Self, NoAdapter> {
         let setup = WgpuSetup::CreateNew(egui_wgpu::WgpuSetupCreateNew::without_display_handle());
         let instance = pollster::block_on(setup.new_instance());
@@ -43,12 +43,12 @@ impl Headless {
         format!("{} ({})", info.name, info.backend)
     }
 
-    /// The application as it stands. It must have been made with this device, see [`Self::app`].
+    /// The application in its present state. It must have been created on this device, see [`Self::app`].
     ///
     /// # Errors
-    /// A size that cannot be drawn.
+    /// The size cannot be drawn.
     pub fn app_frame(&mut self, app: &mut App, size: [u32; 2], scale: f32) -> Result<Image, RenderError> {
-        // egui settles the size of its panels over a few passes; time stands still meanwhile.
+        // egui needs a few passes to settle panel sizes; time does not advance meanwhile.
         for _ in 0..3 {
             self.canvas.pass(size, scale, |ui| app.show(ui))?;
             app.viewport.advance(&app.player, 10.0);
@@ -57,7 +57,7 @@ impl Headless {
         self.canvas.paint(output, size, scale).wait()
     }
 
-    /// What its applications are drawn in.
+    /// The egui context of its applications.
     pub fn context(&self) -> &egui::Context {
         &self.canvas.ctx
     }
@@ -65,15 +65,15 @@ impl Headless {
     /// An application on this device.
     ///
     /// # Errors
-    /// A scene that cannot start.
+    /// The scene fails to start.
     pub fn app(&self, options: AppOptions) -> Result<App, StartError> {
         App::with_context(&self.canvas.ctx, None, options)
     }
 
-    /// A plain picture of `list` at `list.size` with `overlay` written over it; `scale` is pixels per point.
+    /// A plain picture of `list` at `list.size` with the text of `overlay`; `scale` is pixels per point.
     ///
     /// # Errors
-    /// A size that cannot be drawn.
+    /// The size cannot be drawn.
     pub fn picture(
         &mut self,
         list: &Arc<DrawList>,
@@ -91,11 +91,11 @@ impl Headless {
         self.canvas.paint(output, list.size, scale).wait()
     }
 
-    /// The CPU work for one frame of a running window without the stepping: interface, draw list, tessellation, upload and
-    /// encoded commands. For benchmarks.
+    /// CPU work of one frame of a running window without stepping: interface, draw list, tessellation, upload and encoded
+    /// commands. For benchmarks.
     ///
     /// # Errors
-    /// A size that cannot be drawn.
+    /// The size cannot be drawn.
     pub fn encode_frame(&mut self, app: &mut App, size: [u32; 2], scale: f32) -> Result<(), RenderError> {
         app.viewport.advance(&app.player, 1.0 / 60.0);
         let output = self.canvas.pass(size, scale, |ui| app.show(ui))?;
@@ -104,7 +104,7 @@ impl Headless {
         Ok(())
     }
 
-    /// Waits until the device has drawn what was submitted.
+    /// Waits until the device has finished the submitted work.
     pub fn wait(&self) {
         if let Err(error) = self.canvas.state().device.poll(wgpu::PollType::wait_indefinitely()) {
             log::warn!("waiting for the device: {error}");

@@ -1,4 +1,4 @@
-//! What the application asks of its platform: a desktop window or a web page.
+//! Platform services used by the application: desktop window or web page.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,17 +14,17 @@ pub trait Running {
     /// Its next message, if any; none follows [`Message::Done`] or [`Message::Failed`].
     fn poll(&mut self) -> Option<Message>;
 
-    /// How long it is to rest from now on, as a multiple of the time that it computes; 0 at first.
+    /// Sets the rest between spells, as a multiple of the computing time; 0 at first.
     fn rest(&mut self, rest: f64);
 
-    /// Ends it; messages already sent can still be polled.
+    /// Cancels it; messages already sent can still be polled.
     fn cancel(&mut self);
 }
 
-/// A file to be saved, with its description.
+/// A file to save, with its description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SaveFile {
-    /// Name, as suggested by the application or as the user has changed it; on the desktop a path.
+    /// Name suggested by the application or edited by the user; a path on the desktop.
     pub name: String,
     /// Media type.
     pub mime: &'static str,
@@ -37,7 +37,7 @@ pub struct SaveFile {
 pub struct OpenedFile {
     /// Its name.
     pub name: String,
-    /// Its content, or why it could not be read.
+    /// Its content, or the read error as a message.
     pub content: Result<Vec<u8>, String>,
 }
 
@@ -46,81 +46,82 @@ pub type Dropped = Arc<dyn egui::DroppedFile + Send + Sync>;
 
 /// Services of the desktop or the page. The application works without any ([`NoHost`]).
 ///
-/// Nothing here blocks: slow requests are answered later through [`Self::opened`], and the host then asks egui for a repaint.
+/// No method blocks: slow requests are answered later through [`Self::opened`], and the host then requests a repaint from egui.
 pub trait Host {
-    /// Address to which the fragment of a share link is appended; with "" the link is the fragment alone.
+    /// Address to which the fragment of a share link is appended; "" gives the fragment alone.
     fn address(&self) -> String {
         String::new()
     }
 
-    /// A link was made: put it where the user sees it, e.g. in the address bar. Returns whether the host also copies it to the
-    /// clipboard; otherwise egui does.
+    /// Publishes a new link, e.g. in the address bar. Returns whether the host also copies it to the clipboard; otherwise egui
+    /// does.
     fn shared(&mut self, _link: &str) -> bool {
         false
     }
 
-    /// Whether to ask the user for a path before [`Self::save`]; otherwise the host decides where files go.
+    /// Whether the user is asked for a path before [`Self::save`]; otherwise the host decides where files are saved.
     fn asks_for_path(&self) -> bool {
         false
     }
 
-    /// Saves `files`; returns a text that says where they are.
+    /// Saves `files`; returns a message with their location.
     ///
     /// # Errors
-    /// Why not, in words.
+    /// The cause, as a message.
     fn save(&mut self, _files: &[SaveFile]) -> Result<String, String> {
         Err("Files cannot be saved here".to_owned())
     }
 
-    /// Lets the user choose a scene file, and with it those that it names; false if the application is to ask for a path instead.
+    /// Opens a dialog for a scene file and the files it refers to; false if the application must ask for a path instead.
     fn pick_file(&mut self) -> bool {
         false
     }
 
-    /// Lets the user choose the path of a file to be saved, with `name` suggested; false if the application is to ask for it instead.
+    /// Opens a dialog for the path of a file to save, with the suggested `name`; false if the application must ask for it
+    /// instead.
     #[cfg(not(target_arch = "wasm32"))]
     fn pick_path(&mut self, _name: &str) -> bool {
         false
     }
 
-    /// The path that was chosen since, or nothing if the user has cancelled. Dialogs are shown over the window `frame`.
+    /// The path chosen since the last call; the inner `None` if the user cancelled. Dialogs are shown over the window `frame`.
     #[cfg(not(target_arch = "wasm32"))]
     fn picked_path(&mut self, _ctx: &egui::Context, _frame: &eframe::Frame) -> Option<Option<String>> {
         None
     }
 
-    /// Reads files that were dropped at once, now or later.
+    /// Reads files that were dropped together, now or later.
     fn read_dropped(&mut self, files: Vec<Dropped>);
 
-    /// The next files that were chosen at once, or dropped and read.
+    /// The next group of files chosen together, or dropped and read.
     fn opened(&mut self) -> Option<Vec<OpenedFile>>;
 
-    /// Folder in which the scene file `name`, opened here, finds the files that it names; `None` where files have no folder.
+    /// Folder in which files named by the opened scene file `name` are looked up; `None` if files have no folder.
     fn folder(&self, _name: &str) -> Option<PathBuf> {
         None
     }
 
-    /// Watches the scene file `name` from now on, instead of any other, and the files `beside` it that it names; `None` for
-    /// none. `ctx` is asked for a repaint when one of them is saved.
+    /// Watches the scene file `name`, and the files `beside` it that it refers to, instead of any previous one; `None` stops.
+    /// `ctx` is asked for a repaint when one of them is saved.
     fn watch(&mut self, _ctx: &egui::Context, _name: Option<&str>, _beside: &[String]) {}
 
-    /// The next content of the watched scene file, also when a file beside it was saved. The first may be as it was when the
+    /// The next content of the watched scene file, also after a file beside it was saved. The first may be unchanged since the
     /// watch began.
     fn saved_elsewhere(&mut self) -> Option<OpenedFile> {
         None
     }
 
-    /// How many background computations may run at once beside the picture.
+    /// Number of background computations that may run at once without slowing the picture.
     fn workers(&self) -> usize {
         1
     }
 
-    /// Starts a long background computation; `None` if that is not possible.
+    /// Starts a long background computation; `None` if that is impossible.
     fn start(&mut self, _job: Job) -> Option<Box<dyn Running>> {
         None
     }
 
-    /// Fills the screen with the window, or ends that.
+    /// Enters or leaves full screen.
     fn fill_screen(&mut self, ctx: &egui::Context, on: bool) {
         ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
     }
@@ -128,20 +129,20 @@ pub trait Host {
     /// Switches sound on or off; off at first.
     fn sound(&mut self, _on: bool) {}
 
-    /// Sounds `clicks` of a frame that begins now.
+    /// Plays the `clicks` of a frame that starts now.
     fn click(&mut self, _clicks: &[Click]) {}
 
-    /// Why nothing is heard although sound is on, in words; `None` as long as nothing is known against it.
+    /// Why sound is on but inaudible, as a message; `None` if no problem is known.
     fn no_sound(&mut self) -> Option<String> {
         Some("it cannot be made here".to_owned())
     }
 
-    /// What is going on, for users who do not see the picture; the same sentences are in the accessibility tree. `event`:
+    /// Announces the current state to users who cannot see the picture; the accessibility tree has the same sentences. `event`:
     /// something has just happened.
     fn announce(&mut self, _text: &str, _event: bool) {}
 }
 
-/// No services: for headless frames and tests.
+/// No services, for headless frames and tests.
 #[derive(Debug, Default)]
 pub struct NoHost;
 

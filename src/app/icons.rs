@@ -1,8 +1,8 @@
-//! Buttons with painted icons: they need no font, and a screen reader reads their name.
+//! Buttons with painted icons. They need no font; screen readers read their names.
 
 use eframe::egui::{self, Color32, Pos2, Rect, Response, Role, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 
-/// What an icon shows.
+/// The symbol of an icon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Icon {
     /// Triangle.
@@ -21,7 +21,7 @@ pub enum Icon {
     After,
     /// Curved arrow: back to the default.
     Undo,
-    /// The same the other way round.
+    /// Mirrored curved arrow: redo.
     Redo,
 }
 

@@ -1,4 +1,4 @@
-//! The list of impacts: a row for each that has ended, the latest first; and the badge over the picture at the instant of one.
+//! The list of impacts: one row per finished impact, latest first; and the badge over the picture at an impact's instant.
 
 use std::fmt::Write as _;
 
@@ -13,10 +13,10 @@ use crate::simulate::{ContactState, Impact};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;
-/// Most rows in sight at first.
+/// Most visible rows at first.
 const ROWS: f32 = 9.0;
 
-/// A column: heading, width in points, what it says.
+/// A column: heading, width in points, tooltip.
 type Column = (&'static str, f32, &'static str);
 
 const COLUMNS: [Column; 9] = [
@@ -37,13 +37,13 @@ const COLUMNS: [Column; 9] = [
     ),
 ];
 
-/// The panel.
+/// State of the panel.
 #[derive(Default)]
 pub struct ImpactList {
     open: bool,
 }
 
-/// A duration, to three digits.
+/// Formats a duration to three digits.
 fn duration(seconds: f64) -> String {
     let unit = match seconds {
         _ if seconds < 1e-3 => "us",
@@ -53,12 +53,12 @@ fn duration(seconds: f64) -> String {
     value::quantity(seconds, unit, 3)
 }
 
-/// A speed in mm/s, to three digits, without its unit.
+/// Formats a speed in mm/s to three digits, without unit.
 fn millimetres(speed: f64) -> String {
     value::number(1e3 * speed, 3)
 }
 
-/// Restitution of the law, and why an impact may have another.
+/// The law's coefficient of restitution, and why an impact's may differ.
 fn law(impact: &Impact) -> String {
     let law = value::number(impact.law, 3);
     match (impact.disturbed, impact.floored) {
@@ -68,7 +68,7 @@ fn law(impact: &Impact) -> String {
     }
 }
 
-/// What the columns say of an impact.
+/// Cells of an impact's row.
 fn cells(player: &Player, number: u64, impact: &Impact) -> [String; COLUMNS.len()] {
     [
         number.to_string(),
@@ -88,7 +88,7 @@ fn joint(player: &Player, joint: usize) -> String {
     joints.get(joint).map_or_else(String::new, |joint| joint.name.clone())
 }
 
-/// A row of cells in the widths of the columns.
+/// A row of cells with the column widths.
 fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -102,7 +102,7 @@ fn row(ui: &mut Ui, mut cell: impl FnMut(&mut Ui, usize)) {
 }
 
 impl ImpactList {
-    /// The table. Returns the instant of a row that was clicked, s.
+    /// The table. Returns the instant of a clicked row, s.
     fn table(ui: &mut Ui, player: &Player) -> Option<f64> {
         let (shown, known) = (player.pacer.shown(), player.reached());
         let record = player.impact_record();
@@ -175,7 +175,7 @@ impl App {
         );
     }
 
-    /// The list, in a window of its own over the lower left of the picture.
+    /// The list, in a window over the lower left of the picture.
     pub(super) fn impact_list_ui(&mut self, ctx: &egui::Context) {
         let (mut open, mut asked, mut save) = (self.impact_list.open, None, false);
         let area = self.picture_rect;
@@ -206,16 +206,16 @@ impl App {
         }
     }
 
-    /// The impact under way at the instant shown, in a line: `>>` and `<<` arrive at one. `None` while time passes.
+    /// One line about the impact at the displayed instant, e.g. after `>>` or `<<`. `None` during playback.
     pub fn impact_badge(&self) -> Option<String> {
         let player = &self.player;
-        // A film steps through instants that nobody has stopped at.
+        // Film frames are not instants chosen by the user.
         if player.is_playing() || self.film.is_some() {
             return None;
         }
         let shown = player.pacer.shown();
         let record = player.impact_record();
-        // Of the ball joint that is followed, as long as that touches.
+        // The impact of the followed ball joint, while that is in contact.
         let touches =
             |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactState::Free);
         let (number, own) = record.under_way(self.viewport.focus().filter(touches), shown)?;
@@ -229,13 +229,13 @@ impl App {
                 millimetres(impact.approach_speed),
                 millimetres(impact.separation_speed)
             ),
-            // A change may have taken the wall away.
+            // A change may have removed the wall.
             None if report.state == ContactState::Free => return None,
             None => format!("{begins}, peak {peak}, stays in contact"),
         })
     }
 
-    /// Saves the impacts of the run up to the instant shown.
+    /// Saves the impacts up to the displayed instant.
     pub fn save_impacts(&mut self) {
         let player = &self.player;
         let mut text = impact_row::COLUMNS.join(",");
@@ -250,7 +250,7 @@ impl App {
         let names: Vec<&str> = player.running().machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
         let more = [
             ("rows", json!(rows)),
-            // Indices in the column `joint`, from 0.
+            // Indices in the column `joint` start at 0.
             ("ball_joints", json!(names)),
             ("impacts_no_longer_kept", json!(player.impact_record().dropped())),
         ];

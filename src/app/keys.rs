@@ -1,8 +1,8 @@
-//! The keyboard: one table for what a key does and for the overlay that lists them.
+//! Keyboard: one table defines both the actions and the overlay that lists them.
 
 use eframe::egui::{self, EventFilter, Id, Key, Response, Slider, Ui};
 
-/// What a key asks for.
+/// Action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Action {
@@ -10,7 +10,7 @@ pub enum Action {
     Step,
     StepBack,
     Backwards,
-    /// To the next or the previous impact.
+    /// Go to the next or the previous impact.
     Impact {
         forward: bool,
     },
@@ -34,7 +34,7 @@ pub enum Action {
     Plots,
     Bench,
     Present,
-    /// To the next or the previous step of a lesson.
+    /// Go to the next or the previous step of a lesson.
     TurnPage {
         forward: bool,
     },
@@ -43,17 +43,17 @@ pub enum Action {
     Close,
 }
 
-/// Key, how it is written in the overlay (empty: with the line above), what it does.
+/// A key with its label in the overlay, and its action.
 pub struct Binding {
-    /// Where the overlay lists it.
+    /// Group in the overlay.
     pub group: Group,
     /// Key.
     pub key: Key,
-    /// What it asks for.
+    /// Its action.
     pub action: Action,
-    /// How the overlay writes the key; empty where the line above names it already.
+    /// Label of the key in the overlay; empty if the line above covers it.
     pub written: &'static str,
-    /// What the overlay says.
+    /// Description in the overlay.
     pub help: &'static str,
 }
 
@@ -61,7 +61,7 @@ const fn bind(group: Group, key: Key, action: Action, written: &'static str, hel
     Binding { group, key, action, written, help }
 }
 
-/// All keys.
+/// All key bindings.
 pub const BINDINGS: [Binding; 41] = [
     bind(Group::Run, Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(Group::Run, Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
@@ -130,12 +130,12 @@ pub const BINDINGS: [Binding; 41] = [
     bind(Group::Window, Key::Escape, Action::Close, "Esc", "Close"),
 ];
 
-/// What `key` asks for.
+/// Action of `key`.
 pub fn action(key: Key) -> Option<Action> {
     BINDINGS.iter().find(|binding| binding.key == key).map(|binding| binding.action)
 }
 
-/// Mouse and touch, for the overlay.
+/// Mouse and touch gestures for the overlay.
 pub const POINTER: [(&str, &str); 13] = [
     ("Drag beside the machine, one finger", "Turn the view"),
     ("Drag on a body; a finger stays first", "Pull it by a spring; with shift along the line of sight"),
@@ -152,12 +152,12 @@ pub const POINTER: [(&str, &str); 13] = [
     ("Arrows after a drag on a slider", "Move that slider"),
 ];
 
-/// Under which heading the overlay lists something.
+/// Groups of the overlay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
     /// Time and steps.
     Run,
-    /// What is drawn, and from where.
+    /// Display options and cameras.
     Picture,
     /// Panels and dialogs.
     Window,
@@ -166,7 +166,7 @@ pub enum Group {
 }
 
 impl Group {
-    /// Its heading.
+    /// Heading of the group.
     pub fn title(self) -> &'static str {
         match self {
             Self::Run => "Run",
@@ -176,7 +176,7 @@ impl Group {
         }
     }
 
-    /// What is listed under it: key or gesture, and what it does.
+    /// Rows of the group: key or gesture, and its action.
     pub fn rows(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let keys = BINDINGS.iter().filter(move |b| !b.written.is_empty() && b.group == self);
         let pointer = POINTER.into_iter().filter(move |_| self == Self::Pointer);
@@ -184,23 +184,23 @@ impl Group {
     }
 }
 
-/// Where the focused slider is stored.
+/// Key under which the focused slider's ID is stored.
 const SLIDER: &str = "slider with the focus";
 
-/// Way of a finger from which it is clear where it goes, points.
+/// Finger travel that determines the direction of a drag, points.
 const SLACK: f32 = 8.0;
 
-/// What a finger that came down on a slider does.
+/// State of a touch that started on a slider.
 #[derive(Clone, Copy, PartialEq)]
 enum Finger {
-    /// Not known yet.
+    /// Undecided.
     Waits,
-    /// Sideways: it draws the handle. Up or down: it scrolls what the slider lies in.
+    /// Sideways: moves the handle. Vertical: scrolls the enclosing area.
     Goes,
 }
 
-/// Leaves a finger that came down on the slider `own` to what the slider lies in, unless it goes sideways. `place`: where this
-/// is kept. To be called before the slider is added; whether that is to hear of what the finger has done so far.
+/// Leaves a touch that started on the slider `own` to the enclosing scroll area, unless it moves sideways. `place`: ID of the
+/// stored state. Call it before adding the slider; returns whether the slider may receive the touch.
 fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
     let (touched, origin, way) = ui.input(|input| {
         let pointer = &input.pointer;
@@ -232,11 +232,11 @@ fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
     hears
 }
 
-/// What of all that `ui` lies in scrolls under a finger at `point`.
+/// ID of the area around `ui` that scrolls under a finger at `point`.
 fn scrolling_at(ui: &Ui, point: egui::Pos2) -> Option<Id> {
     let layer = ui.layer_id();
     ui.ctx().viewport(|viewport| {
-        // What a slider lies in has been added before it, and is for drags alone.
+        // Enclosing scroll areas were added earlier and sense only drags.
         let widgets = viewport.this_pass.widgets.get_layer(layer);
         let under = widgets.filter(|widget| {
             let sense = widget.sense;
@@ -246,8 +246,8 @@ fn scrolling_at(ui: &Ui, point: egui::Pos2) -> Option<Id> {
     })
 }
 
-/// A slider that keeps the arrow keys once dragged or reached by Tab, until something else is clicked. A finger moves it by a drag
-/// to the side alone.
+/// A slider that captures the arrow keys after a drag or Tab focus, until something else is clicked. Only a sideways drag of a
+/// finger moves it.
 pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     let place = ui.next_auto_id().with("finger");
     let own = place.with("slider");
@@ -256,7 +256,7 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     let response = if hears {
         ui.add(slider)
     } else {
-        // It looks as always.
+        // Disabled without fading.
         let faded = std::mem::replace(&mut ui.visuals_mut().disabled_alpha, 1.0);
         let response = ui.add_enabled(false, slider);
         ui.visuals_mut().disabled_alpha = faded;
@@ -274,8 +274,8 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     response
 }
 
-/// Actions of the keys pressed since the last frame. A text field in use keeps all keys; a focused slider keeps the arrows, and
-/// any other focused control the space bar as well.
+/// Actions of the keys pressed since the last frame. An active text field captures all keys, a focused slider the arrows, and any
+/// other focused control also the space bar.
 pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     if ctx.text_edit_focused() {
         return Vec::new();
@@ -283,7 +283,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let focused = ctx.memory(egui::Memory::focused);
     let slider = focused.is_some() && focused == ctx.data(|data| data.get_temp(Id::unique(SLIDER)));
     if slider {
-        // egui's slider handles only the arrows along it.
+        // egui's slider handles only the arrows in its own direction.
         ctx.input_mut(|input| {
             for event in &mut input.events {
                 if let egui::Event::Key { key, .. } = event {
@@ -310,7 +310,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
                     if !modifiers.command && !modifiers.alt =>
                 {
                     let binding = BINDINGS.iter().find(|b| b.key == *key && !held_back(*key))?;
-                    // Only these repeat while held down.
+                    // Only these actions repeat while the key is held.
                     let repeats =
                         matches!(binding.action, Action::Step | Action::StepBack | Action::Faster | Action::Slower);
                     (!repeat || repeats).then_some(binding.action)

@@ -1,5 +1,5 @@
-//! Where the names of joints, the sizes of forces and the like stand over a picture: clear of each other, of what else is written
-//! and, where there is room, of the machine. A label stays where it stands from its point until that place is no longer good.
+//! Placement of labels (joint names, force magnitudes and the like) over a picture: clear of each other, of other text and, if
+//! possible, of the machine. A label keeps its place relative to its anchor until that place becomes unsuitable.
 
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -8,30 +8,30 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2, p
 
 use crate::view::{Colour, Cover, DrawList, Label, LabelKind};
 
-/// Plates in a picture beyond which further ones are left out, and names without room after which no more are tried.
+/// Most plates in a picture; number of names without room after which no more are tried.
 pub(super) const MOST_PLATES: usize = 256;
 const MOST_MISSED: usize = 256;
-/// Distances of a plate from its point, points: further away it would seem to belong to something else.
+/// Distances of a plate from its anchor, points; a plate further away would seem to belong to something else.
 const GAPS: [f32; 6] = [8.0, 16.0, 28.0, 42.0, 57.0, FURTHEST];
 pub(super) const FURTHEST: f32 = 72.0;
-/// Directions from the point to the plate, from the one that its kind prefers to the opposite one.
+/// Directions from the anchor to the plate, from the preferred to the opposite direction.
 const TURNS: [f32; 12] = [0.0, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0, 4.0, -4.0, 5.0, -5.0, 6.0];
-/// Distance of a plate from what it names beyond which a line leads there, points.
+/// Distance beyond which a leader line connects the plate to its anchor, points.
 pub(super) const LED: f32 = 14.0;
-/// Room about the words of a plate, points.
+/// Padding around the text of a plate, points.
 const PAD: Vec2 = vec2(4.0, 1.0);
-/// Edge of the cells in which it is known what bodies cover, points.
+/// Cell size of the coverage map of bodies, points.
 const CELL: f32 = 5.0;
-/// What a place costs: the share of the plate that lies over balls, over bodies; each further distance, each further direction.
+/// Cost of a place: share of the plate over balls, over bodies; each further distance, each further direction.
 const BALL: f32 = 8.0;
 const BODY: f32 = 1.0;
 const FURTHER: f32 = 0.08;
 const TURNED: f32 = 0.015;
-/// A line that runs over another plate, or under this one.
+/// Cost of a leader that crosses another plate, or crosses this one.
 const CROSSED: f32 = 2.0;
-/// How much worse than the best a place may get before its label leaves it.
+/// Cost difference from the best place at which a label moves.
 const BETTER: f32 = 0.6;
-/// Opacity below which the mark of a peak has no label.
+/// Opacity below which a peak mark has no label.
 const FAINT: f32 = 0.25;
 
 /// A view colour as a painter colour.
@@ -58,7 +58,7 @@ pub(super) fn text(
     painter.text(at, anchor, text, font, ink)
 }
 
-/// Least edge of a picture that has room for more than the time, points.
+/// Smallest edge of a picture with room for more than the time, points.
 pub(super) const SMALL: f32 = 200.0;
 
 /// Whether a picture is large enough for a legend, names and forces.
@@ -66,21 +66,21 @@ pub fn has_room(rect: Rect) -> bool {
     rect.size().min_elem() >= SMALL
 }
 
-/// Distance and direction by index.
+/// Indices of distance and direction.
 type Place = (usize, usize);
 
-/// Where the labels of a picture stand, for the next one.
+/// Label positions of a picture, reused in the next.
 #[derive(Clone, Debug, Default)]
 pub struct Places(pub(super) HashMap<LabelKind, Place>);
 
-/// One label that is to be placed.
+/// A label to place.
 struct Wanted<'a> {
     label: &'a Label,
-    /// Its point, points of the window.
+    /// Its anchor, points of the window.
     at: eframe::egui::Pos2,
-    /// Size of the words.
+    /// Text size.
     size: f32,
-    /// Direction that its kind prefers, rad, clockwise from the right.
+    /// Preferred direction of its kind, rad, clockwise from the right.
     direction: f32,
 }
 
@@ -101,25 +101,25 @@ impl<'a> Wanted<'a> {
     fn plate(&self, size: Vec2, (gap, turn): Place) -> Rect {
         let (sin, cos) = (self.direction + TURNS[turn] * PI / 6.0).sin_cos();
         let half = size / 2.0;
-        // With a side or a corner towards the point.
+        // A side or a corner faces the anchor.
         let out = vec2(cos, sin) / cos.abs().max(sin.abs());
         Rect::from_center_size(self.at + vec2(cos, sin) * GAPS[gap] + out * half, size)
     }
 }
 
-/// The line from a point to its plate, if that is far away.
+/// The leader line from an anchor to its plate, if that is far away.
 fn leader(at: Pos2, plate: Rect) -> Option<[Pos2; 2]> {
     let end = plate.clamp(at);
     (end.distance(at) > LED).then_some([at, end])
 }
 
-/// Whether a line runs over a plate.
+/// Whether a line crosses a plate.
 fn runs_over([from, to]: [Pos2; 2], plate: Rect) -> bool {
     const POINTS: usize = 12;
     (0..=POINTS).any(|k| plate.contains(from.lerp(to, k as f32 / POINTS as f32)))
 }
 
-/// Names of joints and axes at their places in `rect`, over none of what is `taken`.
+/// Draws names of joints and axes at their places in `rect`, avoiding the rectangles `taken`.
 pub(super) fn paint(
     painter: &Painter,
     rect: Rect,
@@ -144,12 +144,12 @@ pub(super) fn paint(
         BODY * bodies + BALL * balls + FURTHER * gap as f32 + TURNED * turn as f32
     };
     let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
-    // Peaks come and go, so they give way to the names.
+    // Peaks are short-lived, so names have priority.
     let labels = list.labels.iter().filter(|label| !is_peak(label)).chain(list.labels.iter().filter(is_peak));
     let most = taken.len() + MOST_PLATES;
     let mut may_miss = MOST_MISSED;
     let mut leaders: Vec<[Pos2; 2]> = Vec::new();
-    // Those that stay where they are come first: one that needs a new place drives no other away.
+    // Labels with a previous place come first, so that a new label displaces none.
     let mut wanted: Vec<_> = labels.filter_map(|label| Wanted::of(label, rect, scale)).collect();
     wanted.sort_by_key(|wanted| (is_peak(&wanted.label), !before.contains_key(&wanted.label.kind)));
     for wanted in wanted {
@@ -174,7 +174,7 @@ pub(super) fn paint(
         let all = || (0..GAPS.len()).flat_map(|gap| (0..TURNS.len()).map(move |turn| (gap, turn)));
         let best = || all().filter_map(free).min_by(|a, b| a.0.total_cmp(&b.0));
         let found = match stays {
-            // None could be so much better.
+            // No place can be better by more than `BETTER`.
             Some(there) if there.0 <= BETTER => Some(there),
             Some(there) => best().filter(|best| best.0 < there.0 - BETTER).or(Some(there)),
             None => best(),
@@ -189,7 +189,7 @@ pub(super) fn paint(
             leaders.push(line);
             painter.line_segment(line, Stroke::new(1.0, ink.gamma_multiply(0.7)));
         }
-        // On a plate of its own: it often lies over a dark part.
+        // A separate plate, since the text often lies over a dark part.
         painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * label.colour.0[3]));
         painter.galley(pos2(plate.min.x, plate.min.y) + PAD, words, ink);
     }
@@ -204,7 +204,7 @@ mod tests {
     use crate::app::theme;
     use crate::view::{Eye, Instance, Layer, Mesh, Palette, Theme};
 
-    /// A picture of 400 × 300 pixels, as many millimetres, with a name at a place and a cube of 40 mm whose centre is at another.
+    /// A picture of 400 × 300 pixels (1 mm per pixel), with the anchor of a name and the centre of a 40 mm cube.
     fn list(name: [f32; 2], cube: [f32; 2]) -> DrawList {
         let clip_from_world = Mat4::from_scale(Vec3::new(2.0 / 400.0, -2.0 / 300.0, 1.0))
             .mul_mat4(&Mat4::from_translation(Vec3::new(-200.0, -150.0, 0.5)));
@@ -238,7 +238,7 @@ mod tests {
             let painter = Painter::new(ui.ctx().clone(), LayerId::background(), rect);
             paint(&painter, rect, 1.0, list, Vec::new(), places);
         });
-        // No texture is made of it.
+        // No texture is uploaded.
         output.textures_delta.clear();
         places.0[&LabelKind::Joint(0)]
     }
@@ -251,7 +251,7 @@ mod tests {
         let over = list(name, [225.0, 130.0]);
         let beside = place(&over, &mut Places::default());
         assert_ne!(beside, free, "a body is where it would stand");
-        // A body that comes slowly and trembles as it does.
+        // A body that approaches slowly and jitters.
         let mut places = Places::default();
         let mut seen = Vec::new();
         for frame in 0..120 {
@@ -261,7 +261,7 @@ mod tests {
         }
         seen.dedup();
         assert_eq!((seen[0], seen.len()), (free, 2), "{seen:?}");
-        // The same pictures again, the same places.
+        // The same pictures give the same places.
         assert_eq!(place(&over, &mut Places::default()), beside);
     }
 }

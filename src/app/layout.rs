@@ -1,4 +1,4 @@
-//! Where everything goes: side by side on a large window; on a small one the picture, and a sheet that folds away.
+//! Layout: panels side by side in a large window; picture and a collapsible sheet in a small one.
 
 use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollArea, Ui};
 
@@ -7,17 +7,17 @@ use super::audience;
 use super::{App, overlay, present, spoken, theme, transport};
 use crate::view::Preset;
 
-/// Below this width or height the window is small, points.
+/// A window below this width or height is small, points.
 const NARROW: f32 = 760.0;
 const SHORT: f32 = 480.0;
-/// Below this width a picture has no room for time and buttons side by side, points.
+/// Width below which time and buttons do not fit side by side in a picture, points.
 const SLIM: f32 = 250.0;
-/// Below this width the picture of a frame in another page shows machine and time alone, points.
+/// Width below which an embedded picture shows only machine and time, points.
 const BARE: f32 = 280.0;
-/// Width of the panel of a lesson beside the picture, points.
+/// Width of a lesson panel beside the picture, points.
 const LESSON: f32 = 340.0;
 
-/// Where the height of the messages is kept.
+/// Key under which the height of the messages is stored.
 const MESSAGES: &str = "height of the messages";
 
 /// Arrangement of the window.
@@ -31,7 +31,7 @@ enum Arrangement {
     Landscape,
 }
 
-/// What the sheet of a small window shows.
+/// Content of a small window's sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sheet {
     /// Parameters.
@@ -40,39 +40,39 @@ pub enum Sheet {
     Plots,
     /// Chaos bench.
     Bench,
-    /// The lesson under way.
+    /// The lesson in progress.
     Lesson,
 }
 
-/// The bar of what scrolls in `ui` from here on is seen at rest, too: a finger does not hover over it.
+/// Makes scroll bars in `ui` visible at rest from here on: touch input does not hover.
 pub(super) fn show_bar(ui: &mut Ui) {
     let bar = &mut ui.spacing_mut().scroll;
     bar.dormant_handle_opacity = 0.6;
     bar.floating_width = bar.bar_width;
 }
 
-/// The entries of a menu; on a low screen they scroll, and a bar shows that they do.
+/// The entries of a menu, scrollable on a low screen, with a visible scroll bar.
 pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
     show_bar(ui);
     let bar = &mut ui.spacing_mut().scroll;
     bar.floating_allocated_width = bar.bar_width;
-    // Room for its frame and for a strip of what lies under it.
+    // Leaves room for the frame and for a strip of the background.
     let most = ui.ctx().content_rect().height() - 48.0;
     ScrollArea::vertical()
         .max_height(most)
-        // Otherwise it would keep its first height when an entry later needs more room.
+        // Otherwise the first height would persist when an entry later grows.
         .min_scrolled_height(most)
         .show(ui, add);
 }
 
-/// A menu. Opened by the keyboard, it focuses its first entry, and it closes when it loses the focus; `stays`: a click on an
-/// entry leaves it open.
+/// A menu. Opened by keyboard, it focuses its first entry; it closes when it loses the focus. `stays`: a click on an entry leaves
+/// it open.
 pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut Ui)) -> egui::Response {
     use egui::containers::menu::{MenuButton, MenuConfig};
     let close =
         if stays { egui::PopupCloseBehavior::CloseOnClickOutside } else { egui::PopupCloseBehavior::CloseOnClick };
     let opened = ui.scope_id().with((name, "opened by keyboard"));
-    // In the pass after opening the entries exist, and this moves the focus from the button to the first of them.
+    // The entries exist in the pass after opening; the focus moves from the button to the first of them.
     if ui.data_mut(|data| data.remove_temp::<bool>(opened)).is_some() {
         ui.memory_mut(|memory| memory.move_focus(egui::FocusDirection::Next));
     }
@@ -84,7 +84,7 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
             ui.ctx().request_repaint();
         }
         let focused = ui.memory(egui::Memory::focused);
-        // What had the focus when a click opened the menu, such as the slider moved last, may keep it.
+        // A widget focused when a click opened the menu, such as the last slider, may stay focused.
         let kept = response.id.with("focus when opened");
         if response.clicked() {
             ui.data_mut(|data| data.insert_temp(kept, focused));
@@ -93,7 +93,7 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
         let elsewhere = focused
             .filter(|focused| *focused != response.id && Some(*focused) != before)
             .and_then(|focused| ui.ctx().read_response(focused))
-            // A popup opened from a menu is in the foreground, too.
+            // Popups opened from a menu are also in the foreground.
             .is_some_and(|focused| focused.layer_id.order != egui::Order::Foreground);
         if elsewhere {
             Popup::close_id(ui.ctx(), Popup::default_response_id(&response));
@@ -102,14 +102,14 @@ pub(super) fn menu(ui: &mut Ui, name: &str, stays: bool, add: impl FnOnce(&mut U
     response
 }
 
-/// Closes the menu that `ui` is in, if any: an entry may also be shown outside a menu.
+/// Closes the menu around `ui`, if any: entries may also be shown outside a menu.
 pub(super) fn close_menu(ui: &Ui) {
     if egui::containers::menu::is_in_menu(ui) {
         ui.close();
     }
 }
 
-/// A space of `lines` lines of small text, whatever its content: what is too long scrolls, and nothing below moves.
+/// Reserves `lines` lines of small text; longer content scrolls, and nothing below moves.
 pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mut Ui)) {
     let line = ui.text_style_height(&egui::TextStyle::Small) + 2.0;
     let height = lines as f32 * line;
@@ -121,7 +121,7 @@ pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mu
         ScrollArea::vertical().id_salt(id).max_height(height).min_scrolled_height(height).auto_shrink(false).show(
             ui,
             |ui| {
-                // Room for the scroll bar.
+                // Space for the scroll bar.
                 ui.set_max_width(ui.available_width() - 10.0);
                 add(ui);
             },
@@ -129,7 +129,7 @@ pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mu
     });
 }
 
-/// Hint over the picture while a file is dragged over the window.
+/// Hint over the picture while a file hovers over the window.
 fn drop_hint(ui: &Ui, area: egui::Rect) {
     if ui.input(|input| input.raw.hovered_files.is_empty()) {
         return;
@@ -146,7 +146,7 @@ fn drop_hint(ui: &Ui, area: egui::Rect) {
 }
 
 impl App {
-    /// Everything, in whatever space there is.
+    /// The whole interface, in the available space.
     pub fn show(&mut self, ui: &mut Ui) {
         let size = ui.available_size();
         let arrangement = if size.y < SHORT || (size.x < NARROW && size.x > size.y) {
@@ -163,16 +163,16 @@ impl App {
         if self.fingers != Some(fingers) {
             theme::apply_size(ui.ctx(), fingers);
             self.fingers = Some(fingers);
-            // Apply it in this pass already, so that the picture is framed at its final size.
+            // Applied in this pass, so that the picture is framed at its final size.
             ui.set_style(ui.ctx().global_style());
         }
         self.summary(ui);
-        // Its keys are shared with the page around it.
+        // An embedded window shares its keys with the surrounding page.
         if self.embedded().is_none() {
             transport::first_of_tab(ui);
         }
         if self.dialog.is_some() {
-            // Disabled, so that no tooltip stays open above the dialog. The dialog's own backdrop dims what lies under it.
+            // Disabling closes tooltips above the dialog; the dialog's backdrop does the dimming.
             ui.visuals_mut().disabled_alpha = 1.0;
             ui.disable();
         }
@@ -200,7 +200,7 @@ impl App {
         self.over_all(ui);
     }
 
-    /// What lies over all panels.
+    /// Elements above all panels.
     fn over_all(&mut self, ui: &Ui) {
         self.save_kept();
         self.impact_list_ui(ui.ctx());
@@ -208,7 +208,7 @@ impl App {
         self.dialog_ui(ui.ctx());
     }
 
-    /// The panel of a lesson at the side of a wide window. Nothing of it on a small one, where it is a sheet.
+    /// Lesson panel at the side of a wide window. A small window shows lessons in its sheet instead.
     pub(super) fn lesson_beside(&mut self, ui: &mut Ui, bar: Frame) {
         if self.course().is_none() {
             return;
@@ -249,7 +249,7 @@ impl App {
             show_controls,
             |ui| {
                 ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                    // Room for the scroll bar beside the fields.
+                    // Space for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
                     controls.title(ui, player);
@@ -264,7 +264,7 @@ impl App {
             .size_range(300.0..=640.0)
             .show_collapsible(ui, show_bench, |ui| {
                 ScrollArea::vertical()
-                    // A lesson scrolls its own.
+                    // A lesson has its own scroll position.
                     .id_salt(("bench", teaching))
                     .auto_shrink(false)
                     .show(ui, |ui| {
@@ -273,7 +273,7 @@ impl App {
                     })
                     .inner
             });
-        // In a low window the picture keeps more than a strip.
+        // Limits the plots so that the picture remains usable in a low window.
         let plots_height = (0.34 * ui.available_height()).clamp(150.0, 230.0);
         Panel::bottom("plots")
             .frame(bar)
@@ -282,7 +282,7 @@ impl App {
             .size_range(150.0..=600.0)
             .show_collapsible(ui, show_plots, |ui| {
                 spoken::landmark(ui, "Plots");
-                // Otherwise the panel would shrink to what the plots leave of it.
+                // Otherwise the panel would shrink to its content.
                 ui.take_available_space();
                 ui.horizontal(|ui| {
                     plots.header(ui, player);
@@ -325,7 +325,7 @@ impl App {
 
     fn portrait(&mut self, ui: &mut Ui, bar: Frame) {
         if self.sheet.is_some() {
-            // A question of a lesson and its answers.
+            // Fits a lesson question with its answers.
             let share = if self.sheet == Some(Sheet::Lesson) { 0.47 } else { 0.42 };
             let height = (ui.available_height() * share).max(160.0);
             Panel::bottom("sheet").frame(bar).exact_size(height).show(ui, |ui| self.sheet(ui));
@@ -362,7 +362,7 @@ impl App {
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 ui.horizontal(|ui| {
                     let tabs = if self.course().is_some() { 350.0 } else { 270.0 };
-                    // Where they would cover the buttons, they are a menu.
+                    // Tabs that would cover the buttons become a menu.
                     let folded = ui.available_width() < tabs + transport::LEAST;
                     let tabs = if folded { 90.0 } else { tabs };
                     let room = ui.available_width() - tabs;
@@ -394,7 +394,7 @@ impl App {
         }
     }
 
-    /// The picture in what the panels leave; resets the run if that was `asked` in them or in the picture.
+    /// The picture in the remaining space; resets the run if that was `asked` by a panel or the picture.
     pub(super) fn central(&mut self, ui: &mut Ui, asked: bool) {
         let picture = CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
         if asked || picture.inner {
@@ -409,7 +409,7 @@ impl App {
         }
     }
 
-    /// What the sheet shows; choosing the same again folds it away. `backwards` where the layout runs from right to left.
+    /// Tabs of the sheet; clicking the active tab collapses it. `backwards`: the layout runs from right to left.
     fn sheet_tabs(&mut self, ui: &mut Ui, backwards: bool) {
         let mut tabs = vec![
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
@@ -431,7 +431,7 @@ impl App {
         }
     }
 
-    /// Shows `sheet`, or folds it away if it is shown.
+    /// Shows `sheet`, or collapses it if it is open.
     pub(super) fn fold(&mut self, sheet: Sheet) {
         self.sheet = (self.sheet != Some(sheet)).then_some(sheet);
     }
@@ -445,7 +445,7 @@ impl App {
         let Self { player, controls, accuracy, plots, bench, sheet, viewport, .. } = self;
         let mut of_bench = None;
         ScrollArea::vertical().id_salt("sheet").auto_shrink(false).show(ui, |ui| {
-            // Room for the bar.
+            // Space for the scroll bar.
             ui.set_max_width(ui.available_width() - 14.0);
             match sheet {
                 Some(Sheet::Controls) => {
@@ -496,10 +496,10 @@ impl App {
         };
         let options = width("View options");
         let cameras: f32 = Preset::ALL.into_iter().map(Preset::label).chain(["Fit"]).map(width).sum();
-        // The time stands to the left of them.
+        // The time is to the left of the buttons.
         let gap = ui.spacing().item_spacing.x;
         let narrow = area.width() < overlay::reach(ui.painter()) + cameras + options - gap + 10.0;
-        // Beside the microscope of a phone the time needs all of the upper edge.
+        // Beside the microscope on a phone, the time needs the full upper edge.
         let edge = if area.width() < SLIM { Align2::RIGHT_BOTTOM } else { Align2::RIGHT_TOP };
         if !plain && !presenting {
             let size = egui::vec2(if narrow { options } else { options + cameras }, row.y);
@@ -524,7 +524,7 @@ impl App {
             self.problem = Some(error.to_string());
         }
         if plain {
-            // A saved picture has no buttons in it.
+            // A saved picture has no buttons.
             return false;
         }
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
@@ -555,16 +555,16 @@ impl App {
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player)).inner
     }
 
-    /// Where the messages over the lower edge of `area` are.
+    /// Area of the messages at the lower edge of `area`.
     fn messages_place(&self, ui: &Ui, area: egui::Rect) -> egui::Rect {
-        // As high as in the frame before; at first a line with a button.
+        // Height in the previous frame; initially one line with a button.
         let height = ui.data(|data| data.get_temp(Id::unique(MESSAGES)));
         let height = height.unwrap_or(ui.spacing().interact_size.y + 16.0);
         Align2::CENTER_BOTTOM.align_size_within_rect(egui::vec2(area.width().min(640.0), height), area)
     }
 
-    /// Messages over the lower edge of the picture: they come and go by themselves, and move nothing. Returns the part of
-    /// `area` left free.
+    /// Messages over the lower edge of the picture; they appear and disappear without affecting the layout. Returns the free part
+    /// of `area`.
     fn messages(&mut self, ui: &mut Ui, area: egui::Rect) -> egui::Rect {
         let id = Id::unique(MESSAGES);
         if !self.has_messages() {
@@ -573,7 +573,7 @@ impl App {
         }
         let row = ui.spacing().interact_size.y;
         let most = if self.is_refused() {
-            // What lies under it is not what the link promised.
+            // Hides the picture, which does not show what the link promised.
             let fill = ui.visuals().panel_fill;
             ui.painter().rect_filled(area.expand(10.0), 0.0, fill);
             area.height()
@@ -596,7 +596,7 @@ impl App {
         area.with_max_y(place.top() - 8.0)
     }
 
-    /// What was just done, shown for a few seconds.
+    /// A notice displayed for a few seconds.
     fn notice_plate(&mut self, ui: &Ui, area: egui::Rect) {
         let now = ui.input(|input| input.time);
         let Some(notice) = &mut self.notice else {

@@ -1,4 +1,4 @@
-//! Lessons: steps with a text and a state of the machine, questions that the run answers, and what was to be seen.
+//! Lessons: steps with a text and a machine state, questions answered by the run, and explanations.
 
 mod before;
 mod built_in;
@@ -28,28 +28,28 @@ use measure::Measured;
 use names::{Names, comparisons};
 use spots::Spots;
 
-/// A live change belongs to a step's run if it came at most this long after its instant, s: the longest step of a solver.
+/// Latest time of a live change after its nominal instant, s: the longest solver step.
 const LATE: f64 = 10e-3;
 
-/// A lesson under way.
+/// A lesson in progress.
 pub struct Course {
     lesson: Arc<Lesson>,
     step: usize,
-    /// The machine is on its way to the state of the step.
+    /// The machine is being brought to the state of the step.
     sets: bool,
-    /// The choice that the class predicts.
+    /// Index of the predicted choice.
     predicted: Option<usize>,
-    /// The machine has come to the end of the step.
+    /// The machine has reached the end of the step.
     reached: bool,
-    /// What shows then has not been drawn yet.
+    /// The result has not been drawn yet.
     fresh: bool,
-    /// Whether the panel shows only the upper part of the step.
+    /// Whether the panel hides the lower part of the step.
     more: bool,
     measured: Measured,
 }
 
 impl Course {
-    /// At step `step`, counted from 0, or the last one.
+    /// Starts at step `step`, counted from 0, or at the last step if there are fewer.
     pub fn new(lesson: Arc<Lesson>, step: usize) -> Self {
         Self {
             step: step.min(lesson.steps.len() - 1),
@@ -73,7 +73,7 @@ impl Course {
         self.step
     }
 
-    /// Name and step, counted from 1, for a link: only a built-in lesson is known elsewhere.
+    /// Name and step (counted from 1) for a link; `None` unless the lesson is built in.
     pub(super) fn shared(&self) -> Option<(String, usize)> {
         let name = &self.lesson.name;
         let known = BUILT_IN_LESSONS.iter().any(|(own, _)| own == name);
@@ -84,42 +84,42 @@ impl Course {
         &self.lesson.steps[self.step]
     }
 
-    /// Whether the answer, and what was to be seen, is on show.
+    /// Whether the answer and the explanation are displayed.
     pub fn is_reached(&self) -> bool {
         self.reached
     }
 
-    /// Whether the machine is still being set.
+    /// Whether the machine is still being brought to the state of the step.
     pub fn is_busy(&self) -> bool {
         self.sets
     }
 
-    /// Computes everything that the lesson measures, however long that takes.
+    /// Computes all measures of the lesson without a time limit.
     ///
     /// # Errors
-    /// Why it cannot be computed.
+    /// The cause of a failed computation.
     pub fn measure(&mut self) -> Result<(), String> {
         self.measured.advance(|| true);
         self.measured.fault().map_or(Ok(()), |why| Err(why.to_owned()))
     }
 
-    /// Index of the right choice of the question of this step; `None` while it is not known.
+    /// Index of the correct choice of this step's question; `None` while unknown.
     pub fn right(&self) -> Option<usize> {
         let names = self.measured.names();
         let choices = &self.now().question.as_ref()?.choices;
         choices.iter().position(|choice| names.holds(&choice.when) == Some(true))
     }
 
-    /// The instant to which the machine is to run, s.
+    /// The instant at which the step ends, s.
     pub fn until(&self) -> Option<f64> {
         self.measured.names().time(self.now().until.as_ref()?)
     }
 
-    /// What is wrong with the lesson, if it does not hold what it says: texts that cannot be filled in, claims that do not hold,
-    /// questions with no right choice or with several. Everything is computed first.
+    /// Checks the lesson: every text can be filled in, every claim holds, and every question has exactly one correct choice.
+    /// Computes all measures first.
     ///
     /// # Errors
-    /// The first such fault, in words.
+    /// The first fault, as a message.
     pub fn examine(&mut self) -> Result<(), String> {
         self.measure()?;
         let names = self.measured.names();
@@ -158,13 +158,13 @@ impl Course {
         Ok(())
     }
 
-    /// What the right choice of the question says; `None` while it is not known.
+    /// Text of the correct choice; `None` while unknown.
     pub fn answer(&self) -> Option<String> {
         let choice = &self.now().question.as_ref()?.choices[self.right()?];
         text::fill(&choice.text, &self.measured.names()).ok()
     }
 
-    /// The whole lesson, with its values and its answers, after [`Self::examine`].
+    /// The whole lesson as text with values and answers, after [`Self::examine`].
     ///
     /// # Errors
     /// As [`Self::examine`].
@@ -197,7 +197,7 @@ impl Course {
         Ok(out)
     }
 
-    /// Whether the run on show is that of the step: nobody has changed the machine.
+    /// Whether the displayed run belongs to the step, i.e. the user has not changed the machine.
     fn is_own(&self, player: &Player) -> bool {
         let run = &self.lesson.runs[self.now().run];
         let log = player.log();
@@ -213,7 +213,7 @@ impl Course {
     }
 }
 
-/// The sides of a condition with their values.
+/// Both sides of each comparison in a condition, with their values.
 fn known_values(condition: &str, names: &Names<'_>) -> String {
     let mut out: Vec<String> = Vec::new();
     for (left, _, right) in comparisons(condition).unwrap_or_default() {
@@ -228,12 +228,12 @@ fn known_values(condition: &str, names: &Names<'_>) -> String {
 }
 
 impl App {
-    /// The lesson under way.
+    /// The lesson in progress.
     pub fn course(&self) -> Option<&Course> {
         self.course.as_deref()
     }
 
-    /// Goes on with `lesson` at step `step`, counted from 0; if it `begins` there, the machine is set for it.
+    /// Continues `lesson` at step `step`, counted from 0; if `begins`, the machine is set for that step.
     pub(super) fn join_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
         self.remember_window();
         self.course = Some(Box::new(Course::new(lesson, step)));
@@ -243,7 +243,7 @@ impl App {
         }
     }
 
-    /// Begins a built-in lesson.
+    /// Starts a built-in lesson.
     pub(super) fn open_lesson(&mut self, name: &str) {
         match Lesson::built_in(name) {
             Ok(lesson) => self.join_lesson(lesson, 0, true),
@@ -251,7 +251,7 @@ impl App {
         }
     }
 
-    /// Ends the lesson; the window is as it was before.
+    /// Ends the lesson and restores the window.
     pub(super) fn leave_lesson(&mut self) {
         if let Some(course) = self.course.take() {
             self.give_back_window(&course.lesson);
@@ -261,7 +261,7 @@ impl App {
         }
     }
 
-    /// To the next step of the lesson, or to the one before.
+    /// Goes to the next or the previous step of the lesson.
     pub(super) fn turn_page(&mut self, forward: bool) {
         let Some(course) = &mut self.course else {
             return;
@@ -272,8 +272,8 @@ impl App {
             false if course.step > 0 => course.step - 1,
             _ => return,
         };
-        // A step that goes on needs no new state, as long as the machine is where the one before it left it: not short of where it
-        // ends, and not past where this one ends, which would give the answer away.
+        // A continuing step needs no new state if the machine is where the previous step left it: not before the previous step's
+        // end, and not past the end of this one, which would reveal the answer.
         let shown = self.player.pacer.shown();
         let end = |step: usize| {
             let until = course.lesson.steps[step].until.as_ref();
@@ -291,7 +291,7 @@ impl App {
         }
     }
 
-    /// Puts the machine in the state of the step: that with which its run begins, or where the step before it in that run ends.
+    /// Sets the machine for the step: to the start of its run, or to the end of the previous step in that run.
     pub(super) fn set_step(&mut self) {
         let Some(course) = &mut self.course else {
             return;
@@ -312,7 +312,7 @@ impl App {
             self.viewport.set_pose(pose);
         }
         let mut link = link;
-        // What is changed live, or compared with a twin, has to be gone through from the beginning.
+        // Live changes and twin runs must be replayed from the start.
         if let Some(end) = left_at {
             link.time = Some(end);
         }
@@ -321,7 +321,7 @@ impl App {
         self.show_link(link);
     }
 
-    /// The settings of a link that [`Self::show_link`] leaves to who opens it.
+    /// Applies the link settings that [`Self::show_link`] leaves to the caller.
     fn set_look(&mut self, link: &super::Link) {
         if let Some(scale) = link.time_scale {
             self.player.pacer.set_scale(scale);
@@ -331,8 +331,8 @@ impl App {
         }
     }
 
-    /// Shows what the step wants to be seen; the machine stays where it is. `anew`: it was just set, and what the steps before
-    /// asked for holds as well.
+    /// Applies the view settings of the step; the machine is unchanged. `anew`: the machine was just set, so the settings of
+    /// earlier steps apply as well.
     fn look_at_step(&mut self, anew: bool) {
         let Some(course) = &self.course else {
             return;
@@ -343,14 +343,14 @@ impl App {
         let begin = if anew { lesson.beginning(last) } else { last };
         for step in &lesson.steps[begin..=last] {
             if !step.begins && step.link != super::Link::default() {
-                // The view stays with its ball joint.
+                // The camera continues to follow its ball joint.
                 let followed = self.viewport.followed().filter(|_| step.link.camera.is_none());
                 self.set_look(&step.link);
                 self.show_link(step.link.clone());
                 self.viewport.follow(followed);
             }
         }
-        // The camera is where the latest of them wants it.
+        // The latest camera setting applies.
         let places = |step: &&Step| step.view.is_some() || step.link.camera.is_some();
         match steps.iter().rev().find(places).and_then(|step| step.view) {
             Some(Look::From(preset)) => self.viewport.preset(preset),
@@ -367,7 +367,7 @@ impl App {
         }
     }
 
-    /// Goes on with what a lesson does beside the run: computes what it measures, and stops the machine where the step ends.
+    /// Advances the lesson alongside the run: computes its measures, and stops the machine at the end of the step.
     pub(super) fn advance_lesson(&mut self, ctx: &egui::Context) {
         let Some(course) = &mut self.course else {
             return;
@@ -389,7 +389,7 @@ impl App {
                     self.problem = Some(error.to_string());
                 }
             }
-            // Not the user's.
+            // These are not user edits.
             self.player.take_edits();
             if begin.twin {
                 self.player.set_twin(true);
@@ -416,7 +416,7 @@ impl App {
         }
     }
 
-    /// Rings around what the step points at, over everything: they move nothing.
+    /// Draws rings around the step's highlighted items, over everything, without affecting the layout.
     pub(super) fn point_out(&self, ui: &egui::Ui) {
         let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
         let joints = &self.player.running().machine.ball_joints;
@@ -437,13 +437,13 @@ impl App {
         }
     }
 
-    /// Whether all that the step points at is in sight.
+    /// Whether all highlighted items of the step are visible.
     pub fn points_out(&self, ctx: &egui::Context) -> bool {
         let labels = self.pointed_controls();
         Spots::places(ctx, &labels).len() == labels.len()
     }
 
-    /// Names of the controls that the step points at.
+    /// Names of the highlighted controls of the step.
     fn pointed_controls(&self) -> Vec<String> {
         let wanted = self.course().map_or(&[][..], |course| &course.now().highlight);
         let joints = &self.player.running().machine.ball_joints;

@@ -1,4 +1,4 @@
-//! The microscope: beside the 3D view it magnifies one ball joint until its play is visible.
+//! The microscope: magnifies one ball joint beside the 3D view until its play is visible.
 
 mod draw;
 mod sight;
@@ -15,23 +15,23 @@ use sight::Sight;
 
 /// Least width and height, points.
 const LEAST: egui::Vec2 = vec2(200.0, 150.0);
-/// Share of the picture that it opens with, and the most points.
+/// Initial fraction of the picture, and upper limit, points.
 const SHARE: f32 = 0.4;
 const USUAL: f32 = 330.0;
-/// Most of the picture that it takes, as a share.
+/// Largest fraction of the picture.
 const MOST: f32 = 0.5;
-/// What it must leave of the picture, points: where there is less it waits for room.
+/// Least remainder of the picture, points; the microscope stays hidden if there is less.
 const LEFT: f32 = 120.0;
 /// Height of the section of the contact, points.
 const SECTION: f32 = 112.0;
-/// From this width on, pictures and numbers are side by side, points.
+/// Width from which pictures and numbers are side by side, points.
 const WIDE: f32 = 430.0;
 /// Width of the numbers beside the pictures, points.
 const NUMBERS: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.
 const SLOWEST: f64 = 1e-4;
 
-/// The panel and its choices.
+/// State of the panel.
 #[derive(Default)]
 pub struct Microscope {
     open: bool,
@@ -46,7 +46,7 @@ impl Microscope {
         self.open
     }
 
-    /// Shows or closes it.
+    /// Opens or closes it.
     pub fn set_open(&mut self, open: bool) {
         self.open = open;
     }
@@ -56,18 +56,18 @@ impl Microscope {
         self.joint
     }
 
-    /// Puts another ball joint into focus.
+    /// Selects the ball joint in focus.
     pub fn focus(&mut self, joint: usize) {
         self.joint = joint;
     }
 
-    /// Where the clearance was last drawn; `None` if nothing with clearance was.
+    /// Clearance circle of the last drawing; `None` if no joint with clearance was drawn.
     pub fn circle(&self) -> Option<Circle> {
         self.circle
     }
 
-    /// The panel, at the side of `ui` or below in a high one; `view`: world vectors to the right and up in the 3D view. Returns
-    /// a joint that was chosen in it.
+    /// The panel, beside the picture or below it in a tall `ui`; `view`: world vectors to the right and up in the 3D view.
+    /// Returns the joint selected in it.
     fn ui(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
         self.circle = None;
         let room = ui.available_size();
@@ -77,7 +77,7 @@ impl Microscope {
             (room.y, LEAST.y, Panel::bottom("microscope below"))
         };
         if !self.open || room < least + LEFT {
-            // The picture keeps its id.
+            // Keeps the picture's automatic ID.
             ui.skip_ahead_auto_ids(1);
             return None;
         }
@@ -196,9 +196,9 @@ impl Microscope {
 }
 
 fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
-    // Sideways, too: a long number must not widen the panel.
+    // Scrolls sideways, too: a long number must not widen the panel.
     ScrollArea::both().id_salt("under the microscope").auto_shrink(false).show(ui, |ui| {
-        // Room for the scroll bar.
+        // Space for the scroll bar.
         ui.set_max_width(ui.available_width() - 10.0);
         add(ui);
     });
@@ -229,7 +229,7 @@ fn section(ui: &mut Ui, sight: &Sight) {
     );
 }
 
-/// What the pictures show, in numbers and words.
+/// Numeric values of the pictures' contents.
 fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &sight.report;
@@ -339,12 +339,12 @@ impl App {
         &self.microscope
     }
 
-    /// The microscope, to open it.
+    /// The microscope, mutable.
     pub fn microscope_mut(&mut self) -> &mut Microscope {
         &mut self.microscope
     }
 
-    /// Puts ball joint `joint` into focus if the scene has it: the view follows its centre.
+    /// Focuses ball joint `joint` if the scene has it: the view follows its centre.
     pub(super) fn focus(&mut self, joint: usize) {
         self.microscope.focus(joint);
         self.viewport.centre(&self.player, joint);
@@ -358,7 +358,7 @@ impl App {
         }
     }
 
-    /// The instruments in the view menu.
+    /// Instrument switches in the view menu.
     pub(super) fn instruments(&mut self, ui: &mut Ui) {
         ui.label("Instruments");
         ui.horizontal(|ui| {

@@ -1,6 +1,6 @@
 //! The application: one [`App`] shared by the desktop window, the browser and headless frames.
 //!
-//! `logic` advances the state (keys, stepping, recording), `ui` shows it.
+//! `logic` advances the state (keys, stepping, recording), `ui` displays it.
 
 mod accuracy;
 mod announce;
@@ -114,27 +114,27 @@ use viewport::Viewport;
 #[cfg(not(target_arch = "wasm32"))]
 pub use window::{WindowError, run_native};
 
-/// Time budget per frame for replaying towards the state of a link, s: the window still responds twenty times a second.
+/// Time budget per frame for replaying to the state of a link, s; keeps the window responsive twenty times a second.
 const REPLAY_BUDGET: f64 = 0.03;
 
-/// Whether a frame that begins now may still step.
+/// Returns a predicate: whether a frame that starts now may still step.
 fn replay_budget(clock: Clock) -> impl Fn() -> bool {
     let start = clock();
     move || clock() - start < REPLAY_BUDGET
 }
 
-/// How long a verdict is shown that needs no answer, s.
+/// Display time of a verdict that needs no action, s.
 const VERDICT: f64 = 6.0;
 
-/// How often a background computation is polled for progress.
+/// Polling period of background computations for progress.
 const POLL: std::time::Duration = std::time::Duration::from_millis(100);
 
-/// How the application starts.
+/// Start options of the application.
 #[derive(Clone, Debug)]
 pub struct AppOptions {
     /// The scene to show.
     pub scene: Scene,
-    /// Light, dark, or as the system asks.
+    /// Theme: light, dark or system.
     pub theme: ThemePreference,
     /// Whether the run plays from the start.
     pub playing: bool,
@@ -142,24 +142,24 @@ pub struct AppOptions {
     pub time_scale: f64,
     /// View options.
     pub view: ViewOptions,
-    /// The link that `scene` comes from: its state is reproduced.
+    /// The link that `scene` comes from; its state is reproduced.
     pub link: Option<Link>,
-    /// The lesson that goes with it, and its step, counted from 0.
+    /// The lesson of the scene, and its step, counted from 0.
     pub lesson: Option<(Arc<Lesson>, usize)>,
-    /// Its panels within another page; `None` for a window of its own.
+    /// Panels of an embedded window; `None` for a stand-alone window.
     pub embedded: Option<Embedded>,
     /// A message to show at once, e.g. why a link could not be opened.
     pub problem: Option<String>,
-    /// Begins paused and without flashes, whatever else is asked for: for who wants little motion.
+    /// Reduced motion: starts paused and without flashes, whatever the other options.
     pub calm: bool,
-    /// Texts and edges in black and white.
+    /// High contrast: texts and edges in black and white.
     pub contrast: bool,
     /// Clock that measures the stepping time of a frame.
     pub clock: Clock,
 }
 
 impl AppOptions {
-    /// Plays `scene` at its own pace, with its play magnified enough to be visible.
+    /// Plays `scene` at its own time scale, with the play magnified enough to be visible.
     pub fn new(scene: Scene) -> Self {
         Self {
             time_scale: opening::time_scale(&scene),
@@ -177,22 +177,22 @@ impl AppOptions {
         }
     }
 
-    /// What a visitor meets: the default scene, driven so fast that its joints rattle at every turn. The window says so, and how to get
-    /// back to what the scene's file gives.
+    /// The first-time scene: the default scene, driven so fast that its joints rattle at every turn. The window states the
+    /// change, and how to revert to the scene file.
     pub fn first() -> Self {
         Self { time_scale: opening::RATTLING_SCALE, ..Self::new(opening::rattling()) }
     }
 
-    /// Begins `lesson` at step `step`, counted from 0.
+    /// Starts `lesson` at step `step`, counted from 0.
     pub fn of_lesson(lesson: Arc<Lesson>, step: usize) -> Self {
         Self { playing: false, lesson: Some((lesson.clone(), step)), ..Self::new(lesson.runs[0].scene.clone()) }
     }
 
-    /// Reads a link: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. One that asks for nothing of a run gives
-    /// what [`Self::first`] does.
+    /// Reads a link: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. A link without settings for a run gives the same as
+    /// [`Self::first`].
     ///
     /// # Errors
-    /// A link that cannot be read, or whose scene is invalid or cannot start; in words.
+    /// The link cannot be read, or its scene is invalid or fails to start; as a message.
     pub fn from_link(text: &str) -> Result<Self, String> {
         let link = Link::parse(text).map_err(|error| error.to_string())?;
         let lesson = link.lesson.as_deref().map(Lesson::built_in).transpose();
@@ -236,8 +236,8 @@ impl AppOptions {
         Ok(options)
     }
 
-    /// As [`Self::from_link`], but a bad link gives the default scene, paused, in the panels that the link asks for, with the reason
-    /// as [`Self::problem`].
+    /// As [`Self::from_link`], but a bad link gives the default scene, paused, in the panels requested by the link, with the
+    /// reason as [`Self::problem`].
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
             let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
@@ -247,10 +247,10 @@ impl AppOptions {
     }
 }
 
-/// A message about what was just done, shown for a few seconds.
+/// A message about the last action, shown for a few seconds.
 struct Notice {
     text: String,
-    /// When it was first shown, s of viewing.
+    /// Time of its first display, s of viewing.
     since: Option<f64>,
 }
 
@@ -273,7 +273,7 @@ pub struct App {
     controls: Controls,
     accuracy: Accuracy,
     viewport: Viewport,
-    /// The picture of a run from before a change, and the number of that run.
+    /// Picture of a run from before a change, and that run's number.
     beside: Option<(u64, Box<Viewport>)>,
     plots: Plots,
     timeline: Timeline,
@@ -281,31 +281,31 @@ pub struct App {
     dialog: Option<Dialog>,
     /// Error of the last attempt to open or reset.
     problem: Option<String>,
-    /// It is why the link that the window began with could not be opened.
+    /// Whether `problem` is the failure to open the initial link.
     refused: bool,
     show_controls: bool,
     show_plots: bool,
     show_bench: bool,
-    /// In a small window: what its sheet shows.
+    /// Content of the sheet in a small window.
     sheet: Option<Sheet>,
     compact: bool,
-    /// Whether touch input was ever seen.
+    /// Whether touch input has ever occurred.
     touched: bool,
-    /// Whether the controls are sized for fingers; `None` before the first pass.
+    /// Whether the controls are sized for touch; `None` before the first pass.
     fingers: Option<bool>,
     host: Box<dyn Host>,
-    /// Address of a page that the user has typed, instead of the host's; "" for none.
+    /// Page address typed by the user, which replaces the host's; "" for none.
     page: String,
-    /// Of a scene that came by a link it is none: a link must not make the program read a file.
+    /// Empty for a scene from a link: a link must not make the program read a file.
     scene_file: SceneFile,
     replay: Option<Replay>,
-    /// A run in progress to a section of a sweep, and whether a twin is to start there.
+    /// A run in progress to a section of a sweep, and whether a twin starts there.
     load: Option<(Load, bool)>,
     verdict: Option<Verdict>,
-    /// When that was first shown, s of viewing, if it needs no answer; minus infinity once that was long enough.
+    /// Time of the verdict's first display, s of viewing, if it needs no action; minus infinity once it has expired.
     verdict_shown: Option<f64>,
     notice: Option<Notice>,
-    /// Whether the user has put away what is said about the changes that the window began with.
+    /// Whether the user has dismissed the notice of the initial changes.
     changes_seen: bool,
     announcer: Announcer,
     microscope: Microscope,
@@ -313,45 +313,45 @@ pub struct App {
     undo: undo::Undo,
     picture: Picture,
     scene_pictures: ScenePictures,
-    /// A film being made.
+    /// The film in progress.
     film: Option<film::Making>,
-    /// How the last one was to be.
+    /// Settings of the last film.
     film_wanted: Option<film::Wanted>,
     presentation: Option<present::Presentation>,
-    /// The zoom of the interface without what a tiny window takes off it.
+    /// The zoom before it was reduced for a tiny window.
     squeezed: Option<f32>,
-    /// Which of the chosen plots is shown alone: in a presentation, and in the window for the class.
+    /// Index of the single plot shown in a presentation and in the audience window.
     single_plot: Option<usize>,
-    /// The window for the class.
+    /// The audience window.
     #[cfg(not(target_arch = "wasm32"))]
     audience: Option<audience::Audience>,
-    /// What the next start is to begin with; without one nothing is remembered.
+    /// Settings for the next start; `None` disables storing them.
     #[cfg(not(target_arch = "wasm32"))]
     store: Option<Store>,
-    /// Files for which the host asks for a path.
+    /// Files waiting for a path from the host.
     #[cfg(not(target_arch = "wasm32"))]
     saving: Vec<SaveFile>,
     embedded: Option<Embedded>,
     sound: Sound,
-    /// The lesson under way.
+    /// The lesson in progress.
     course: Option<Box<Course>>,
-    /// The window as it was before that.
+    /// Snapshot of the window before the lesson.
     before_lesson: Option<Box<lesson::WindowBefore>>,
-    /// Where the 3D view is, points.
+    /// Area of the 3D view, points.
     picture_rect: egui::Rect,
-    /// Texts and edges are in black and white.
+    /// Whether texts and edges are black and white.
     contrast: bool,
-    /// The graphics adapter and its interface; "" without a window.
+    /// Graphics adapter and backend; "" without a window.
     renderer: String,
-    /// The graphics of the window, to draw pictures off screen.
+    /// Graphics of the window, for drawing pictures off screen.
     graphics: Option<egui_wgpu::RenderState>,
 }
 
 impl App {
-    /// For a window: sets up the theme and the renderer.
+    /// Creates the application for a window, with its theme and renderer.
     ///
     /// # Errors
-    /// A scene that cannot start.
+    /// The scene fails to start.
     pub fn new(cc: &eframe::CreationContext<'_>, options: AppOptions) -> Result<Self, StartError> {
         Self::with_context(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), options)
     }
@@ -359,7 +359,7 @@ impl App {
     /// The same without a window.
     ///
     /// # Errors
-    /// A scene that cannot start.
+    /// The scene fails to start.
     pub fn with_context(
         ctx: &egui::Context,
         state: Option<&egui_wgpu::RenderState>,
@@ -440,13 +440,12 @@ impl App {
         Ok(app)
     }
 
-    /// Applies camera, followed part, plots and instruments of `link`, and goes to its instant; what it does not mention
-    /// stays.
+    /// Applies camera, followed part, plots and instruments of `link`, and goes to its instant; other settings stay.
     fn show_link(&mut self, link: Link) {
         if let Some(pose) = link.camera {
             self.viewport.set_pose(pose);
         }
-        // Reading the link has already checked that the parts exist.
+        // The existence of the parts was checked when the link was read.
         let scene = self.player.running();
         self.viewport.follow(link.followed(scene).ok().flatten());
         if let Some(chosen) = &link.plots {
@@ -467,13 +466,15 @@ impl App {
             self.viewport.options.wear = shown.wear;
             self.show_ideal(shown.ideal);
         }
+        // Channels are recorded from now on, not from the first frame on.
+        self.player.pick(&self.plots.picked);
         self.replay = Replay::new(link);
         if self.replay.is_some() {
             self.player.set_playing(false);
         }
     }
 
-    /// Continues in another window, or with new graphics after the old were lost; nothing else changes.
+    /// Continues in another window, or with new graphics after a device loss; the state is unchanged.
     pub fn attach(&mut self, ctx: &egui::Context, state: Option<&egui_wgpu::RenderState>, theme: ThemePreference) {
         theme::apply(ctx, self.contrast);
         ctx.set_theme(theme);
@@ -485,24 +486,24 @@ impl App {
         }
         self.fingers = None;
         self.graphics = state.cloned();
-        // What was being drawn is lost.
+        // A picture in progress is lost.
         self.picture.forget();
         self.scene_pictures = ScenePictures::default();
         self.cancel_film();
     }
 
-    /// The running scene.
+    /// The player.
     pub fn player(&self) -> &Player {
         &self.player
     }
 
-    /// Whether the link that the window began with could not be opened, and nothing else was done since: another scene stands in its
-    /// place, behind the reason.
+    /// Whether the initial link could not be opened and nothing was done since; the window then shows another scene behind the
+    /// error message.
     pub fn is_refused(&self) -> bool {
         self.refused && self.problem.is_some() && !self.player.is_playing()
     }
 
-    /// Whether the key of a browser's event, its `name`, does something here, alone or with the command key.
+    /// Whether a browser key event called `name` has an action here, alone or with the command key.
     pub fn uses(&self, ctx: &egui::Context, name: &str, command: bool) -> bool {
         if ctx.memory(egui::Memory::focused).is_some() {
             return true;
@@ -516,33 +517,32 @@ impl App {
         }
     }
 
-    /// The running scene, to drive it.
+    /// The player, mutable.
     pub fn player_mut(&mut self) -> &mut Player {
         &mut self.player
     }
 
-    /// Lets slow frames lower the quality of the picture while it moves: for a window or page, whose pictures need not be the same
-    /// each time.
+    /// Lets slow frames reduce the quality of the moving picture: for a window or page, where pictures need not be reproducible.
     pub fn follow_frame_rate(&mut self) {
         self.viewport.follow_frame_rate(true);
     }
 
-    /// With which quality the latest picture was drawn.
+    /// Quality of the latest picture.
     pub fn picture_quality(&self) -> Quality {
         self.viewport.quality()
     }
 
-    /// Where the camera is or is moving to; `None` before the first picture.
+    /// Camera pose, or its target while the camera moves; `None` before the first picture.
     pub fn camera_pose(&self) -> Option<CameraPose> {
         self.viewport.pose()
     }
 
-    /// Where a point of the scene, m, is drawn, points of the window; `None` behind the camera.
+    /// Window position, points, of a point of the scene, m; `None` behind the camera.
     pub fn place_in_view(&self, point: &Vec3) -> Option<egui::Pos2> {
         self.viewport.place(point, self.picture_rect)
     }
 
-    /// Which plots are shown.
+    /// The plots and their settings, mutable.
     pub fn plots_mut(&mut self) -> &mut Plots {
         &mut self.plots
     }
@@ -552,8 +552,8 @@ impl App {
         &self.bench
     }
 
-    /// Whether the run is being replayed to the state of a link or to a section of a sweep, or filmed; until then it takes no
-    /// commands.
+    /// Whether the run is being replayed to the state of a link or to a section of a sweep, or filmed; it takes no commands
+    /// meanwhile.
     fn is_under_way(&self) -> bool {
         self.replay.is_some() || self.load.is_some() || self.film.is_some()
     }
@@ -564,7 +564,7 @@ impl App {
         Some(load.fraction(&self.player))
     }
 
-    /// Does what was asked for in the bench.
+    /// Handles a request of the bench.
     fn bench_asks(&mut self, asked: bench::Asked) {
         match asked {
             bench::Asked::Section(load) => self.start_load(load),
@@ -572,7 +572,7 @@ impl App {
                 Err(error) => self.problem = Some(error.to_string()),
                 Ok(scene) => {
                     let lost = value::changes(self.player.pending());
-                    // What another ready sweep has changed is no loss.
+                    // Changes made by another ready sweep are no loss.
                     let opened = READY.iter().filter_map(|ready| ready.scene().ok());
                     let mut known = opened.chain([scene]);
                     let same = known.any(|scene| value::differences(&scene, self.player.pending(), &[]).is_empty());
@@ -586,7 +586,7 @@ impl App {
         }
     }
 
-    /// Opens the scene of a ready sweep, and starts it.
+    /// Opens the scene of a ready sweep and starts the sweep.
     fn start_ready(&mut self, sweep: &'static ReadySweep) {
         let scene = sweep.scene().map_err(|error| error.to_string());
         self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
@@ -595,7 +595,7 @@ impl App {
         }
     }
 
-    /// Runs to a section of a sweep; asks first if that changes more than the varied parameter.
+    /// Runs to a section of a sweep; asks first if more than the varied parameter would change.
     fn start_load(&mut self, load: Load) {
         match load.scene.scene() {
             Err(error) => self.problem = Some(error.to_string()),
@@ -611,7 +611,7 @@ impl App {
         }
     }
 
-    /// Restarts the scene of a sweep and runs it towards a section.
+    /// Restarts the scene of a sweep and runs to a section.
     fn go_to_section(&mut self, load: Load) {
         let phase = self.player.watch().phase();
         let twin = self.player.twin().is_some();
@@ -632,7 +632,7 @@ impl App {
         }
     }
 
-    /// Continues towards a section within the budget of a frame.
+    /// Continues towards a section within the frame budget.
     fn advance_load(&mut self) {
         let Some((load, twin)) = &mut self.load else {
             return;
@@ -653,7 +653,7 @@ impl App {
         self.viewport.arrive(&self.player);
     }
 
-    /// Opens a built-in scene or a file; on an error the running scene stays and the reason is shown.
+    /// Opens a built-in scene or a file; on an error the running scene stays, and the reason is shown.
     pub fn open(&mut self, argument: &str) -> Result<(), String> {
         let scene = Scene::load(argument, &[]).map_err(|error| error.to_string())?;
         self.show_scene(&scene)?;
@@ -661,15 +661,15 @@ impl App {
         Ok(())
     }
 
-    /// Opens a link in any of its forms, a built-in scene or a file; on an error the running scene stays.
+    /// Opens a link in any form, a built-in scene or a file; on an error the running scene stays.
     ///
     /// # Errors
-    /// As [`Self::open_link`] and [`Self::open`], in words.
+    /// As [`Self::open_link`] and [`Self::open`], as a message.
     pub fn open_any(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
         if link::is_link(text) { self.open_link(ctx, text) } else { self.open(text.trim()) }
     }
 
-    /// Back to t = 0 with every change applied.
+    /// Resets to t = 0 with all changes applied.
     pub fn reset(&mut self) {
         match self.player.reset() {
             Ok(()) => {
@@ -684,12 +684,12 @@ impl App {
         }
     }
 
-    /// What the mechanism is doing, in sentences; renewed about once a second and when something happens.
+    /// Description of the mechanism's state in sentences; updated about once a second and after an event.
     pub fn announcement(&self) -> &str {
         self.announcer.text()
     }
 
-    /// What became of the link that the application was opened with.
+    /// The verdict on the initial link.
     pub fn verdict(&self) -> Option<&Verdict> {
         self.verdict.as_ref()
     }
@@ -700,7 +700,7 @@ impl App {
         Some(replay.fraction(&self.player))
     }
 
-    /// Stops the replay to the state of a link, or to a section, where it is; gives up a film.
+    /// Stops a replay or a run to a section at the present instant; cancels a film.
     fn cancel_replay(&mut self) {
         self.cancel_film();
         if self.load.take().is_some() {
@@ -726,7 +726,7 @@ impl App {
             let begins = options.link.is_none();
             self.player.pacer.set_scale(options.time_scale);
             self.player.set_playing(options.playing);
-            // A window of its own remains one.
+            // A stand-alone window remains one.
             if let (Some(panels), Some(wanted)) = (&mut self.embedded, options.embedded) {
                 *panels = wanted;
             }
@@ -746,31 +746,31 @@ impl App {
         opened
     }
 
-    /// Pauses and shows `time`, s: any instant shown before.
+    /// Pauses and shows `time`, s: any previously displayed instant.
     pub fn look_back(&mut self, time: f64) {
         self.player.go_to(time);
         self.viewport.revisit(&self.player);
     }
 
-    /// Ball joint, force in N and age in s of every peak that is marked.
+    /// Ball joint, force in N and age in s of every marked peak.
     pub fn peak_marks(&self) -> Vec<(usize, f32, f64)> {
         self.viewport.peak_marks(&self.player)
     }
 
-    /// Pauses and runs on until `time`, s, however long that takes. Impacts on the way are recorded but no longer glow.
+    /// Pauses and runs to `time`, s, without a time limit. Impacts on the way are recorded but do not glow.
     pub fn run_to(&mut self, time: f64) {
         self.player.run_to(time);
         self.player.advance(0.0);
         self.viewport.arrive(&self.player);
     }
 
-    /// Advances the state by `dt` seconds; returns whether it keeps moving by itself.
+    /// Advances the state by `dt` seconds; returns whether it is still changing.
     pub fn advance(&mut self, dt: f64) -> bool {
         self.player.pick(&self.plots.picked);
         if let Some(replay) = &mut self.replay {
             let may_step = replay_budget(self.player.clock);
             self.verdict = replay.advance(&mut self.player, may_step);
-            // What the link did is not to be undone.
+            // Changes made by the link are not undoable.
             self.player.take_edits();
             if self.verdict.is_some() {
                 self.verdict_shown = None;
@@ -787,7 +787,7 @@ impl App {
             return true;
         }
         let sought = self.player.is_seeking();
-        // Two machines side by side are seen at the same instant: the one now waits for the other.
+        // Two machines side by side show the same instant: the current one waits for the other.
         let waits = self.plots.comparison.is_waited_for(&self.player);
         self.advance_heard(if waits { 0.0 } else { dt });
         if sought && !self.player.is_seeking() {
@@ -799,7 +799,7 @@ impl App {
         moves || sought || self.player.is_seeking() || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
-    /// Steps the runs on between two frames, as [`Player::step_between`].
+    /// Steps the runs between two frames, as [`Player::step_between`].
     pub fn step_between(&mut self, since: f64) -> Option<bool> {
         if self.is_under_way() || since > LONGEST_FRAME {
             return None;
@@ -813,7 +813,7 @@ impl App {
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
         let mut player = Player::new(scene).map_err(|error| scene.locate(&error).to_string())?;
-        // Its time scale is not that of the run.
+        // Cancelled first, because a film uses another time scale.
         self.cancel_film();
         player.clock = self.player.clock;
         let another = scene.source.text != self.player.pending().source.text;
@@ -842,7 +842,7 @@ impl App {
     }
 
     fn act(&mut self, ctx: &egui::Context, action: Action) {
-        // While a dialog is open the machine cannot be operated.
+        // An open dialog blocks the machine's controls.
         if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
             return;
         }
@@ -940,7 +940,7 @@ impl App {
         }
     }
 
-    /// A verdict that needs no answer is shown for some seconds.
+    /// Expires a verdict that needs no action after some seconds.
     fn age_verdict(&mut self, ctx: &egui::Context) {
         if !self.verdict.as_ref().is_some_and(files::is_right) {
             return;
@@ -954,7 +954,7 @@ impl App {
         }
     }
 
-    /// Announces what is going on, if an announcement is due.
+    /// Makes an announcement if one is due.
     fn announce(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
         let (told, wait) = self.announcer.update(now, &self.player, &self.news());
@@ -968,7 +968,7 @@ impl App {
         }
     }
 
-    /// The report for screen readers: in the accessibility tree, read out politely when it changes.
+    /// The report for screen readers: in the accessibility tree, announced politely on changes.
     fn summary(&self, ui: &mut Ui) {
         let place = egui::Rect::from_min_size(ui.max_rect().min, egui::Vec2::ZERO);
         let id = egui::Id::unique("summary");
@@ -1018,7 +1018,7 @@ impl App {
             }
             Some(Answer::Open(argument)) => {
                 if let Err(reason) = self.open_any(ctx, &argument) {
-                    // The dialog shows it.
+                    // The dialog shows the error instead.
                     self.problem = None;
                     self.dialog = Some(Dialog::Open { path: argument, error: Some(reason) });
                 }
@@ -1030,7 +1030,7 @@ impl App {
 
 impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        // Behind another window nothing is shown and time stands still.
+        // A hidden window shows nothing, and its time stands still.
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
             return;
         }

@@ -1,22 +1,22 @@
-//! What a window begins with: the pace and the plots of a scene, and the scene that a visitor meets first.
+//! Initial state of a window: time scale and plots of a scene, and the scene for first-time visitors.
 
 use crate::analysis::drive::{NoPeriod, drive_period};
 use crate::scene::{DEFAULT_SCENE, Scene};
 use crate::simulate::{Quantity, SCALE_RANGE};
 
-/// Seconds of viewing that a period of the drives takes, where the scene gives no time scale.
+/// Viewing time of one drive period, s, if the scene has no time scale.
 const TURN: f64 = 4.0;
-/// Time scale where neither a file nor a drive gives one.
+/// Time scale if neither the scene nor a drive defines one.
 const UNDRIVEN: f64 = 0.1;
 
-/// Changes of the default scene with which its joints rattle at every turn: with the paper's drive they come to rest after 70 ms.
-/// The approach speed that a ball hit again while it touches needs goes with them.
+/// Changes to the default scene that keep its joints rattling: with the paper's drive they come to rest after 70 ms. A ball that
+/// is hit again during contact also needs the changed approach speed.
 const RATTLING: [(&str, &str); 2] = [("spcmm.frequency", "6 Hz"), ("contact.approach_speed", "largest")];
-/// Simulated seconds per second at which it is shown: a turn takes 3.3 s.
+/// Time scale of the rattling scene, simulated seconds per second: a turn takes 3.3 s.
 pub const RATTLING_SCALE: f64 = 0.05;
 
-/// Simulated seconds per second that a window on `scene` begins with: its file's, or one at which a period of its drives takes about
-/// four seconds.
+/// Initial time scale of a window on `scene`, simulated seconds per second: the value in its file, or one at which a drive period
+/// takes about four seconds.
 pub fn time_scale(scene: &Scene) -> f64 {
     let period = match drive_period(scene) {
         Ok(period) => Some(period),
@@ -37,7 +37,7 @@ fn round(scale: f64) -> f64 {
     1.0 / (nearest.unwrap_or(1.0) * decade)
 }
 
-/// Plots that a window on `scene` begins with.
+/// Initial plots of a window on `scene`.
 pub fn plots(scene: &Scene) -> Vec<Quantity> {
     let given = scene.view.plots;
     if given[0].is_none() {
@@ -47,13 +47,13 @@ pub fn plots(scene: &Scene) -> Vec<Quantity> {
     all.filter(|quantity| given.contains(&Some(quantity.word()))).collect()
 }
 
-/// The default scene as a visitor meets it: it goes on rattling.
+/// The default scene for first-time visitors, whose joints keep rattling.
 pub fn rattling() -> Scene {
     let changes = RATTLING.map(|(key, value)| (key.to_owned(), value.to_owned()));
     Scene::load(DEFAULT_SCENE, &changes).expect("built-in scenes are right")
 }
 
-/// Whether `scene` is the one of [`rattling`], with no other changes.
+/// Whether `scene` is the scene of [`rattling`] without further changes.
 pub fn is_rattling(scene: &Scene) -> bool {
     let asked = scene.changes.iter().map(|(key, value)| (key.as_str(), value.as_str()));
     scene.name == DEFAULT_SCENE && asked.eq(RATTLING)
@@ -71,7 +71,7 @@ mod tests {
             let scene = Scene::load(name, &[]).expect("built in");
             let scale = time_scale(&scene);
             match drive_period(&scene) {
-                // With the paper's drive only the first 70 ms are worth seeing: it has a pace for these.
+                // With the paper's drive only the first 70 ms matter; the scene file sets a time scale for them.
                 Ok(_) if name == DEFAULT_SCENE => assert_eq!(scale, 0.02),
                 Ok(period) => assert!((3.0..6.0).contains(&(period / scale)), "{name}: {period} s at {scale}"),
                 Err(_) => assert!(scene.view.time_scale.is_some(), "{name}"),
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn the_words_of_scene_files_are_those_of_the_plots() {
-        // Two as links made before those plots were renamed have them.
+        // Two of them as named in links made before the plots were renamed.
         let words = Quantity::ALL.map(|quantity| match quantity {
             Quantity::Penetration => "penetration".to_owned(),
             Quantity::ProbeError => "probe-error".to_owned(),

@@ -1,5 +1,4 @@
-//! What the interface paints over a picture: labels, the legend of the arrows, the time. Used by the viewport and
-//! by headless frames.
+//! Overlays painted on a picture: labels, arrow legend, time. Used by the viewport and by headless frames.
 
 use eframe::egui::epaint::RectShape;
 use eframe::egui::{Align2, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
@@ -15,27 +14,27 @@ use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewO
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
 
-/// Size of the time in a picture that has room for it, points.
+/// Font size of the time in a picture with enough room, points.
 const TIME: f32 = 18.0;
 
-/// Longest axis of the legend, as a share of the picture's width.
+/// Longest axis of the legend relative to the picture's width.
 const LONGEST_AXIS: f32 = 0.4;
 
-/// What is written over a picture.
+/// Contents of the overlay.
 #[derive(Clone, Debug, Default)]
 pub struct Overlay {
     /// Simulated time, s.
     pub time: Option<f64>,
     /// Lines below the time, after those about the picture itself; e.g. [`force_notes`].
     pub notes: Vec<String>,
-    /// How to read the arrows.
+    /// Whether to draw the legend of the arrows.
     pub legend: bool,
-    /// Names of joints and axes.
+    /// Whether to draw names of joints and axes.
     pub labels: bool,
 }
 
-/// Writes over the picture of `list` in `rect`; `scale` is pixels per point. Names keep clear of the rest and of what is painted
-/// `above` all this, and stay at the `places` of the picture before where those are still good.
+/// Paints the overlay of `list` in `rect`; `scale` is pixels per point. Names avoid the rest and the rectangles painted `above`
+/// it, and reuse their `places` in the previous picture where possible.
 #[expect(clippy::too_many_arguments, reason = "one call for a whole picture")]
 pub fn paint(
     painter: &Painter,
@@ -67,7 +66,7 @@ pub fn paint(
     }
 }
 
-/// Simulated time in the upper left corner, with notes below it, on a plate of their own: where that is.
+/// Simulated time in the upper left corner with notes below it, on a plate; returns the plate.
 fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = String>, theme: Theme) -> Rect {
     let palette = Palette::of(theme);
     let ink = colour(palette.text);
@@ -75,7 +74,7 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
     let large = has_room(rect);
     let (size, small_size, margin) = if large { (TIME, 13.0, MARGIN) } else { (11.0, 10.0, 6.0) };
     let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
-    // The first note says how much the play is magnified: never left out for want of room alone.
+    // The first note states the magnification of the play and is never omitted for lack of room alone.
     let notes = notes.filter(|note| !note.is_empty());
     let notes = notes.take(if large { usize::MAX } else { 1 });
     lines.extend(notes.map(|note| line(note, small_size)));
@@ -94,30 +93,30 @@ fn time(painter: &Painter, rect: Rect, time: f64, notes: impl Iterator<Item = St
     plate
 }
 
-/// How far from the left edge of a picture any time reaches, points.
+/// Right edge of the longest possible time in a picture, points.
 pub fn reach(painter: &Painter) -> f32 {
     let longest = format!("t = {} ms", "0".repeat(value::LONGEST_TIME - 3));
     let words = painter.layout_no_wrap(longest, FontId::proportional(TIME), colour(Palette::of(Theme::Light).text));
     MARGIN + words.size().x + 8.0
 }
 
-/// Approximate width and height of the time with one note per joint, whatever the notes say; points.
+/// Approximate width and height of the time with one note per joint, whatever the text; points.
 pub fn plate(joints: usize) -> [f32; 2] {
     const LONGEST: [f32; 2] = [150.0, 230.0];
     const LINE: f32 = 16.0;
-    // Time and magnification come first.
+    // The first lines are time and magnification.
     let longest = LONGEST[usize::from(joints > 0)];
     [MARGIN + longest + 8.0, MARGIN + 38.0 + LINE * joints as f32 + 8.0]
 }
 
-/// About where axes and gravity are drawn.
+/// Approximate area of axes and gravity.
 fn triad(rect: Rect) -> Rect {
-    // Gravity is beside the axes where there is room: `SceneView::push_triad`.
+    // Gravity is beside the axes if there is room: `SceneView::push_triad`.
     let width = if rect.width() < 300.0 { 118.0 } else { 164.0 };
     Align2::LEFT_BOTTOM.align_size_within_rect(vec2(width, 118.0), rect)
 }
 
-/// About where time with one note per joint, axes and legend stand in a picture in `rect`.
+/// Approximate areas of the time with one note per joint, the axes and the legend in a picture in `rect`.
 pub fn plates(rect: Rect, joints: usize, options: &ViewOptions) -> Vec<Rect> {
     let large = has_room(rect);
     let [width, height] = if large { plate(joints) } else { [130.0, 36.0] };
@@ -160,15 +159,15 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
         .collect()
 }
 
-/// How to read the arrows, in the lower right corner: where that is.
+/// Legend of the arrows in the lower right corner; returns its area.
 fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: Theme) -> Rect {
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
     let longest = rect.width() * LONGEST_AXIS;
-    // Close up, the reference arrow may be wider than the view: show the part that fits.
+    // In a close-up the reference arrow may be wider than the view; only the part that fits is drawn.
     let shown = full.min(longest);
-    // Room for half a number beyond the last mark.
+    // Space for half a number beyond the last mark.
     let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
     let axis = corner.y - 18.0;
     let back = painter.add(Shape::Noop);
@@ -180,7 +179,7 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
         let x = left + tick.fraction * full;
         painter.line_segment([pos2(x, axis - 4.0), pos2(x, axis + 4.0)], Stroke::new(1.5, ink));
         let words = format_quantity_digits(f64::from(tick.force), "", 3);
-        // Omitted where it would touch the mark before it.
+        // Omitted if it would touch the previous mark.
         if x - 12.0 >= free_from {
             let placed = text(painter, pos2(x, axis + 5.0), Align2::CENTER_TOP, &words, 11.0, ink, halo);
             free_from = placed.max.x + 4.0;
@@ -231,7 +230,7 @@ fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: The
     plate
 }
 
-/// What a wear map shows, and its unit.
+/// Quantity of a wear map, and its unit.
 fn wear_words(map: WearMap) -> Option<(&'static str, &'static str)> {
     match map {
         WearMap::Off => None,
@@ -240,7 +239,7 @@ fn wear_words(map: WearMap) -> Option<(&'static str, &'static str)> {
     }
 }
 
-/// What the colours of `list` stand for, where it has a wear map.
+/// Note on the meaning of the colours in `list`, if it has a wear map.
 fn wear_note(list: &DrawList) -> Option<String> {
     let scale = list.wear_scale?;
     let (what, unit) = wear_words(scale.map)?;
@@ -252,12 +251,11 @@ fn wear_note(list: &DrawList) -> Option<String> {
     })
 }
 
-/// How to read the colours of a wear map, at the right edge above the legend of the arrows: where that is. Left out where there
-/// is no room.
+/// Colour scale of a wear map, at the right edge above the legend of the arrows; returns its area. Omitted if there is no room.
 fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) -> Option<Rect> {
     const BAR: [f32; 2] = [12.0, 110.0];
     const PARTS: u32 = 48;
-    // Above: its own title, the time with its notes, the buttons of the window. Below: the legend of the arrows.
+    // Above: title, time with notes, buttons of the window. Below: legend of the arrows.
     const FREE: [f32; 2] = [100.0, 122.0];
     let (what, unit) = wear_words(scale.map).filter(|_| scale.largest > 0.0)?;
     let room = rect.height() - FREE[0] - FREE[1];
@@ -286,7 +284,7 @@ fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) ->
         let place = pos2(left - 3.0, y);
         all |= text(painter, place, Align2::RIGHT_CENTER, &words, 11.0, ink, halo);
     }
-    // In a narrow picture the note beside the time says what it is; the title would lie over a joint.
+    // In a narrow picture the title would cover a joint; the note beside the time has the same information.
     if rect.width() >= 520.0 {
         let title = format!("Wear: {what}, {unit}");
         let place = pos2(bar.max.x, bar.min.y - 6.0);
@@ -309,7 +307,7 @@ mod tests {
     use eframe::egui::{Context, LayerId, RawInput};
     use glam::Vec3;
 
-    /// Names of a column of `count` joints, `apart` points from each other, as they are painted.
+    /// Painted names of a column of `count` joints, `apart` points from each other.
     fn painted(count: usize, apart: f32) -> Vec<(String, Pos2)> {
         let label = |joint: usize| Label {
             text: format!("J{joint}").into(),
@@ -329,7 +327,7 @@ mod tests {
         words.collect()
     }
 
-    /// What is painted for the labels of `list`.
+    /// Shapes painted for the labels of `list`.
     fn shapes_of(list: &DrawList, rect: Rect) -> Vec<Shape> {
         shapes(rect, |painter| labels::paint(painter, rect, 1.0, list, Vec::new(), &mut Places::default()))
     }
@@ -340,7 +338,7 @@ mod tests {
         let mut output = ctx.run_ui(RawInput::default(), |ui| {
             paint(&Painter::new(ui.ctx().clone(), LayerId::background(), rect));
         });
-        // No texture is made of them.
+        // No texture is uploaded.
         output.textures_delta.clear();
         output.shapes.into_iter().map(|shape| shape.shape).collect()
     }
@@ -405,7 +403,7 @@ mod tests {
             pixel: glam::Vec2::new(x, y),
             colour: Palette::of(Theme::Light).text,
         };
-        // Left of the time's plate's end, below the caption, at the legend.
+        // Inside the time's plate, below the caption, and at the legend.
         let list = DrawList {
             labels: vec![at(60.0, 45.0), at(400.0, 60.0), at(700.0, 575.0)],
             legend: Some(Legend {
@@ -442,7 +440,7 @@ mod tests {
                 assert!(!name.intersects(*place), "over {other}");
             }
         }
-        // Without the rest they would stand there.
+        // Alone, the labels would overlap the time.
         let alone = texts(&Overlay { labels: true, ..Overlay::default() });
         assert!(alone[0].1.intersects(others.iter().find(|(text, _)| text.starts_with("t =")).expect("time").1));
     }

@@ -1,53 +1,53 @@
-//! What the picture may cost while it moves: less once frames are slow, more again once there is room. At rest it has everything.
+//! Picture quality while it moves: reduced when frames are slow, raised when there is headroom, full at rest.
 
 use crate::simulate::REST;
 use crate::view::Quality;
 
-/// A frame that takes longer, s, is slow, if drawing is what takes most of it.
+/// A longer frame, s, counts as slow if drawing takes most of it.
 const SLOW: f64 = 1.0 / 24.0;
-/// So many slow frames in succession, or so long of them, s, lower the quality.
+/// Number or total duration, s, of consecutive slow frames that lowers the quality.
 const PATIENCE: (u32, f64) = (12, 1.2);
-/// A frame whose drawing takes less, s, leaves room.
+/// A frame with a shorter drawing time, s, has headroom.
 const ROOM: f64 = 1.0 / 45.0;
-/// How long there is room before the quality is raised, s: at first, and at most after raising it was of no use. It grows by a
-/// factor each time, so that the quality does not swing.
+/// Headroom time before the quality is raised, s: initial value, and maximum after failed attempts. Each failure multiplies it by
+/// a factor, which prevents oscillation.
 const WAIT: (f64, f64) = (3.0, 120.0);
 const GROWTH: f64 = 4.0;
-/// A raised quality that lasts so long, s, was of use.
+/// A raised quality that lasts this long, s, has succeeded.
 const TRIAL: f64 = 10.0;
-/// How many times its length a frame without room takes off the time with room.
+/// Weight of a frame without headroom when it is subtracted from the headroom time.
 const LOSS: f64 = 8.0;
-/// A picture that has not changed for so long, s, is at rest.
+/// A picture unchanged for this time, s, is at rest.
 const STILL: f64 = 0.2;
 
-/// A frame on the screen.
+/// A displayed frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     /// Pixels of the picture.
     pub size: [u32; 2],
-    /// Whether it differs from the frame before.
+    /// Whether it differs from the previous frame.
     pub moves: bool,
-    /// When, s of viewing.
+    /// Viewing time, s.
     pub now: f64,
-    /// Time since the frame before, s.
+    /// Time since the previous frame, s.
     pub dt: f64,
-    /// What of it was not stepping, s.
+    /// Frame time without stepping, s.
     pub drawing: f64,
 }
 
-/// Finds the row of [`Quality::LADDER`] that the frames allow.
+/// Selects the row of [`Quality::LADDER`] that the frame times permit.
 #[derive(Debug)]
 pub struct Pace {
     row: usize,
-    /// Slow frames in succession, and how long they took, s.
+    /// Number of consecutive slow frames, and their total duration, s.
     slow: (u32, f64),
-    /// For how long there was room, and for how long there has to be, s.
+    /// Accumulated and required headroom time, s.
     room: f64,
     wait: f64,
-    /// Time since the quality was raised, s, until it has proved to be of use.
+    /// Time since the quality was raised, s, until the trial succeeds.
     trial: Option<f64>,
     size: [u32; 2],
-    /// The latest frame, and the latest that moved, s of viewing.
+    /// The latest frame, and the latest moving one, s of viewing.
     latest: f64,
     moved: f64,
 }
@@ -68,10 +68,10 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Takes a frame; returns with which quality it is drawn.
+    /// Takes a frame; returns the quality to draw it with.
     pub fn frame(&mut self, seen: &Seen) -> Quality {
         if seen.size != self.size {
-            // Another size may have more room.
+            // Another size may have more headroom.
             (self.size, self.wait) = (seen.size, WAIT.0);
         }
         if seen.now > self.latest {
@@ -92,13 +92,13 @@ impl Pace {
         }
     }
 
-    /// How long the picture has to stay as it is until it is at rest, s; `None` if it is.
+    /// Remaining time until the unchanged picture counts as at rest, s; `None` if it does already.
     pub fn until_still(&self, now: f64) -> Option<f64> {
         let left = self.moved + STILL - now;
         (left > 0.0).then_some(left)
     }
 
-    /// Takes a frame between others that moved.
+    /// Counts a frame between moving frames.
     fn count(&mut self, dt: f64, drawing: f64) {
         self.slow = if dt > SLOW && 2.0 * drawing >= dt { (self.slow.0 + 1, self.slow.1 + dt) } else { (0, 0.0) };
         self.room = if drawing < ROOM { self.room + dt } else { (self.room - LOSS * dt).max(0.0) };
@@ -108,7 +108,7 @@ impl Pace {
             self.wait = WAIT.0;
         }
         let (frames, time) = self.slow;
-        // One alone is a hitch.
+        // A single slow frame is a hitch.
         if frames >= PATIENCE.0 || (frames > 1 && time >= PATIENCE.1) {
             if self.trial.take().is_some() {
                 self.wait = (GROWTH * self.wait).min(WAIT.1);
@@ -132,17 +132,18 @@ mod tests {
     const SIZE: [u32; 2] = [500, 400];
     const LEAST: usize = Quality::LADDER.len() - 1;
 
-    /// A window whose picture moves.
+    /// A window with a moving picture.
     #[derive(Default)]
     struct Window {
         pace: Pace,
         now: f64,
-        /// Every change of the row.
+        /// All changes of the row.
         changes: Vec<(f64, usize)>,
     }
 
     impl Window {
-        /// Moves for `time` s; drawing takes `cost` of the row, s, as a whole number of `tick`, and stepping `stepping`.
+        /// Moves for `time` s; drawing takes the row's `cost`, s, rounded to a multiple of `tick`, and stepping takes `stepping`,
+        /// s.
         fn run(&mut self, time: f64, tick: f64, stepping: f64, cost: impl Fn(usize) -> f64) {
             let end = self.now + time;
             while self.now < end {
@@ -163,7 +164,7 @@ mod tests {
         }
     }
 
-    /// Of a screen at 60 Hz, and of one that waits for nothing.
+    /// A screen at 60 Hz, and one without vertical sync.
     const SCREEN: f64 = 1.0 / 60.0;
     const FREE: f64 = 1e-6;
 
@@ -177,7 +178,7 @@ mod tests {
         let rows: Vec<_> = Quality::LADDER.iter().map(order).collect();
         for (row, next) in rows.iter().zip(&rows[1..]) {
             let lights = |row: &([bool; 3], u32)| row.0.iter().filter(|out| **out).count();
-            // In this order: the first that is kept goes next, and resolution last.
+            // Order of reduction: the first feature still present goes next, resolution last.
             assert!(next.0.is_sorted_by(|a, b| a >= b), "{next:?}");
             if lights(row) < 3 {
                 assert_eq!((lights(next), next.1), (lights(row) + 1, 100));
@@ -193,7 +194,7 @@ mod tests {
     fn only_slow_frames_in_succession_lower_it_step_by_step() {
         let mut window = Window::default();
         window.run(100.0, SCREEN, 0.0, |_| 0.005);
-        // Now and then one, and pauses.
+        // Occasional slow frames, and pauses.
         for _ in 0..20 {
             window.run(1.05, FREE, 0.0, |_| 0.1);
             window.now += 2.0;
@@ -230,7 +231,7 @@ mod tests {
             assert_eq!(window.pace.row, LEAST);
             window.run(20.0, tick, 0.0, |_| 0.01);
             assert_eq!(window.pace.row, 0, "tick {tick} s");
-            // Hitches now and then hold it up no longer than a moment.
+            // Occasional hitches delay it only briefly.
             let mut window = Window::default();
             window.run(20.0, tick, 0.0, |_| 0.1);
             for _ in 0..25 {
@@ -245,7 +246,7 @@ mod tests {
     #[test]
     fn under_an_even_load_it_settles_and_does_not_swing() {
         const MINUTES: f64 = 600.0;
-        // By row; the greatest leaps that software drawing showed are from four samples to one.
+        // Drawing times by row; the largest jumps in software rendering are from four samples to one.
         let loads = [
             [0.050, 0.045, 0.018, 0.016, 0.010, 0.005],
             [0.300, 0.250, 0.100, 0.090, 0.060, 0.020],
@@ -287,7 +288,7 @@ mod tests {
         window.now += 0.6 * wait;
         assert_eq!(window.show(false, 0.1, 0.1), Quality::FULL);
         assert_eq!(window.pace.until_still(window.now), None);
-        // Moved again, it is as before at once; the gap was no frame.
+        // Moving again restores the quality at once; the gap is not a frame.
         window.now += 1.0;
         assert_eq!(window.show(true, 1.0, 1.0), Quality::LADDER[LEAST]);
         assert_eq!(window.pace.slow.0, 0);

@@ -1,5 +1,5 @@
-//! Pictures to save: the 3D view, the view with the plots below it, or the whole window, at any size. They are redrawn off
-//! screen at that size by the same code, so that labels and arrows are as sharp as the rest.
+//! Saved pictures of the 3D view, the view with plots, or the whole window, at any size. The same code redraws them off screen at
+//! that size, so that labels and arrows are sharp.
 
 use eframe::egui::{self, Button, CentralPanel, DragValue, Panel, RichText, Ui, Vec2, vec2};
 use eframe::egui_wgpu::RenderState;
@@ -14,8 +14,7 @@ use crate::render::RenderError;
 
 /// Height of the plots below the view, points.
 const PLOTS: f32 = 230.0;
-/// Least edge of a picture of the view, points, where its pixels allow it: a small view is drawn with room for its names and
-/// legend.
+/// Least edge of a picture of the view, points, if its pixels permit: a small view is enlarged to fit names and legend.
 const LEAST_EDGE: f32 = 1.1 * SMALL;
 /// Sizes to choose from, as multiples of the size on the screen.
 const TIMES: [u32; 3] = [1, 2, 4];
@@ -24,15 +23,15 @@ const EDGE: std::ops::RangeInclusive<u32> = 16..=65_536;
 /// Timeout for a picture that does not arrive, s.
 const TIMEOUT: f64 = 20.0;
 
-/// What a picture shows.
+/// Contents of a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Contents {
     /// The 3D view without its buttons.
     #[default]
     View,
-    /// The same with the plots below it.
+    /// The 3D view with the plots below it.
     Plots,
-    /// Everything.
+    /// The whole window.
     Window,
 }
 
@@ -44,16 +43,16 @@ impl Contents {
     ];
 }
 
-/// Settings of the next picture, and a pending one.
+/// Settings of the next picture, and a pending picture.
 pub struct Picture {
     contents: Contents,
     /// Multiple of the size on the screen; `None`: the typed size `own`.
     times: Option<u32>,
     own: [u32; 2],
-    /// A picture has been requested.
+    /// Whether a picture was requested.
     asked: bool,
     pending: Option<(Pending, f64)>,
-    /// What is being drawn off screen, while it is being drawn.
+    /// Contents of the current off-screen pass.
     drawn: Option<Contents>,
 }
 
@@ -71,7 +70,7 @@ impl Default for Picture {
 }
 
 impl Picture {
-    /// Whether this pass is drawn off screen.
+    /// Whether this pass draws off screen.
     pub fn is_drawn(&self) -> bool {
         self.drawn.is_some()
     }
@@ -81,12 +80,12 @@ impl Picture {
         self.drawn.is_some_and(|drawn| drawn != Contents::Window)
     }
 
-    /// Gives up a pending picture.
+    /// Discards a pending picture.
     pub fn forget(&mut self) {
         (self.asked, self.pending) = (false, None);
     }
 
-    /// Size of the picture in pixels, and its pixels per point, if its content measures `points` on the screen.
+    /// Size of the picture in pixels, and its pixels per point, for contents of `points` on the screen.
     fn size(&self, points: Vec2, screen: f32) -> ([u32; 2], f32) {
         let (pixels, scale) = match self.times {
             Some(times) => {
@@ -101,7 +100,7 @@ impl Picture {
         if self.times == Some(1) {
             return (pixels, scale);
         }
-        // Text of fewer pixels than on an ordinary screen is illegible; on a small view, larger text leaves no room for names.
+        // Text with fewer pixels than on an ordinary screen is illegible; in a small view, larger text leaves no room for names.
         let readable = screen.min(1.0);
         let room = match self.contents {
             Contents::Window => f32::INFINITY,
@@ -112,7 +111,7 @@ impl Picture {
 }
 
 impl App {
-    /// The options of the picture, and its button.
+    /// Options and save button of the picture.
     pub(super) fn picture_menu(&mut self, ui: &mut Ui) {
         let help = "A picture as chosen below, PNG";
         if ui.button("Picture…").on_hover_text(help).clicked() {
@@ -150,7 +149,7 @@ impl App {
         ui.label(RichText::new(format!("{width} × {height} pixels")).small().weak());
     }
 
-    /// Size on the screen of what the picture shows, points.
+    /// Screen size of the picture's contents, points.
     fn picture_points(&self, ctx: &egui::Context) -> Vec2 {
         let view = self.picture_rect.size();
         let points = match self.picture.contents {
@@ -161,14 +160,14 @@ impl App {
         points.max(Vec2::splat(1.0))
     }
 
-    /// Saves a picture as chosen, once it has been read back from the graphics adapter; does not block.
+    /// Saves the chosen picture once it has been read back from the graphics adapter; does not block.
     pub fn save_picture(&mut self, ctx: &egui::Context) {
         self.picture.forget();
         self.picture.asked = true;
         ctx.request_repaint();
     }
 
-    /// Draws the picture that [`Self::save_picture`] asked for, and takes it once it is there.
+    /// Draws the picture requested by [`Self::save_picture`], and collects it when available.
     pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
         if std::mem::take(&mut self.picture.asked) {
@@ -213,10 +212,10 @@ impl App {
         drawn.map_err(|error| format!("The picture cannot be drawn: {error}"))
     }
 
-    /// Draws a frame of a film of `size` pixels, whose `first` one settles the layout.
+    /// Draws a film frame of `size` pixels; the `first` one settles the layout.
     ///
     /// # Errors
-    /// A size that cannot be drawn, in words.
+    /// The size cannot be drawn; the message says why.
     pub(super) fn draw_frame(
         &mut self,
         ctx: &egui::Context,
@@ -233,7 +232,7 @@ impl App {
         drawn.map_err(|error| error.to_string())
     }
 
-    /// Draws `contents` with (pixels, pixels per point) on `canvas`, which is `new` to it or has drawn the like before.
+    /// Draws `contents` with (pixels, pixels per point) on `canvas`; `new` if it has not drawn these contents before.
     fn draw_off_screen(
         &mut self,
         ctx: &egui::Context,
@@ -243,10 +242,10 @@ impl App {
         new: bool,
     ) -> Result<Pending, RenderError> {
         if new {
-            // Panels, collapsed parts and scroll positions are as in the window.
+            // Panels, collapsing headers and scroll positions as in the window.
             let memory = ctx.memory(Clone::clone);
             canvas.ctx.memory_mut(|own| *own = memory);
-            // They were in what this has replaced.
+            // Copying the memory overwrote fonts and zoom.
             canvas.ctx.set_fonts(theme::fonts());
             canvas.ctx.options_mut(|options| options.zoom_factor = 1.0);
             canvas.ctx.set_theme(ctx.theme());
@@ -255,7 +254,7 @@ impl App {
         let kept = (self.picture_rect, self.compact, self.fingers);
         self.viewport.freeze(Some(self.picture_rect.aspect_ratio()));
         self.picture.drawn = Some(contents);
-        // egui settles the size of what is new to it over a few passes.
+        // egui settles new layouts over a few passes.
         let mut output = Ok(egui::FullOutput::default());
         for _ in 0..if new { 3 } else { 1 } {
             output = canvas.pass(size, scale, |ui| self.show_contents(ui, contents));
@@ -298,9 +297,9 @@ mod tests {
         assert_eq!(of(Some(1), [0, 0], view, 1.0), ([980, 470], 1.0));
         assert_eq!(of(Some(4), [0, 0], view, 1.0), ([3920, 1880], 4.0));
         assert_eq!(of(Some(2), [0, 0], view, 1.5), ([2940, 1410], 3.0));
-        // As large against the picture as in the view: it just holds it.
+        // Same relative size as in the view: just fits.
         assert_eq!(of(None, [1960, 2000], view, 1.0), ([1960, 2000], 2.0));
-        // Letters are never smaller than on the screen.
+        // Type is never smaller than on the screen.
         assert_eq!(of(None, [490, 235], view, 1.0), ([490, 235], 1.0));
         let small = vec2(390.0, 150.0);
         assert_eq!(of(Some(1), [0, 0], small, 1.0), ([390, 150], 1.0));

@@ -1,5 +1,5 @@
-//! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind; and one per name by which
-//! channels are picked, and unit.
+//! Live plots of the recorded channels: one plot per quantity with one line per joint, axis or kind; and one plot per picked
+//! channel name and unit.
 
 use eframe::egui::{
     self, ComboBox, EventFilter, Id, Key, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo,
@@ -21,30 +21,30 @@ use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOI
 #[cfg(not(target_arch = "wasm32"))]
 mod sheet;
 
-/// Windows to choose from, s.
+/// Selectable windows, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
-/// The shortest time range that a plot zooms to, s.
+/// The shortest zoomed time range, s.
 const SHORTEST_WINDOW: f64 = 1e-6;
-/// Least useful height of a plot.
+/// Least useful height of a plot, points.
 const LEAST_HEIGHT: f32 = 110.0;
-/// Least distance between two marks on an axis, points: the height of their numbers.
+/// Least distance between two marks on an axis, points: the text height of their labels.
 const MARKS_APART: f32 = 16.0;
-/// Generous width of a character of the numbers, points.
+/// Upper estimate of the width of a label's character, points.
 const LETTER: f64 = 7.0;
-/// Fraction of the time range that an arrow key moves the cursor by.
+/// Fraction of the time range by which an arrow key moves the cursor.
 const NUDGE: f64 = 0.01;
 /// Approximate maximum number of marks on an axis.
 const MARKS: f64 = 5.0;
-/// A range smaller than this fraction of the values, or than this in axis units, is rounding and not motion.
+/// A range below this fraction of the values, or below this in axis units, is rounding error rather than motion.
 const GRAIN: f64 = 1e-9;
 
-/// Which plots are shown and how.
+/// The plots and their settings.
 pub struct Plots {
-    /// Quantities shown, in the order of [`Quantity::ALL`].
+    /// Displayed quantities, in the order of [`Quantity::ALL`].
     pub chosen: Vec<Quantity>,
-    /// Names, or patterns, of channels that are shown after them, as of `run --channels`.
+    /// Names or patterns of channels displayed after them, as in `run --channels`.
     pub picked: Vec<String>,
-    /// What is searched among the channels, and what was found.
+    /// Search text of the channel list, and its result.
     search: String,
     found: Option<(String, Vec<Entry>)>,
     /// Time window.
@@ -55,19 +55,19 @@ pub struct Plots {
     traces: Vec<Trace>,
     levels: Vec<Trace>,
     readings: Vec<Vec<PlotPoint>>,
-    /// Traces of one plot of the runs before a change.
+    /// Traces of the same plot in the runs before a change.
     before: Vec<Vec<Trace>>,
-    /// Runs before a change, whose curves are shown, too.
+    /// Runs before a change; their curves are drawn as well.
     pub comparison: Comparison,
-    /// Latest place of each plot of a quantity.
+    /// Latest screen position of each quantity's plot.
     places: Vec<(Quantity, Place)>,
-    /// Time range that the user has zoomed to, s, in place of the window.
+    /// Zoomed time range, s, which replaces the window.
     zoomed: Option<(f64, f64)>,
-    /// Where the arrow keys have moved the cursor of the plot that has the focus, s.
+    /// ID of the focused plot, and its cursor position set by arrow keys, s.
     cursor: Option<(Id, f64)>,
 }
 
-/// What of the plots is chosen: quantities, channels, time window, hidden lines.
+/// Selection of the plots: quantities, channels, time window, hidden lines.
 pub struct PlotChoice {
     chosen: Vec<Quantity>,
     picked: Vec<String>,
@@ -75,16 +75,16 @@ pub struct PlotChoice {
     hidden: Vec<usize>,
 }
 
-/// A name by which channels may be picked.
+/// A name for picking channels.
 struct Entry {
     name: String,
-    /// Units of what it stands for, separated by commas.
+    /// Units of the matching channels, separated by commas.
     units: String,
 }
 
-/// What one plot shows.
+/// Contents of a plot.
 struct Panel<'a> {
-    /// `None` where channels were picked by name.
+    /// `None` for channels picked by name.
     quantity: Option<Quantity>,
     label: &'a str,
     help: &'a str,
@@ -96,7 +96,7 @@ struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
-    /// That of `quantity`; `None` if the scene has none of it.
+    /// Panel of `quantity`; `None` if the scene does not have it.
     fn of_quantity(quantity: Quantity, player: &'a Player) -> Option<Self> {
         let list = player.channels().list().iter().enumerate();
         let members: Vec<(usize, &str)> = list
@@ -113,7 +113,7 @@ impl<'a> Panel<'a> {
         })
     }
 
-    /// Those of the channels picked by `name`, one for each unit.
+    /// Panels of the channels picked by `name`, one per unit.
     fn of_pick(name: &'a str, player: &'a Player) -> Vec<Self> {
         let mut panels: Vec<Self> = Vec::new();
         let picked = player.channels().picked().iter().zip(player.picked());
@@ -137,7 +137,7 @@ impl<'a> Panel<'a> {
         panels
     }
 
-    /// What its controls are called by: of channels picked by one name each unit has a plot.
+    /// Accessible name; for picked channels the title, since each unit has its own plot.
     fn name(&self) -> String {
         if self.quantity.is_some() { self.label.to_owned() } else { self.title() }
     }
@@ -151,7 +151,7 @@ impl<'a> Panel<'a> {
     }
 }
 
-/// Unit of the axis for a channel, and its value in SI units.
+/// Axis unit of a channel, and its value in SI units.
 fn axis_unit(channel: &Listed) -> (&'static str, f64) {
     match channel.unit {
         "m" => ("mm", 1e-3),
@@ -161,10 +161,10 @@ fn axis_unit(channel: &Listed) -> (&'static str, f64) {
     }
 }
 
-/// Most entries of the list of channels.
+/// Maximum length of the channel list.
 const MOST_FOUND: usize = 60;
 
-/// Names of channels that contain `search`, or match it as a pattern: without it, all groups of components.
+/// Names of channels that contain `search` or match it as a pattern; all component groups if it is empty.
 fn find(player: &Player, search: &str) -> Vec<Entry> {
     let list = channels_of(&player.running().machine, player.frame());
     let wanted = search.to_lowercase();
@@ -192,21 +192,21 @@ fn find(player: &Player, search: &str) -> Vec<Entry> {
     entries
 }
 
-/// Where a plot is on the screen, and its units in SI.
+/// Position of a plot on the screen, and its units in SI.
 struct Place {
     transform: PlotTransform,
     units: [f64; 2],
 }
 
 impl Plots {
-    /// The chosen quantities and the window, where they differ from those with which a window on `scene` begins.
+    /// The chosen quantities and the window, where they differ from the initial ones of a window on `scene`.
     pub fn changed(&self, scene: &Scene) -> (Option<Vec<Quantity>>, Option<PlotWindow>) {
         let first = Self::of(scene);
         let chosen = (self.chosen != first.chosen).then(|| self.chosen.clone());
         (chosen, (self.window != first.window).then_some(self.window))
     }
 
-    /// Those that a window on `scene` begins with.
+    /// Initial plots of a window on `scene`.
     pub fn of(scene: &Scene) -> Self {
         Self {
             chosen: opening::plots(scene),
@@ -226,13 +226,13 @@ impl Plots {
         }
     }
 
-    /// Shows what a window on `scene` begins with; channels picked by name stay.
+    /// Restores the initial plots of a window on `scene`; picked channels stay.
     pub fn begin(&mut self, scene: &Scene) {
         let picked = std::mem::take(&mut self.picked);
         *self = Self { picked, ..Self::of(scene) };
     }
 
-    /// Where the plot of `quantity` last drew a value (SI) at `time`, s; points of the screen. `None` if it is not shown.
+    /// Screen position, points, of a value (SI) at `time`, s, in the latest plot of `quantity`. `None` if it is not displayed.
     pub fn place(&self, quantity: Quantity, time: f64, value: f64) -> Option<Pos2> {
         let (_, place) = self.places.iter().find(|(shown, _)| *shown == quantity)?;
         let point = PlotPoint::new(time / place.units[0], value / place.units[1]);
@@ -296,7 +296,7 @@ impl Plots {
         self.channels(ui, player);
     }
 
-    /// Picking channels by name.
+    /// Controls for picking channels by name.
     fn channels(&mut self, ui: &mut Ui, player: &Player) {
         ui.add(
             TextEdit::singleline(&mut self.search)
@@ -338,7 +338,7 @@ impl Plots {
             ui.label(RichText::new(note).small().weak());
         }
         if let Some((name, on)) = toggled {
-            // Their places in the record are about to change.
+            // Their indices in the record will change.
             let first = player.picked().start;
             self.hidden.retain(|channel| *channel < first);
             self.picked.retain(|picked| *picked != name);
@@ -348,19 +348,19 @@ impl Plots {
         }
     }
 
-    /// What is chosen.
+    /// The present selection.
     pub fn choice(&self) -> PlotChoice {
         let Self { chosen, picked, window, hidden, .. } = self;
         PlotChoice { chosen: chosen.clone(), picked: picked.clone(), window: *window, hidden: hidden.clone() }
     }
 
-    /// Chooses what was chosen before.
+    /// Restores a selection.
     pub fn choose(&mut self, choice: PlotChoice) {
         PlotChoice { chosen: self.chosen, picked: self.picked, window: self.window, hidden: self.hidden } = choice;
         self.reset();
     }
 
-    /// Back to the chosen window.
+    /// Returns to the chosen window.
     pub fn reset(&mut self) {
         self.zoomed = None;
         self.found = None;
@@ -382,7 +382,7 @@ impl Plots {
         }
     }
 
-    /// Time range of the plots, s. It ends at the displayed instant, which moves to three quarters of it if there is a future.
+    /// Time range of the plots, s. It ends at the displayed instant, or up to a quarter of its length later if recorded.
     fn range(&self, player: &Player) -> (f64, f64) {
         if let Some(range) = self.zoomed {
             return range;
@@ -392,26 +392,26 @@ impl Plots {
         let length = self.window_length(player);
         let end = if self.window == PlotWindow::Everything { known } else { shown };
         let end = end.max(known.min(shown + 0.25 * length));
-        // A window that starts before t = 0 fills from the left.
+        // A window that would start before t = 0 fills from the left.
         if end < length { (0.0, length) } else { (end - length, end) }
     }
 
-    /// Titles of the chosen plots, in their order.
+    /// Titles of the chosen plots in order.
     pub fn titles(&self, player: &Player) -> Vec<String> {
         panels(&self.chosen, &self.picked, player).iter().map(Panel::title).collect()
     }
 
-    /// The chosen plots, side by side if there is room, otherwise stacked. Returns the instant that was clicked, s.
+    /// The chosen plots, side by side if there is room, otherwise stacked. Returns the clicked instant, s.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<f64> {
         self.show(ui, player, None)
     }
 
-    /// The chosen plot number `index` alone. Returns as [`Self::ui`].
+    /// Only the chosen plot number `index`. Returns as [`Self::ui`].
     pub fn single(&mut self, ui: &mut Ui, player: &Player, index: usize) -> Option<f64> {
         self.show(ui, player, Some(index))
     }
 
-    /// The same in a second window: where plots are in the first stays known.
+    /// The same in a second window; recorded plot positions of the first window are preserved.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn second(&mut self, ui: &mut Ui, player: &Player, index: usize) {
         let places = std::mem::take(&mut self.places);
@@ -435,7 +435,7 @@ impl Plots {
         let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
         let rows = chosen.len().div_ceil(columns);
         let gap = ui.spacing().item_spacing;
-        // The last mark of the axis below reaches beyond the plot.
+        // The last mark of the lower axis extends beyond the plot.
         let width = (space.x - 16.0 - gap.x * (columns - 1) as f32) / columns as f32;
         let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(LEAST_HEIGHT);
         egui::ScrollArea::vertical().id_salt("plots").show(ui, |ui| {
@@ -462,7 +462,7 @@ impl Plots {
         let members = &panel.members;
         let dark = ui.visuals().dark_mode;
         let faint = ui.visuals().weak_text_color();
-        // No bin is wider than a pixel column, as long as the record has such bins.
+        // No bin is wider than a pixel column, if the record's resolution permits.
         let bins = (2.0 * space.x * ui.ctx().pixels_per_point()) as usize;
         let query = |channel: usize, out: &mut Vec<Bin>| {
             out.clear();
@@ -485,7 +485,7 @@ impl Plots {
         }
         self.levels.clear();
         if kind == PlotKind::FromZeroWithClearances {
-            // As recorded: the present value says nothing about the past.
+            // The recorded clearance: the present value may differ from the past one.
             for index in player.clearances() {
                 let mut trace = Trace { colour: faint, ..Trace::default() };
                 query(index, &mut trace.bins);
@@ -525,7 +525,7 @@ impl Plots {
             let across = axis(AxisHints::new_x()).label_spacing(Rangef::new(0.0, 1.0)).formatter(move |mark, range| {
                 let words = time_mark(&mark);
                 let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
-                // Omit one that would reach into the next plot.
+                // Omits a mark that would extend into the next plot.
                 if 0.5 * LETTER * words.chars().count() as f64 > beyond + 28.0 {
                     return String::new();
                 }
@@ -537,7 +537,7 @@ impl Plots {
                     short_tick(mark.value, mark.step_size, most)
                 },
             );
-            // Late times have long numbers, of which fewer fit side by side.
+            // Marks at late times have long labels, so fewer fit side by side.
             let letters = |mark: &GridMark| time_mark(mark).chars().count();
             let marks_across = move |input: GridInput| {
                 let marks = marks(&input, MARKS);
@@ -566,7 +566,7 @@ impl Plots {
                 .grid_fade(0.0);
             let Self { traces, levels, readings, hidden, comparison, before, .. } = &*self;
             let instant = |time: f64| format!("{} {time_unit}", value::number(time / time_size, earliest));
-            // All curves at an instant, behind these words.
+            // All curves at an instant, appended to `words`.
             let reading = |time: f64, mut words: String, between: &str| {
                 for ((_, member), trace) in members.iter().zip(traces) {
                     let Some((least, greatest)) = trace.at(time) else {
@@ -594,7 +594,7 @@ impl Plots {
                         plot.add(
                             FilledArea::new(band.member, &band.times, &band.low, &band.high)
                                 .fill_color(band.colour.gamma_multiply(0.75))
-                                // Edges would jump where a term changes sides.
+                                // Strokes would jump where a term changes sign.
                                 .stroke(egui::Stroke::NONE),
                         );
                     }
@@ -622,7 +622,7 @@ impl Plots {
             let cursor = self.cursor.and_then(|(plot, time)| (plot == own).then_some(time));
             ui.ctx().accesskit_node_builder(own, |node| {
                 if let Some(time) = cursor {
-                    // Read out as it moves.
+                    // Read aloud as the cursor moves.
                     node.set_live(Live::Polite);
                     let values = reading(time, String::new(), ", ");
                     let values = values.trim_start_matches(", ");
@@ -650,7 +650,7 @@ impl Plots {
             if (from..to).contains(&now)
                 && (player.has_future() || self.zoomed.is_some() || player.abandoned_future().is_some())
             {
-                // The future is pale.
+                // Fades the future.
                 let painter = ui.painter_at(frame);
                 let veil = ui.visuals().panel_fill.gamma_multiply(0.65);
                 painter.rect_filled(frame.with_min_x(x(now)), 0.0, veil);
@@ -674,7 +674,7 @@ impl Plots {
         .inner
     }
 
-    /// Arrow keys on a plot that has the focus: an instant to read its values at.
+    /// Arrow keys on a focused plot move the cursor to an instant.
     fn move_cursor(&mut self, ui: &Ui, response: &egui::Response, player: &Player) {
         if !response.has_focus() {
             self.cursor = self.cursor.filter(|(plot, _)| *plot != response.id);
@@ -688,7 +688,7 @@ impl Plots {
             let (from, to) = self.range(player);
             let before = self.cursor.map_or(player.pacer.shown(), |(_, time)| time);
             let wanted = before + by * NUDGE * (to - from);
-            // A recorded instant, and never the same again.
+            // A recorded instant, and always a new one.
             let all = self.traces.iter().flat_map(|trace| &trace.bins).map(|bin| 0.5 * (bin.from + bin.to));
             let ahead = all.filter(|time| (time - before) * by > 0.0);
             let nearest = ahead.min_by(|a, b| (a - wanted).abs().total_cmp(&(b - wanted).abs()));
@@ -699,7 +699,7 @@ impl Plots {
         }
     }
 
-    /// Pointer input on a plot: another time range, or the instant that is returned, s.
+    /// Pointer input on a plot: changes the time range, or returns an instant, s.
     fn pointer(
         &mut self,
         ui: &Ui,
@@ -733,7 +733,7 @@ impl Plots {
         clicked.flatten().map(time).filter(|time| *time <= player.reached())
     }
 
-    /// The terms of the energy balance, stacked: energy supplied above zero, energy absorbed or stored below.
+    /// The stacked terms of the energy balance: supplied energy above zero, absorbed or stored energy below.
     fn bands<'a>(&self, members: &[(usize, &'a str)], units: [f64; 2]) -> Vec<Band<'a>> {
         let mut bands: Vec<Band<'a>> = Vec::new();
         let mut terms = Vec::new();
@@ -760,7 +760,7 @@ impl Plots {
         bands
     }
 
-    /// What is shown with its unit, and its members as switches in the colours of their lines.
+    /// Title with unit, and switches of the members in the colours of their lines.
     fn title(&mut self, ui: &mut Ui, player: &Player, panel: &Panel<'_>) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
@@ -796,7 +796,7 @@ impl Plots {
     }
 }
 
-/// The least and the greatest value of all curves, SI, and where the greatest is: its curve, and its time, s.
+/// Least and greatest value of all curves, SI, with the curve and the time, s, of the greatest.
 fn largest<'a>(members: &[(usize, &'a str)], traces: &[Trace]) -> Option<(&'a str, f64, f64, f64)> {
     let mut found: Option<(&str, f64, f64, f64)> = None;
     for ((_, member), trace) in members.iter().zip(traces) {
@@ -813,7 +813,7 @@ fn largest<'a>(members: &[(usize, &'a str)], traces: &[Trace]) -> Option<(&'a st
     found
 }
 
-/// What `kept` recorded of the members of `panel`, from and to these instants, s, in at most so many bins.
+/// Record of the members of `panel` in `kept` between two instants, s, with a limited number of bins.
 fn before(
     kept: &Kept,
     player: &Player,
@@ -833,14 +833,14 @@ fn before(
     seen.map(trace).collect()
 }
 
-/// Those of the `chosen` quantities and of the channels `picked` by name.
+/// Panels of the `chosen` quantities and of the channels `picked` by name.
 fn panels<'a>(chosen: &[Quantity], picked: &'a [String], player: &'a Player) -> Vec<Panel<'a>> {
     let of_quantity = |quantity: &Quantity| Panel::of_quantity(*quantity, player);
     let of_picks = picked.iter().flat_map(|name| Panel::of_pick(name, player));
     chosen.iter().filter_map(of_quantity).chain(of_picks).collect()
 }
 
-/// One term of a stack, in the units of the axes.
+/// One term of a stack, in axis units.
 struct Band<'a> {
     member: &'a str,
     colour: egui::Color32,
@@ -854,14 +854,14 @@ fn widened(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f
     Some((a.min(least), b.max(greatest)))
 }
 
-/// The least and the greatest value in `traces`, in units of `size`.
+/// Least and greatest value in `traces`, in units of `size`.
 fn extremes<'a>(traces: impl Iterator<Item = &'a Trace>, size: f64) -> Option<(f64, f64)> {
     let bins = traces.flat_map(|trace| &trace.bins);
     bins.fold(None, |all, bin| widened(all, bin.least / size, bin.greatest / size))
 }
 
-/// Axis range for values in a range, or for none: all of them with a margin, or a range in which they look flat if they differ
-/// by rounding only.
+/// Axis range for a range of values, or for none: with a margin, or wide enough to look flat if the values differ only by
+/// rounding.
 fn range(values: Option<(f64, f64)>, from_zero: bool) -> (f64, f64) {
     let (mut least, mut greatest) = values.unwrap_or((0.0, 0.0));
     if from_zero {
@@ -918,7 +918,7 @@ impl PlotWindow {
     }
 }
 
-/// Unit of a time axis of this length, and its size in seconds.
+/// Unit of a time axis of this length, and its value in seconds.
 pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
     if length >= 0.5 {
         ("s", 1.0)
@@ -929,30 +929,30 @@ pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
     }
 }
 
-/// The same for an axis that ends at `to`, s: late times have a larger unit, with decimals.
+/// The same for an axis that ends at `to`, s: late times use a larger unit with decimals.
 fn time_axis_until(length: f64, to: f64) -> (&'static str, f64) {
-    // As long as five digits stand before the point.
+    // Limits labels to five digits before the decimal point.
     let longest = [5e-4, 0.5].into_iter().zip([0.1, 100.0]);
     let least = longest.filter(|(_, end)| to >= *end).map(|(length, _)| length);
     time_axis(least.fold(length, f64::max))
 }
 
-/// Label of a mark on an axis that reaches to `most` with marks `step` apart: enough digits to tell it from its neighbours.
+/// Label of a mark on an axis up to `most` with mark distance `step`: enough digits to distinguish neighbours.
 pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
     written(mark, step, (1e-4..1e9).contains(&most))
 }
 
-/// The same beside a plot, where there is room for four digits: `2e4`. With more the plot would move when a peak is that high.
+/// The same beside a plot, with room for four digits: `2e4`. More digits would move the plot at a high peak.
 fn short_tick(mark: f64, step: f64, most: f64) -> String {
     written(mark, step, (1e-4..1e4).contains(&most))
 }
 
-/// A mark of an axis in digits, or else by a power of ten.
+/// A mark's label in plain digits or with a power of ten.
 fn written(mark: f64, step: f64, in_digits: bool) -> String {
     if mark.abs() < 1e-6 * step {
         return "0".to_owned();
     }
-    // A step of 2.5 has a digit more than one of 2.
+    // A step of 2.5 needs one digit more than a step of 2.
     let power = step.log10().floor() as i32;
     let mantissa = step / 10_f64.powi(power);
     let last = power - i32::from((mantissa - mantissa.round()).abs() > 1e-6);
@@ -1017,7 +1017,7 @@ mod tests {
 
     #[test]
     fn rounding_is_drawn_flat_and_motion_is_not() {
-        // An empty plot has an axis, too, and its zero is on it.
+        // An empty plot also has an axis that includes zero.
         assert_eq!(range(None, true), (-0.05, 1.05));
         assert_eq!(range(Some((0.0, 0.0)), true), (-0.05, 1.05));
         assert_eq!(range(Some((0.0, 0.0)), false), (-1.1, 1.1));

@@ -1,5 +1,5 @@
-//! Presentation: the picture with large type and thick arrows, time, transport and one plot, for a projector and the last row. It
-//! changes nothing of the run.
+//! Presentation for a projector and the last row: the picture with large type and thick arrows, time, transport and one plot. It
+//! does not affect the run.
 
 use std::sync::Arc;
 
@@ -7,17 +7,17 @@ use eframe::egui::{self, Align2, FontId, Galley, Id, Panel, Rect, Sense, Ui, Vec
 
 use super::{App, overlay, spoken, theme, transport, value};
 
-/// Least height of a text as a share of the screen's: what the last row of a lecture hall can read.
+/// Least text height as a fraction of the screen height, legible from the last row of a lecture hall.
 const LEAST_TEXT: f32 = 1.0 / 40.0;
-/// Smallest type of the interface, points: that of the ticks of the arrows' legend.
+/// Smallest type of the interface, points: tick labels of the arrows' legend.
 const SMALLEST: f32 = 11.0;
 /// Type of the caption, points.
 const CAPTION: f32 = 24.0;
 /// Type of the badge of an impact in a window, points.
 const BADGE: f32 = 15.0;
-/// Room about its words, points.
+/// Padding around its text, points.
 const PAD: Vec2 = vec2(12.0, 4.0);
-/// Width that the time takes in the corner of the picture, points.
+/// Width of the time in the corner of the picture, points.
 const TIME: f32 = 170.0;
 /// Least height of the plots, points.
 const LEAST_PLOTS: f32 = 130.0;
@@ -25,27 +25,27 @@ const LEAST_PLOTS: f32 = 130.0;
 const BESIDE: f32 = 700.0;
 /// Width of the buttons at the right end of the bar, points.
 const BUTTONS: f32 = 150.0;
-/// How much thicker arrows are.
+/// Thickness of arrows relative to the normal view.
 pub(super) const THICKNESS: f32 = 2.0;
-/// Change of the screen's height that the type follows, as a share of it.
+/// Least relative change of the screen height that changes the type size.
 const FOLLOWED: f32 = 0.02;
 
-/// What was before, and how the screen is.
+/// Settings to restore, and the screen height.
 pub struct Presentation {
-    /// Zoom of the interface before.
+    /// Previous zoom of the interface.
     zoom: f32,
-    /// Thickness of arrows before.
+    /// Previous thickness of arrows.
     thickness: f32,
-    /// Height of the screen that the type was sized for, points at zoom 1.
+    /// Screen height for which the type was sized, points at zoom 1.
     height: f32,
 }
 
-/// Height of the plots below the picture in what is left of `ui`, points.
+/// Height of the plots below the picture in the rest of `ui`, points.
 pub(super) fn plots_height(ui: &Ui) -> f32 {
     (0.36 * ui.available_height()).max(LEAST_PLOTS)
 }
 
-/// What controls and picture need at least, points, and how much smaller than their own size they may get for it.
+/// Least size for controls and picture, points, and smallest zoom that makes room for them.
 const LEAST_WINDOW: egui::Vec2 = egui::vec2(320.0, 300.0);
 const LEAST_ZOOM: f32 = 0.5;
 
@@ -84,24 +84,24 @@ impl App {
         self.host.fill_screen(ctx, on);
     }
 
-    /// Whether it is a presentation.
+    /// Whether a presentation is active.
     pub fn is_presenting(&self) -> bool {
         self.presentation.is_some()
     }
 
-    /// Zoom of the interface, but for that of a presentation.
+    /// Zoom of the interface without that of a presentation.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn own_zoom(&self, ctx: &egui::Context) -> f32 {
         let shown = || self.squeezed.unwrap_or_else(|| ctx.zoom_factor());
         self.presentation.as_ref().map_or_else(shown, |presentation| presentation.zoom)
     }
 
-    /// Which of the chosen plots a presentation and the window for the class show, if any.
+    /// The plot shown in a presentation and in the audience window, if any.
     pub fn single_plot(&self) -> Option<usize> {
         self.single_plot.filter(|index| *index < self.plots.titles(&self.player).len())
     }
 
-    /// Shows the next of the chosen plots, and none after the last; in a presented lesson all of them, or none.
+    /// Shows the next of the chosen plots, or none after the last; in a presented lesson toggles between all and none.
     pub(super) fn turn_plot(&mut self) {
         if self.is_presenting() && self.course().is_some() {
             self.show_plots = !self.show_plots;
@@ -112,14 +112,14 @@ impl App {
         self.single_plot = self.single_plot();
     }
 
-    /// Sizes the type for the screen, once its size has changed: on the way to the full screen and back.
+    /// Sizes the type for the screen after a size change, e.g. when entering or leaving full screen.
     pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
         let Some(presentation) = &mut self.presentation else {
             return self.squeeze(ctx);
         };
         let height = screen_height(ctx);
         let change = (height - presentation.height).abs();
-        // A pass later the new zoom is in force: only then the height is that of the screen.
+        // The new zoom takes effect a pass later; only then the height is that of the screen.
         let settled = (ctx.zoom_factor() - legible(presentation.height)).abs() < 1e-3;
         if settled && change > FOLLOWED * presentation.height {
             presentation.height = height;
@@ -127,7 +127,7 @@ impl App {
         }
     }
 
-    /// Makes everything smaller in a window that is too small for its controls, as on a page at four times the size.
+    /// Reduces the zoom in a window that is too small for its controls, e.g. on a page zoomed to four times the size.
     fn squeeze(&mut self, ctx: &egui::Context) {
         let now = ctx.zoom_factor();
         let own = self.squeezed.unwrap_or(now);
@@ -139,7 +139,7 @@ impl App {
         }
     }
 
-    /// The whole of the window.
+    /// Contents of the whole window.
     pub(super) fn presentation_ui(&mut self, ui: &mut Ui) {
         let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
         let free = !self.is_under_way();
@@ -148,7 +148,7 @@ impl App {
             .frame(bar)
             .show(ui, |ui| {
                 leave = double_tapped(ui);
-                // A lesson needs the height: there the timeline has what is left of the row.
+                // A lesson needs the height, so the timeline gets the rest of the row.
                 let teaching = self.course().is_some();
                 if !teaching {
                     ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
@@ -192,7 +192,7 @@ impl App {
         }
     }
 
-    /// Those at the right end of the bar, from right to left. Returns whether the presentation is to end.
+    /// The buttons at the right end of the bar, from right to left. Returns whether to end the presentation.
     fn presentation_buttons(&mut self, ui: &mut Ui) -> bool {
         let help = "Back to the window with its panels (F5, Esc, double-tap on this bar)";
         let leave = ui.button("Leave").on_hover_text(help).clicked();
@@ -204,7 +204,7 @@ impl App {
         leave
     }
 
-    /// The plot that was turned to; in a lesson that speaks of plots all of them.
+    /// The selected plot; in a lesson that refers to plots, all of them.
     fn presented_plots(&mut self, ui: &mut Ui, bar: egui::Frame) {
         let teaching = self.course().is_some();
         let single = self.single_plot().filter(|_| !teaching);
@@ -227,7 +227,7 @@ impl App {
         });
     }
 
-    /// The last finished impact: ball joint, largest normal force, how long it lasted.
+    /// The last finished impact: ball joint, largest normal force, duration.
     pub fn last_impact(&self) -> Option<String> {
         let player = &self.player;
         let shown = player.pacer.shown();
@@ -238,8 +238,8 @@ impl App {
         Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
     }
 
-    /// The words of the caption and the plate they stand on in the picture's `area`: the impact under way at an instant that is looked at; when
-    /// `presenting`, otherwise, the last one that ended.
+    /// Text of the caption and its plate in the picture's `area`: the impact at the inspected instant; when `presenting`,
+    /// otherwise, the last finished one.
     pub(super) fn caption_plate(&self, ui: &Ui, area: Rect, presenting: bool) -> Option<(Arc<Galley>, Rect)> {
         let ink = ui.visuals().strong_text_color();
         if !presenting && (!overlay::has_room(area) || self.picture.is_plain()) {
@@ -254,7 +254,7 @@ impl App {
         let full = if presenting { CAPTION } else { BADGE };
         let room = inside.width() - 2.0 * PAD.x;
         let lay = |size: f32| {
-            // What is too long even in the smallest type has a second line.
+            // Text too long in the smallest type wraps to a second line.
             let width = if size > SMALLEST { f32::INFINITY } else { room };
             ui.painter().layout(text.clone(), FontId::proportional(size), ink, width)
         };
@@ -263,8 +263,8 @@ impl App {
             words = lay((full * room / words.size().x).max(SMALLEST));
         }
         let middle = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
-        // Beside a lesson there is no room in the middle: the time stands on the left. Beside the microscope, too, there is
-        // room below the time alone.
+        // Beside a lesson the middle is too narrow, so the time is on the left. Beside the microscope, too, there is room only
+        // below the time.
         let place = if !presenting || middle.left() >= area.left() + TIME {
             middle
         } else {
@@ -276,7 +276,7 @@ impl App {
         Some((words, place.expand2(PAD)))
     }
 
-    /// Writes that caption over the picture in `area`.
+    /// Draws the caption over the picture in `area`.
     pub(super) fn caption(&self, ui: &Ui, area: Rect, caption: Option<(Arc<Galley>, Rect)>) {
         let Some((words, plate)) = caption else {
             return;
@@ -297,8 +297,8 @@ impl App {
     }
 }
 
-/// Names the bar that fills `ui` for screen readers. Whether it is double-clicked or double-tapped where it holds nothing else. Comes
-/// before its contents, which lie over it.
+/// Names the bar that fills `ui` for screen readers. Returns whether its empty part was double-clicked or double-tapped. Call it
+/// before adding the contents, which take precedence.
 pub fn double_tapped(ui: &Ui) -> bool {
     spoken::landmark(ui, "Transport");
     let bar: Rect = ui.max_rect();

@@ -1,4 +1,4 @@
-//! Pulling on a body: a press and a drag attach a spring from the pressed point to the pointer.
+//! Pulling a body: press and drag attach a spring from the pressed point to the pointer.
 
 use glam::{Vec2, Vec3};
 
@@ -7,16 +7,16 @@ use crate::machine::Vec3 as Exact;
 use crate::simulate::Pull;
 use crate::view::{Camera, Hit, Picked};
 
-/// What a pointer holds.
+/// A grip of the pointer on a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Grip {
     pull: Pull,
-    /// Where the pointer holds it now, m.
+    /// Position of the pointer end of the spring, m.
     hand: Vec3,
 }
 
 impl Grip {
-    /// Takes hold of what was hit; `None` if it does not move.
+    /// Grips the body at `hit`; `None` if it cannot move.
     pub fn new(player: &Player, hit: Hit) -> Option<Self> {
         let scene = player.running();
         let body = match hit.what {
@@ -30,8 +30,7 @@ impl Grip {
         Some(Self { pull: Pull::softly(&scene.machine, body, inside, point), hand: hit.point })
     }
 
-    /// The pointer has moved to `pixel`: the hand moves parallel to the picture or, with `depth`, along the line of sight (up
-    /// is away).
+    /// Moves the hand to `pixel`: parallel to the picture plane or, with `depth`, along the line of sight (up is away).
     pub fn drag(&mut self, camera: &Camera, pixel: Vec2, moved: Vec2, size: [u32; 2], depth: bool) {
         let (eye, ray) = camera.ray(pixel, size);
         let (_, _, back) = camera.axes();
@@ -46,7 +45,7 @@ impl Grip {
         }
     }
 
-    /// As input to the run.
+    /// The pull as input to the run.
     pub fn pull(&self) -> Pull {
         Pull { hand: Exact::from(self.hand.to_array().map(f64::from)), ..self.pull }
     }
@@ -89,7 +88,7 @@ mod tests {
         let moved = grip.hand - before;
         assert!(moved.dot(back) < 0.0 && moved.cross(back).length() < 1e-6);
 
-        // The force is the spring's, and what it does is in the energy balance.
+        // The spring force acts on the body, and its work appears in the energy balance.
         player.pull(Some(grip.pull())).expect("in reach");
         let pulled = player.frame().pull.expect("pulls");
         let expected = f64::from(stretch(&grip, &player)) * grip.pull.stiffness;
@@ -101,7 +100,7 @@ mod tests {
         assert!(ledger.residual().abs() < 1e-3 * ledger.external_work.abs(), "{ledger:?}");
         player.pull(None).expect("lets go");
         let work = |player: &Player| player.frame().ledger.expect("kept").external_work;
-        // The rest of the displayed step was pulled, too.
+        // The pull also acts in the rest of the displayed step.
         player.run_to(0.41);
         let pulled = work(&player);
         player.run_to(0.5);

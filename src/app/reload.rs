@@ -1,4 +1,4 @@
-//! The scene file that is shown is loaded again when it, or a file that it names, is saved elsewhere.
+//! Reloads the displayed scene file when another program saves it or a file it refers to.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,22 @@ use super::App;
 use super::host::OpenedFile;
 use crate::scene::{Scene, SceneError};
 
-/// Stepping time within which the instant shown before must be reached again, s; otherwise the run begins at 0.
+/// Longest stepping time, s, to reach the previously displayed instant again; otherwise the run restarts at 0.
 const QUICK: f64 = 0.4;
 
-/// The file that the shown scene was read from, if any.
+/// The file of the displayed scene, if any.
 #[derive(Debug, Default)]
 pub(super) struct SceneFile {
     name: Option<String>,
-    /// Files beside it that the host watches, too; `None` if the host was not told.
+    /// Referenced files that the host also watches; `None` until the host is told.
     told: Option<Vec<String>>,
-    /// The file beside it in which there is an error. The shown scene may be without it.
+    /// The referenced file with an error. The displayed scene may lack it.
     wrong: Option<String>,
-    /// Files that were opened together with it.
+    /// Files opened together with the scene file.
     given: Given,
-    /// The changes that are in a file, or came with the scene: those at the first look.
+    /// Changes stored in a file or delivered with the scene: those at the first check.
     saved: Option<Changes>,
-    /// Whether the user has saved the scene here.
+    /// Whether the user saved the scene in this window.
     saved_here: bool,
 }
 
@@ -34,42 +34,42 @@ type Changes = Vec<(String, String)>;
 pub(super) type Given = BTreeMap<String, Vec<u8>>;
 
 impl SceneFile {
-    /// The file `name`, as the user named it; the host is to be told.
+    /// The file `name` as entered by the user; the host is not told yet.
     pub(super) fn named(name: Option<String>) -> Self {
         Self { name, ..Self::default() }
     }
 
-    /// The file `name`, opened together with those `given`.
+    /// The file `name`, opened together with the files `given`.
     pub(super) fn opened(name: String, given: Given) -> Self {
         Self { given, ..Self::named(Some(name)) }
     }
 
-    /// The scene is saved with `changes` in it.
+    /// Records that the scene was saved with `changes`.
     pub(super) fn saved_with(&mut self, changes: Changes) {
         self.saved = Some(changes);
         self.saved_here = true;
     }
 
-    /// Whether `changes` are those that are saved; `None` before the first look.
+    /// Whether `changes` equal the saved ones; `None` before the first check.
     pub(super) fn is_saved_with(&self, changes: &Changes) -> Option<bool> {
         Some(self.saved.as_ref()? == changes)
     }
 
-    /// Whether there is a file with the scene.
+    /// Whether the scene is stored in a file.
     pub(super) fn is_in_file(&self) -> bool {
         self.saved_here || self.name.is_some()
     }
 
-    /// The file.
+    /// Name of the file.
     pub(super) fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 }
 
 impl App {
-    /// Lets the host watch the files of the scene, and loads it again if one was saved.
+    /// Makes the host watch the files of the scene, and reloads the scene after a save.
     pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
-        // The changes of a link come on its way.
+        // The changes of a link arrive with its replay.
         let there = self.replay.is_none();
         let file = &mut self.scene_file;
         let wanted = self.player.pending();
@@ -87,7 +87,7 @@ impl App {
             file.told = Some(names);
         }
         while let Some(file) = self.host.saved_elsewhere() {
-            // The latest message may come from a file that is no longer shown.
+            // The latest message may concern a file that is no longer displayed.
             if self.scene_file.name() == Some(&file.name)
                 && let Err(reason) = self.reload(file)
             {
@@ -96,7 +96,7 @@ impl App {
         }
     }
 
-    /// Parses `text`, which the file `name` holds, with the files that it names as they are now, or as they were `given` with it.
+    /// Parses `text`, the content of the file `name`, with the files it refers to as they are now, or as `given` with it.
     pub(super) fn parse_file(
         &self,
         name: &str,
@@ -108,8 +108,8 @@ impl App {
         Scene::parse_given(text, Some(name), given, folder.as_deref(), changes)
     }
 
-    /// Shows the scene of `file`, with what was changed here unless the file now says something else. View, plots and, if that
-    /// is quick, the instant stay. On an error the running scene stays.
+    /// Shows the scene of `file` with the changes made here, except where the file now has a different value. View and plots are
+    /// preserved, and so is the instant if it is reached quickly. On an error the running scene is unchanged.
     fn reload(&mut self, file: OpenedFile) -> Result<(), String> {
         let name = file.name;
         let bytes = file.content.map_err(|reason| format!("{name}: {reason}"))?;
@@ -120,7 +120,7 @@ impl App {
         let same = text == source.text;
         let given = self.scene_file.given.clone();
         if same && (self.parse_file(&name, &text, &given, &wanted.changes)).is_ok_and(again) {
-            // Saved as it was, or back to it after an error.
+            // Saved without changes, or reverted after an error.
             self.problem = None;
             self.scene_file.wrong = None;
             return Ok(());
@@ -180,14 +180,14 @@ impl App {
         Ok(())
     }
 
-    /// Runs to `time`, s, if that is quick; otherwise the run is at its start afterwards. Whether it went there, or as far as
-    /// the run goes.
+    /// Runs to `time`, s, if that is quick; otherwise the run is at its start afterwards. Returns whether it reached that instant
+    /// or the end of the run.
     fn reach(&mut self, time: f64) -> bool {
         let clock = self.player.clock;
         let start = clock();
         let reached = self.player.run_towards(time, || clock() - start < QUICK);
         if !reached {
-            // It has just started from there: it does so again.
+            // The reloaded run starts again from its beginning.
             self.reset();
         }
         reached

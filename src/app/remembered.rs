@@ -1,5 +1,5 @@
-//! What the desktop window begins with the next time: its size, theme, type size, scene, and recent files. A window of a test and a
-//! headless frame have no [`Store`]: they neither read nor write one.
+//! Settings of the desktop window across sessions: size, theme, type size, scene, and recent files. Test windows and headless
+//! frames have no [`Store`] and neither read nor write settings.
 
 use std::path::{Path, PathBuf};
 
@@ -16,38 +16,38 @@ use crate::session::link::ThemeChoice;
 use crate::simulate::Simulation;
 use crate::words::Words as _;
 
-/// Most recent files that are listed.
+/// Length of the list of recent files.
 const MOST_RECENT: usize = 8;
 /// Least time between two writes while the window changes, s.
 const PAUSE: f64 = 5.0;
-/// Sizes of a window and zooms of its type that are believed, points and factor.
+/// Plausible window lengths, points, and zoom factors.
 const SIZES: std::ops::RangeInclusive<f32> = 200.0..=20_000.0;
 const ZOOMS: std::ops::RangeInclusive<f32> = 0.2..=5.0;
-/// Size with which the window opens for the first time, points.
+/// Initial size of the window, points.
 pub(super) const FIRST_SIZE: [f32; 2] = [1280.0, 800.0];
 
-/// What is remembered.
+/// The stored settings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Remembered {
-    /// Size inside the frame of the window, points at zoom 1.
+    /// Inner size of the window, points at zoom 1.
     pub size: Option<[f32; 2]>,
-    /// Upper left corner of the frame, points at zoom 1; not known on every platform.
+    /// Outer position of the window, points at zoom 1; unavailable on some platforms.
     pub position: Option<[f32; 2]>,
-    /// Whether the window fills the screen, with its frame.
+    /// Whether the window is maximized.
     pub maximized: bool,
     /// `light`, `dark` or `system`.
     pub theme: Option<String>,
     /// Zoom of the interface.
     pub zoom: Option<f32>,
-    /// File or name of the last scene; `None` for what a visitor meets.
+    /// File or name of the last scene; `None` for the first-time scene.
     pub scene: Option<String>,
-    /// Scene files that were opened or saved, the latest first.
+    /// Opened or saved scene files, latest first.
     pub recent: Vec<String>,
 }
 
 impl Remembered {
-    /// Without what no window can have.
+    /// Discards implausible values.
     fn believed(mut self) -> Self {
         self.size = self.size.filter(|size| size.iter().all(|length| SIZES.contains(length)));
         self.position = self.position.filter(|place| place.iter().all(|place| place.abs() <= *SIZES.end()));
@@ -60,7 +60,7 @@ impl Remembered {
         ThemeChoice::of_word(self.theme.as_deref()?).map(theme::preference)
     }
 
-    /// Lists `file` first.
+    /// Moves `file` to the head of the list.
     fn add_recent(&mut self, file: String) {
         self.recent.retain(|other| *other != file);
         self.recent.insert(0, file);
@@ -68,20 +68,20 @@ impl Remembered {
     }
 }
 
-/// The file in which it is kept.
+/// The settings file.
 pub struct Store {
     path: PathBuf,
-    /// As it is now, and as it stands in the file.
+    /// Current settings, and those in the file.
     now: Remembered,
     written: Remembered,
-    /// When it may be written again, s of viewing.
+    /// Earliest time of the next write, s of viewing.
     due: f64,
-    /// Zoom of the frame before.
+    /// Zoom in the previous frame.
     scale: f32,
 }
 
 impl Store {
-    /// The one of this user; `None` where users have no folder for such files.
+    /// The settings file of the current user; `None` if there is no folder for it.
     pub fn of_user() -> Option<Self> {
         let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
         let data = if cfg!(windows) {
@@ -94,26 +94,26 @@ impl Store {
         Some(Self::at(data?.join("jointplay").join("window.json")))
     }
 
-    /// The one in the file `path`. What cannot be read is as good as missing.
+    /// The settings in the file `path`. An unreadable file counts as missing.
     pub fn at(path: PathBuf) -> Self {
         let read = || -> Option<Remembered> { serde_json::from_slice(&std::fs::read(&path).ok()?).ok() };
         let now = read().unwrap_or_default().believed();
         Self { path, written: now.clone(), now, due: f64::NEG_INFINITY, scale: 0.0 }
     }
 
-    /// What it holds.
+    /// The current settings.
     pub fn remembered(&self) -> &Remembered {
         &self.now
     }
 
-    /// Forgets everything.
+    /// Resets all settings.
     pub fn forget(&mut self) {
         self.now = Remembered::default();
         self.write();
     }
 
-    /// What a window begins with that was asked for nothing: the last scene. One that is gone or broken is named in the message, and
-    /// the first scene opened.
+    /// Options of a window without arguments: the last scene. If that is missing or invalid, the message names it, and the
+    /// first-time scene is opened.
     pub fn begin(&self) -> AppOptions {
         let Some(name) = &self.now.scene else {
             return AppOptions::first();
@@ -130,7 +130,7 @@ impl Store {
         })
     }
 
-    /// Writes it to the file, if something has changed. A failure is no reason to disturb anybody: it is only logged.
+    /// Writes changed settings to the file. Errors are only logged.
     pub fn write(&mut self) {
         if self.now == self.written {
             return;
@@ -150,7 +150,7 @@ impl Store {
 }
 
 impl App {
-    /// Begins with theme and type size of `store`, unless something else was asked for, and keeps it up to date from now on.
+    /// Applies theme and type size from `store`, unless other values were requested, and records settings in it from now on.
     pub fn remember_in(&mut self, ctx: &egui::Context, store: Store) {
         let theme = ctx.options(|options| options.theme_preference);
         if let Some(wanted) = store.now.theme().filter(|_| theme == ThemePreference::System) {
@@ -162,7 +162,7 @@ impl App {
         self.store = Some(store);
     }
 
-    /// Notes how the window is.
+    /// Records the settings of the window.
     pub(super) fn remember(&mut self, ctx: &egui::Context) {
         let (scale, zoom) = (ctx.zoom_factor(), self.own_zoom(ctx));
         let whole_screen = self.is_presenting();
@@ -175,7 +175,7 @@ impl App {
         };
         let before = (store.now.scene.clone(), store.now.recent.len());
         let now = &mut store.now;
-        // In the frame in which the zoom changes the window is still measured by the one before.
+        // In the frame of a zoom change, the window size still uses the old zoom.
         let settled = std::mem::replace(&mut store.scale, scale) == scale;
         ctx.input(|input| {
             let window = input.viewport();
@@ -213,7 +213,7 @@ impl App {
         }
     }
 
-    /// Lists the scene among saved `files` as recent.
+    /// Adds the scene among the saved `files` to the recent files.
     pub(super) fn note_recent(&mut self, files: &[SaveFile]) {
         if let Some(store) = &mut self.store {
             for file in files.iter().filter(|file| file.mime == SCENE_TYPE) {
@@ -222,12 +222,12 @@ impl App {
         }
     }
 
-    /// Whether the window is remembered.
+    /// Whether settings are stored.
     pub(super) fn is_remembered(&self) -> bool {
         self.store.is_some()
     }
 
-    /// Menu entries: the recent files.
+    /// Menu entries of the recent files.
     pub(super) fn recent_entries(&mut self, ui: &mut Ui) {
         let recent = self.store.as_ref().map_or(&[][..], |store| &store.now.recent);
         let mut chosen = None;
@@ -246,7 +246,7 @@ impl App {
         }
     }
 
-    /// Menu entry: starts as new.
+    /// Menu entry that resets all settings.
     pub(super) fn new_entry(&mut self, ui: &mut Ui) {
         let help = "As if for the first time: forgets window size, theme, type size, last scene and recent files";
         if ui.button("Start as new…").on_hover_text(help).clicked() {
@@ -255,7 +255,7 @@ impl App {
         }
     }
 
-    /// Starts as if for the first time, and forgets what was.
+    /// Resets all settings and opens the first-time scene.
     pub(super) fn start_as_new(&mut self, ctx: &egui::Context) {
         self.present(ctx, false);
         let options = AppOptions { clock: self.player.clock, ..AppOptions::first() };
@@ -275,19 +275,19 @@ impl App {
         }
         ctx.set_zoom_factor(1.0);
         ctx.send_viewport_cmd(egui::ViewportCommand::Maximized(false));
-        // In points of the zoom that is still in force when this arrives.
+        // In points at the zoom still in effect when the command arrives.
         let size = egui::Vec2::from(FIRST_SIZE) / ctx.zoom_factor();
         ctx.send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
     }
 }
 
-/// Whether the scene `name` may be there: a file that was can be gone.
+/// Checks that the scene `name` exists; its file may have been removed.
 fn is_there(name: &str) -> Result<(), String> {
     let path = Path::new(name);
     if path.is_absolute() && !path.exists() { Err(format!("{name} is no longer there")) } else { Ok(()) }
 }
 
-/// A path that means the same wherever the program is started.
+/// Absolute form of a path, independent of the working directory.
 fn absolute(path: &Path) -> String {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string()
 }

@@ -1,5 +1,5 @@
-//! Notices that a scene file or one beside it was saved, by looking at them twice a second on a thread of its own: a window at
-//! rest stays at rest.
+//! Detects saves of a scene file or a file beside it by polling twice a second on its own thread, so that an idle window does not
+//! repaint.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use std::time::{Duration, SystemTime};
 use super::host::OpenedFile;
 use crate::scene::{LARGEST_FILE, too_large};
 
-/// Between two looks; tests do not wait for long.
+/// Polling period; short in tests.
 const PERIOD: Duration = Duration::from_millis(if cfg!(test) { 20 } else { 500 });
-/// A file that does not change for so long is written completely.
+/// A file unchanged for this time is completely written.
 const SETTLED: Duration = Duration::from_millis(50);
 
-/// A scene file and those beside it, watched until this is dropped.
+/// Watch on a scene file and the files beside it; ends when dropped.
 #[derive(Debug)]
 pub(super) struct Watcher {
     changes: Receiver<OpenedFile>,
@@ -23,8 +23,8 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
-    /// Watches the file `name` and the files `beside` it, and calls `changed` whenever there is something to
-    /// [`Self::poll`]: first its content as it is. `None` if the system provides no thread.
+    /// Watches the file `name` and the files `beside` it, and calls `changed` when [`Self::poll`] has new content, starting with
+    /// the present one. `None` if the system cannot create a thread.
     pub(super) fn start(name: &str, beside: &[String], changed: impl Fn() + Send + 'static) -> Option<Self> {
         let (sender, changes) = channel();
         let over = Arc::new(AtomicBool::new(false));
@@ -42,7 +42,7 @@ impl Watcher {
                     if stamps() != now {
                         continue;
                     }
-                    // Some editors replace a file: for a moment there is none.
+                    // Some editors replace a file, which is briefly missing then.
                     let there = |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
                     let saved = now[0].is_some() && now.iter().zip(&seen).any(there);
                     seen = now;
@@ -74,7 +74,7 @@ impl Drop for Watcher {
     }
 }
 
-/// What changes when a file is saved; `None` if there is no such file.
+/// Modification time and size of a file; `None` if there is no such file.
 fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
     let file = path.metadata().ok().filter(std::fs::Metadata::is_file)?;
     Some((file.modified().ok()?, file.len()))
@@ -99,7 +99,7 @@ mod tests {
         std::fs::write(&path, "first").expect("writes");
         let (sender, told) = channel();
         let watcher = Watcher::start(&path.display().to_string(), &[], move || {
-            // Nobody listens at the end.
+            // The receiver may be gone at the end.
             let _ = sender.send(());
         });
         let watcher = watcher.expect("a thread");
@@ -131,7 +131,7 @@ mod tests {
         let (sender, told) = channel();
         let beside = ["parts/leg".to_owned(), "gone".to_owned()];
         let watcher = Watcher::start(&path.display().to_string(), &beside, move || {
-            // Nobody listens at the end.
+            // The receiver may be gone at the end.
             let _ = sender.send(());
         });
         let watcher = watcher.expect("a thread");
@@ -143,7 +143,7 @@ mod tests {
         next();
         std::fs::write(&leg, "longer").expect("writes");
         next();
-        // That it has gone is no news; that it is there again is.
+        // Deletion is not reported; reappearance is.
         std::fs::remove_file(&leg).expect("removes");
         std::thread::sleep(2 * PERIOD);
         assert!(told.try_recv().is_err());

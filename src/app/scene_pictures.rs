@@ -1,4 +1,4 @@
-//! Small pictures of scenes, for the list of scenes: drawn once each, at the start of the scene, when they are first seen.
+//! Thumbnails for the list of scenes: each is drawn once, at the start of its scene, when it first becomes visible.
 
 use eframe::egui::{Atom, Color32, Pos2, Rect, TextureId, Ui, Vec2, pos2, vec2};
 use eframe::egui_wgpu::RenderState;
@@ -10,30 +10,30 @@ use crate::view::{ArrowOptions, DrawList, PeakMarks, SceneView, Shot, Theme, Vie
 
 /// Size of a picture, points.
 pub const SIZE: Vec2 = vec2(108.0, 72.0);
-/// Distance of the camera over that at which everything fits, with room for arrows.
+/// Camera distance relative to the one that fits the scene with room for arrows.
 const CLOSER: f32 = 0.88;
-/// Part of a picture that is drawn.
+/// Texture coordinates of the whole picture.
 const WHOLE: Rect = Rect { min: Pos2::ZERO, max: pos2(1.0, 1.0) };
 
-/// The pictures that were drawn.
+/// Cache of drawn thumbnails.
 #[derive(Default)]
 pub struct ScenePictures {
     drawn: Vec<Drawn>,
-    /// The pass in which the latest was drawn: one in each, so that none takes long.
+    /// The pass of the latest drawing: one thumbnail per pass keeps passes short.
     pass: Option<u64>,
 }
 
-/// A picture, and of what it is one.
+/// A thumbnail and its key.
 struct Drawn {
     name: String,
     theme: Theme,
     size: [u32; 2],
-    /// `None`: it cannot be drawn.
+    /// `None` if the scene cannot be drawn.
     texture: Option<TextureId>,
 }
 
 impl ScenePictures {
-    /// The picture of the scene `name`, which `load` gives, as a part of a button: as large before it is drawn as afterwards.
+    /// Thumbnail of the scene `name`, loaded by `load`, as a part of a button. Its size is the same before and after drawing.
     pub fn atom(
         &mut self,
         ui: &Ui,
@@ -73,7 +73,7 @@ impl ScenePictures {
             return None;
         }
         self.pass = pass;
-        // Of another size, as on another screen.
+        // The pixel size changed, e.g. on another screen.
         let old = self.drawn.iter().position(|drawn| one(&drawn));
         if let Some(texture) = old.and_then(|old| self.drawn.swap_remove(old).texture) {
             state.renderer.write().free_texture(&texture);
@@ -84,7 +84,7 @@ impl ScenePictures {
     }
 }
 
-/// What is drawn of `scene`: all of it at its start, without forces, axes and names.
+/// Draw list of `scene` at its start, without forces, axes and names.
 fn list(scene: &Scene, theme: Theme, size: [u32; 2], pixels_per_point: f32) -> Option<DrawList> {
     let mut frame = Frame::default();
     Simulation::new(&scene.machine).ok()?.sample(0.0, &mut frame);
@@ -100,7 +100,7 @@ fn list(scene: &Scene, theme: Theme, size: [u32; 2], pixels_per_point: f32) -> O
     let view = SceneView::new(scene, &frame);
     let mut camera = view.camera();
     view.fit(&mut camera, scene, &frame, &options, size);
-    // No room for arrows.
+    // Arrows are not drawn and need no room.
     camera.distance *= CLOSER;
     let marks = PeakMarks::new();
     let shot = Shot {

@@ -1,15 +1,15 @@
-//! Sound on or off, and what is heard while the run plays. It changes nothing of the run.
+//! The sound switch and the clicks heard during playback. Sound does not affect the run.
 
 use eframe::egui::Ui;
 
 use super::click::{Click, TimeWindow, clicks, mass};
 use super::{App, Notice};
 
-/// The switch.
+/// Sound switch and clicks.
 #[derive(Default)]
 pub struct Sound {
     on: bool,
-    /// Those of the latest frame.
+    /// Clicks of the latest frame.
     clicks: Vec<Click>,
 }
 
@@ -39,7 +39,7 @@ impl App {
         }
     }
 
-    /// Off again, with the reason, where nothing can be heard.
+    /// Switches sound off, with a notice of the reason, if the host cannot play it.
     pub(super) fn check_sound(&mut self) {
         if self.sound.on
             && let Some(why) = self.host.no_sound()
@@ -50,8 +50,7 @@ impl App {
         }
     }
 
-    /// Advances the run by `dt` seconds, and lets the impacts be heard that end meanwhile. A way that is not played, as back in time
-    /// or on to an impact, is silent.
+    /// Advances the run by `dt` seconds and plays the impacts that end meanwhile. Jumps back in time or to an impact are silent.
     pub(super) fn advance_heard(&mut self, dt: f64) {
         let player = &mut self.player;
         let plays = player.is_playing() && !player.is_playing_backwards() && !player.is_seeking();
@@ -61,7 +60,7 @@ impl App {
             return;
         }
         let window = TimeWindow { from, to: player.pacer.shown(), lasts: dt };
-        // The simulation may be a step ahead of what is on show.
+        // The simulation may be a step ahead of the displayed instant.
         let impacts = player.simulation().impacts();
         clicks(impacts, &window, mass(player.running()), &mut self.sound.clicks);
         if !self.sound.clicks.is_empty() {

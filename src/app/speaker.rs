@@ -1,4 +1,4 @@
-//! The sound device of the desktop. It is opened by a thread of its own, since that may take a while, and fed by one of the system.
+//! The desktop's sound device. Its own thread opens it, since that may take a while; the system's audio thread feeds it.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
@@ -8,21 +8,21 @@ use cpal::{ErrorKind, FromSample, SampleFormat, SizedSample, StreamConfig};
 
 use super::click::{Click, Voice};
 
-/// From a frame to its sound: longer than a device asks ahead, so that the clicks of a frame keep their distances.
+/// Delay from a frame to its sound: longer than a device's buffer, so that the clicks of a frame keep their spacing.
 const LATENCY: Duration = Duration::from_millis(40);
-/// Most clicks at once; more than any ear tells apart.
+/// Most simultaneous clicks; more than the ear can distinguish.
 const MOST_VOICES: usize = 64;
 
-/// An open device, or one that is being opened; closed when dropped.
+/// A device that is open or being opened; dropping it closes the device.
 pub struct Speaker {
     clicks: Sender<(Instant, Click)>,
     failed: Receiver<String>,
-    /// The thread ends with it.
+    /// Dropping it ends the thread.
     _open: Sender<()>,
 }
 
 impl Speaker {
-    /// Opens the device that the system prefers.
+    /// Opens the system's default device.
     pub fn open() -> Self {
         let (clicks, to_play) = channel();
         let (fail, failed) = channel();
@@ -30,7 +30,7 @@ impl Speaker {
         let told = fail.clone();
         let begun =
             std::thread::Builder::new().name("sound".to_owned()).spawn(move || match stream(to_play, told.clone()) {
-                // Until the other end is dropped.
+                // Blocks until the other end is dropped.
                 Ok(_stream) => drop(closed.recv()),
                 Err(why) => drop(told.send(why)),
             });
@@ -40,23 +40,23 @@ impl Speaker {
         Self { clicks, failed, _open: open }
     }
 
-    /// Sounds `clicks` of a frame that begins now.
+    /// Plays the `clicks` of a frame that starts now.
     pub fn click(&self, clicks: &[Click]) {
         let now = Instant::now() + LATENCY;
         for click in clicks {
             let due = now + Duration::from_secs_f64(click.after.max(0.0));
-            // Where the device is gone, `failed` says so.
+            // `failed` reports a lost device.
             let _ = self.clicks.send((due, *click));
         }
     }
 
-    /// Why nothing is heard, once that is known.
+    /// The error that silences the device, once known.
     pub fn failed(&self) -> Option<String> {
         self.failed.try_recv().ok()
     }
 }
 
-/// Starts the flow of samples. Errors of it that end it go to `failed`.
+/// Starts the audio stream. Fatal errors are sent to `failed`.
 fn stream(clicks: Receiver<(Instant, Click)>, failed: Sender<String>) -> Result<cpal::Stream, String> {
     let device = cpal::default_host().default_output_device();
     let device = device.ok_or("this machine has no sound device")?;
@@ -86,7 +86,7 @@ fn play<T: SizedSample + FromSample<f32>>(
         config,
         move |samples: &mut [T], _| mixer.fill(samples, channels, Instant::now()),
         move |error| match error.kind() {
-            // It goes on.
+            // The stream continues.
             ErrorKind::DeviceChanged | ErrorKind::Xrun | ErrorKind::RealtimeDenied => {
                 log::debug!("sound: {error}");
             }
@@ -98,11 +98,11 @@ fn play<T: SizedSample + FromSample<f32>>(
     Ok(stream)
 }
 
-/// Adds up the clicks that sound at the same time.
+/// Mixes the clicks that sound at the same time.
 struct Mixer {
     clicks: Receiver<(Instant, Click)>,
     rate: f64,
-    /// Each with the samples until it begins.
+    /// Voices, each with the number of samples until its start.
     voices: Vec<(usize, Voice)>,
 }
 
@@ -111,12 +111,12 @@ impl Mixer {
         Self {
             clicks,
             rate,
-            // The system's thread is not kept waiting for memory.
+            // Preallocated: the audio thread must not wait for memory.
             voices: Vec::with_capacity(MOST_VOICES),
         }
     }
 
-    /// The next samples, those from `now` on, the same on every channel.
+    /// Writes the next samples, starting at `now`, identical on all channels.
     fn fill<T: SizedSample + FromSample<f32>>(&mut self, out: &mut [T], channels: usize, now: Instant) {
         for (due, click) in self.clicks.try_iter() {
             if self.voices.len() < MOST_VOICES {

@@ -1,8 +1,9 @@
-//! What a screen reader says and a picture does not: values with their units in words, headings, landmarks, names of splitters.
+//! Texts for screen readers that differ from the displayed ones: values with units in words, headings, landmarks, names of
+//! splitters.
 
 use eframe::egui::{Id, Response, Ui, accesskit::Role};
 
-/// Units by their symbols, in the singular. With a prefix of [`PREFIXES`] they have another size.
+/// Units by symbol, in the singular. A prefix of [`PREFIXES`] scales them.
 const UNITS: [(&str, &str); 10] = [
     ("m", "metre"),
     ("s", "second"),
@@ -18,8 +19,7 @@ const UNITS: [(&str, &str); 10] = [
 const PREFIXES: [(char, &str); 7] =
     [('c', "centi"), ('m', "milli"), ('µ', "micro"), ('n', "nano"), ('k', "kilo"), ('M', "mega"), ('G', "giga")];
 
-/// `text` with the units behind its numbers in words, and without zeros that say nothing: `43.5000 ms` as
-/// `43.5 milliseconds`.
+/// `text` with units spelled out after numbers and trailing zeros removed: `43.5000 ms` becomes `43.5 milliseconds`.
 pub fn words(text: &str) -> String {
     let text = text.replace('\u{202f}', "").replace('°', " deg");
     let mut parts: Vec<String> = Vec::new();
@@ -30,12 +30,12 @@ pub fn words(text: &str) -> String {
         let end = &word[symbol.len()..];
         if let Ok(value) = symbol.parse::<f64>() {
             number = Some(value);
-            // A small one keeps its power of ten.
+            // A small number keeps its power of ten.
             let plain = value == 0.0 || value.abs() >= 1e-6;
             parts.push(if plain { format!("{value}{end}") } else { word.to_owned() });
             continue;
         }
-        // Of a product only the last factor is in the plural: newton metres.
+        // In a product only the last factor is plural: newton metres.
         let factor = |next: &&str| end.is_empty() && unit(next, true).is_some();
         let one = number == Some(1.0) || rest.peek().is_some_and(factor);
         match number.and_then(|_| unit(symbol, one)) {
@@ -52,7 +52,7 @@ pub fn words(text: &str) -> String {
     parts.join(" ")
 }
 
-/// Name of the unit that `symbol` stands for, in the singular or the plural; `None` if it stands for none.
+/// Name of the unit `symbol`, singular or plural; `None` if it is not a unit.
 pub fn unit(symbol: &str, one: bool) -> Option<String> {
     if let Some((above, below)) = symbol.split_once('/') {
         return Some(format!("{} per {}", unit(above, one)?, unit(below, true)?));
@@ -71,12 +71,12 @@ pub fn unit(symbol: &str, one: bool) -> Option<String> {
     Some(format!("{prefix}{name}{end}"))
 }
 
-/// Lets a reader say `text` as the value of a slider, its units in words.
+/// Sets `text`, with units spelled out, as the spoken value of a slider.
 pub fn value(of: &Response, text: &str) {
     of.ctx.accesskit_node_builder(of.id, |node| node.set_value(words(text)));
 }
 
-/// Makes a label, whose text is `title`, a heading.
+/// Marks the label of text `title` as a heading.
 pub fn heading(of: &Response, title: &str) {
     of.ctx.accesskit_node_builder(of.id, |node| {
         node.set_role(Role::Heading);
@@ -85,7 +85,7 @@ pub fn heading(of: &Response, title: &str) {
     });
 }
 
-/// Makes all of `ui` a part of the window that a reader finds by its name.
+/// Marks `ui` as a named landmark for screen readers.
 pub fn landmark(ui: &Ui, name: &str) {
     ui.ctx().accesskit_node_builder(ui.unique_id(), |node| {
         node.set_role(Role::Region);
@@ -102,7 +102,7 @@ pub fn titled(ui: &Ui, of: &Response, title: &str) {
     });
 }
 
-/// Names the splitter of the panel `panel` in `ui`, after the panel was shown.
+/// Names the splitter of `panel` in `ui`; call it after the panel was shown.
 pub fn splitter(ui: &Ui, panel: &str, name: &str) {
     let id: Id = ui.scope_id().with(panel).with("__resize");
     if ui.read_response(id).is_none() {

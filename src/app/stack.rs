@@ -1,9 +1,9 @@
-//! Stacks terms that add up to zero: positive ones above zero, negative ones below, so that both sides reach equally far.
+//! Stacks terms whose sum is zero: positive terms above zero, negative ones below, so that both sides are equally high.
 
 /// Lower and upper edge of one term at each instant.
 pub type Band = (Vec<f64>, Vec<f64>);
 
-/// Stacks `terms` (each one value per instant) away from zero, positive ones up and negative ones down, in their order.
+/// Stacks `terms` (one value per instant each) away from zero in the given order, positive values up and negative values down.
 pub fn stack(terms: &[Vec<f64>]) -> Vec<Band> {
     let instants = terms.iter().map(Vec::len).min().unwrap_or(0);
     let (mut up, mut down) = (vec![0.0; instants], vec![0.0; instants]);

@@ -1,4 +1,4 @@
-//! Look of the window: spacing, type sizes and the colours of both themes.
+//! Appearance of the window: spacing, type sizes and the colours of both themes.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ pub fn series(index: usize, dark: bool) -> Color32 {
     if dark { on_dark } else { on_light }
 }
 
-/// What egui is told of a choice of colours.
+/// The egui preference for a theme choice.
 pub fn preference(choice: ThemeChoice) -> ThemePreference {
     match choice {
         ThemeChoice::Light => ThemePreference::Light,
@@ -45,8 +45,8 @@ pub fn preference(choice: ThemeChoice) -> ThemePreference {
     }
 }
 
-/// The frame of a panel. The page's canvas is cleared to its colour, so that there it fills nothing: where the processor draws,
-/// that is half of what the interface costs.
+/// The frame of a panel. On the web the canvas is already cleared to its colour, so the panel is not filled; with software
+/// rendering that halves the cost of the interface.
 pub fn panel(ui: &Ui) -> Frame {
     let frame = Frame::side_top_panel(ui.style());
     if cfg!(target_arch = "wasm32") { frame.fill(Color32::TRANSPARENT) } else { frame }
@@ -54,10 +54,10 @@ pub fn panel(ui: &Ui) -> Frame {
 
 /// Least side of a touch target, points.
 pub const FINGER: f32 = 44.0;
-/// The same in rows close together; WCAG 2.2 asks for 24 (2.5.8).
+/// Side of a touch target in dense rows, points; WCAG 2.2 requires 24 (2.5.8).
 const TIGHT: f32 = 30.0;
 
-/// Sizes the controls for a mouse, or for fingers.
+/// Sizes the controls for a mouse or for touch.
 pub fn apply_size(ctx: &egui::Context, fingers: bool) {
     ctx.all_styles_mut(|style| {
         let spacing = &mut style.spacing;
@@ -65,23 +65,23 @@ pub fn apply_size(ctx: &egui::Context, fingers: bool) {
         spacing.icon_width = if fingers { 22.0 } else { 16.0 };
         spacing.combo_height = if fingers { 320.0 } else { 200.0 };
     });
-    // A finger moves during a tap and does not come down twice on the same point.
+    // A finger moves during a tap, and a double-tap does not hit the same point twice.
     ctx.options_mut(|options| {
         options.input_options.max_click_dist = if fingers { 16.0 } else { 6.0 };
     });
 }
 
-/// Whether controls are sized for fingers.
+/// Whether controls are sized for touch.
 pub fn has_fingers(ui: &Ui) -> bool {
     ui.spacing().interact_size.x >= FINGER
 }
 
-/// Side of a small button, points: `mouse` where there is no need to make it larger.
+/// Side of a small button, points: `mouse` unless controls are sized for touch.
 pub fn side(ui: &Ui, mouse: f32) -> f32 {
     if has_fingers(ui) { ui.spacing().interact_size.y } else { mouse }
 }
 
-/// Rows that follow in `ui` lie close together: a phone shows the answers of a question, and most of a menu.
+/// Uses dense rows in the rest of `ui`, so that a phone shows all answers of a question and most of a menu.
 pub fn tighten(ui: &mut Ui) {
     if has_fingers(ui) {
         let spacing = ui.spacing_mut();
@@ -89,19 +89,19 @@ pub fn tighten(ui: &mut Ui) {
     }
 }
 
-/// A small line of text that warns.
+/// A small line of warning text.
 pub fn warning(ui: &mut Ui, words: impl Into<String>) -> Response {
     let colour = ui.visuals().warn_fg_color;
     ui.label(RichText::new(words).small().color(colour))
 }
 
-/// A small line of text that says what went wrong.
+/// A small line of error text.
 pub fn error(ui: &mut Ui, words: impl Into<String>) -> Response {
     let colour = ui.visuals().error_fg_color;
     ui.label(RichText::new(words).small().color(colour))
 }
 
-/// One face for everything: its digits are equally wide, so that a clock in it stands still.
+/// One font for everything: its digits have equal widths, so a running clock does not jitter.
 pub fn fonts() -> FontDefinitions {
     const NAME: &str = "Ubuntu-Light";
     let mut fonts = FontDefinitions::empty();
@@ -113,7 +113,7 @@ pub fn fonts() -> FontDefinitions {
     fonts
 }
 
-/// Sets the face of text and both themes' styles, with `contrast` in black and white where they are grey.
+/// Sets the font and the styles of both themes; `contrast` replaces grey by black and white.
 pub fn apply(ctx: &egui::Context, contrast: bool) {
     ctx.set_fonts(fonts());
     apply_size(ctx, false);
@@ -130,7 +130,7 @@ pub fn apply(ctx: &egui::Context, contrast: bool) {
         spacing.item_spacing = vec2(8.0, 6.0);
         spacing.button_padding = vec2(10.0, 4.0);
         spacing.combo_width = 120.0;
-        // A list has its own height.
+        // Lets popup lists take their natural height.
         spacing.default_area_size.y = 1000.0;
         spacing.tooltip_width = 340.0;
         spacing.menu_margin = Margin::same(8);
@@ -146,7 +146,7 @@ pub fn apply(ctx: &egui::Context, contrast: bool) {
     });
 }
 
-/// Makes texts and edges as strong as the screen allows.
+/// Gives text and edges the highest contrast.
 fn sharpen(visuals: &mut Visuals) {
     let (ground, ink) =
         if visuals.dark_mode { (Color32::BLACK, Color32::WHITE) } else { (Color32::WHITE, Color32::BLACK) };
@@ -206,7 +206,7 @@ fn visuals(dark: bool) -> Visuals {
 mod tests {
     use super::*;
 
-    /// Texts of the files below `folder`.
+    /// Collects the texts of the files below `folder`.
     fn texts(folder: &std::path::Path, out: &mut Vec<String>) {
         for entry in std::fs::read_dir(folder).expect("a folder") {
             let path = entry.expect("an entry").path();
@@ -237,7 +237,7 @@ mod tests {
             shown.filter(missing).collect()
         });
         assert_eq!(missing, "");
-        // It does not have everything.
+        // The font does not cover everything.
         assert!(!ctx.fonts_mut(|fonts| fonts.has_glyph(&font, '\u{6f22}')));
     }
 }

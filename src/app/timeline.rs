@@ -1,5 +1,5 @@
-//! The timeline: the run so far from end to end. A lane for each ball joint shows when it was free, slid or crept, and where
-//! its ball came into contact; flags show what was done. A click or a drag displays any instant.
+//! Timeline of the whole run. A lane per ball joint shows free flight, sliding, creep and contact onsets; flags mark user
+//! actions. A click or a drag displays any instant.
 
 use eframe::egui::{
     self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui, WidgetInfo,
@@ -14,21 +14,21 @@ use super::zoom::{self, Zoom};
 use super::{spoken, theme, value};
 use crate::simulate::{ContactState, RECORDED_JOINTS};
 
-/// Height of the row of flags, and of all lanes together, points.
+/// Height of the row of flags, and total height of the lanes, points.
 const FLAGS: f32 = 9.0;
 const LANES: f32 = 24.0;
-/// Window height below which only the strip is shown, and low, points.
+/// Window height below which only a low strip is shown, points.
 const LOW: f32 = 360.0;
 /// The shortest time range shown, s.
 const SHORTEST: f64 = 1e-6;
-/// Opacity of what was abandoned or is to come.
+/// Opacity of abandoned and future parts.
 const PALE: f32 = 0.35;
-/// Fraction of the shown time range that an arrow key moves by.
+/// Fraction of the shown time range per arrow key press.
 const NUDGE: f64 = 0.01;
 /// Largest distance at which the pointer hits a flag, points.
 const NEAR: f32 = 6.0;
 
-/// The strip under the picture.
+/// State of the timeline strip.
 #[derive(Default)]
 pub struct Timeline {
     /// Time range shown, s; the whole run unless the user has zoomed.
@@ -41,8 +41,8 @@ impl Timeline {
         self.zoomed = None;
     }
 
-    /// The row: buttons for the previous and the next impact and for playing backwards, and the strip. `focus`: the ball joint
-    /// whose impacts are meant. Returns whether the displayed instant was changed.
+    /// The row: buttons for previous impact, next impact and reverse playback, and the strip. `focus`: the ball joint whose
+    /// impacts are visited. Returns whether the displayed instant changed.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
         if ui.ctx().content_rect().height() < LOW {
             return self.strip(ui, player, FLAGS + 0.6 * LANES);
@@ -174,7 +174,7 @@ impl Timeline {
     }
 }
 
-/// Time across the strip.
+/// Time scale of the strip.
 struct Scale {
     rect: Rect,
     range: (f64, f64),
@@ -232,7 +232,7 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     let x = scale.x(shown);
     let colour = visuals.strong_text_color();
     painter.vline(x, scale.rect.y_range(), Stroke::new(1.5, colour));
-    // Whole at both ends, too.
+    // Fully visible at both ends.
     let handle = pos2(x.clamp(scale.rect.left() + 4.0, scale.rect.right() - 4.0), scale.rect.top() + 4.0);
     painter.circle_filled(handle, 4.0, colour);
     let edge =
@@ -240,8 +240,8 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
 }
 
-/// The lanes between two times, s: sliding in half the joint's colour, creeping in full colour, and a mark where its ball came
-/// into contact. A pixel column is coloured in proportion to the time in each state.
+/// The lanes between two times, s: sliding in half the joint's colour, creep in full colour, and a mark at each contact onset.
+/// The colour of a pixel column is proportional to the time in each state.
 fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f64, f64), part: f32) {
     let dark = ui.visuals().dark_mode;
     let pixel = 1.0 / ui.ctx().pixels_per_point();
@@ -275,7 +275,7 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
                 *share += weight * covered.max(0.0) as f32;
             }
         }
-        // Columns of one colour form one rectangle.
+        // Adjacent columns of one colour are merged.
         let mut start = 0;
         while start < columns {
             let share = shares[start];
@@ -315,7 +315,7 @@ fn flag_at(ui: &Ui, scale: &Scale, time: f64, part: f32) {
     painter.add(Shape::convex_polygon(points, colour, Stroke::NONE));
 }
 
-/// What is under the pointer.
+/// Tooltip for the pointer position.
 fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     let time = scale.time(pos.x);
     ui.strong(value::time(time));

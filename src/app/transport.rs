@@ -1,4 +1,4 @@
-//! Transport: play, step, reset, time scale, and how fast time really passes.
+//! Transport bar: play, step, reset, time scale, and the time scale actually achieved.
 
 use eframe::egui::{
     self, ComboBox, FocusDirection, Id, Key, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText,
@@ -9,26 +9,26 @@ use super::player::Player;
 use super::{keys, spoken, theme, value};
 use crate::simulate::{Limit, SCALE_RANGE};
 
-/// Time scales that a list offers.
+/// Time scales in the list.
 pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 
-/// Width of the list of time scales, points: room for the longest.
+/// Width of the list of time scales, points: fits the longest entry.
 const SCALES_WIDTH: f32 = 94.0;
-/// Width of the time scale that is reached, points.
+/// Width of the display of the achieved time scale, points.
 const REACHED: f32 = 120.0;
-/// Length of a drag from one of them to the next, points.
+/// Drag distance from one time scale to the next, points.
 const SCALE_APART: f32 = 20.0;
 
-/// Width of [`row`] with its buttons and the list of time scales for fingers, points.
+/// Width of [`row`] with its buttons and the list of time scales in touch size, points.
 pub const LEAST: f32 = 270.0;
 
-/// Where the button that plays is kept from one frame to the next.
+/// Key under which the play button's ID is stored between frames.
 const FIRST: &str = "first stop of Tab";
 
-/// Size of the button that plays and pauses, points.
+/// Size of the play button, points.
 pub const PLAY: f32 = 40.0;
 
-/// The next scale of [`SCALES`] faster or slower than the present one.
+/// The neighbour of `scale` in [`SCALES`], faster or slower.
 pub fn next_scale(scale: f64, faster: bool) -> f64 {
     if faster {
         SCALES.iter().rev().copied().find(|&s| s > scale * 1.0001).unwrap_or(SCALES[0])
@@ -37,8 +37,8 @@ pub fn next_scale(scale: f64, faster: bool) -> f64 {
     }
 }
 
-/// The bar: one row, or two where it is narrow. Returns whether the user asked for a reset; the caller does it, since it touches
-/// more than the player.
+/// The bar in one row, or in two if it is narrow. Returns whether the user asked for a reset; the caller performs it, since it
+/// affects more than the player.
 pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     let narrow = ui.available_width() < 620.0;
     let row = egui::Layout::left_to_right(egui::Align::Center);
@@ -64,11 +64,11 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     asked
 }
 
-/// The bar in one row, without what does not fit. Returns as [`ui`].
+/// The bar in one row, without items that do not fit. Returns as [`ui`].
 pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
     ui.horizontal(|ui| {
         let asked = buttons(ui, player);
-        // Otherwise the time scale would stick out; the time is shown over the picture as well.
+        // Otherwise the time scale would overflow; the time is also shown over the picture.
         if ui.available_width() > clock(ui).x + SCALES_WIDTH + ui.spacing().item_spacing.x {
             time(ui, player);
         }
@@ -91,7 +91,7 @@ pub fn least(ui: &mut Ui, player: &mut Player) -> bool {
     asked
 }
 
-/// Hint for a settled run, at the right end, where nothing else has to make room for it.
+/// Hint for a settled run, at the right end, where it displaces nothing.
 fn settled(ui: &mut Ui, player: &Player) {
     if !player.is_playing() || !player.has_settled() || ui.available_width() < 180.0 {
         return;
@@ -106,8 +106,8 @@ fn settled(ui: &mut Ui, player: &Player) {
     });
 }
 
-/// Gives the focus to the button that plays if nothing has it and Tab is pressed: most come to play, and header and parameters are a
-/// long way. From there Tab goes round through everything. To be called before anything is shown.
+/// Focuses the play button on Tab if nothing has the focus: most users come to play, and header and parameters are many stops
+/// away. From there Tab cycles through all controls. Call it before any widget is shown.
 pub fn first_of_tab(ui: &Ui) {
     let play = ui.data_mut(|data| data.remove_temp::<Option<Id>>(Id::unique(FIRST)).flatten());
     let tab = ui.input(|input| input.key_pressed(Key::Tab) && !input.modifiers.shift);
@@ -151,7 +151,7 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     asked
 }
 
-/// Room for any time, so that what is beside the clock does not move with its digits.
+/// Fixed size for any time, so that neighbours do not move when digits change.
 fn clock(ui: &Ui) -> Vec2 {
     let font = egui::TextStyle::Monospace.resolve(ui.style());
     let digits = "0".repeat(value::LONGEST_TIME);
@@ -181,7 +181,7 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     reached(ui, player);
 }
 
-/// Time scales to choose from: the list, or a drag across it.
+/// Selection of the time scale: the list, or a drag across it.
 fn scales(ui: &mut Ui, player: &mut Player) {
     let list = ComboBox::from_id_salt("time scale")
         .width(SCALES_WIDTH)
@@ -198,12 +198,12 @@ fn scales(ui: &mut Ui, player: &mut Player) {
         .response
         .on_hover_text("Simulated against real time: choose one, or drag to the right for faster")
         .accessible_name("Time scale preset");
-    // The list itself is dragged: a widget of its own would lie over it and take its clicks.
+    // The list itself senses the drag: a separate widget on top would intercept its clicks.
     let drag = list.interact(Sense::DRAG);
     if !drag.dragged() {
         return;
     }
-    // How much of the drag the scales already passed have used up.
+    // Part of the drag already used by passed time scales.
     let used: Option<f32> = ui.data(|data| data.get_temp(drag.id));
     let mut used = used.filter(|_| !drag.drag_started()).unwrap_or(0.0);
     let way = drag.total_drag_delta().unwrap_or_default().x;
@@ -215,10 +215,10 @@ fn scales(ui: &mut Ui, player: &mut Player) {
     ui.data_mut(|data| data.insert_temp(drag.id, used));
 }
 
-/// The time scale that is reached, in what is left of the row below a narrow [`row`], which has no room for it.
+/// The achieved time scale, in the rest of the row below a narrow [`row`], which has no space for it.
 pub fn reached_beside(ui: &mut Ui, player: &Player) {
     if ui.available_width() < REACHED {
-        // Beside one tab more.
+        // Smaller text beside an additional tab.
         let styles = &mut ui.style_mut().text_styles;
         if let Some(small) = styles.get(&egui::TextStyle::Small).cloned() {
             styles.insert(egui::TextStyle::Body, small);
@@ -227,7 +227,7 @@ pub fn reached_beside(ui: &mut Ui, player: &Player) {
     reached(ui, player);
 }
 
-/// The time scale that the computer actually reaches, and what keeps it from the one asked for.
+/// The achieved time scale, and the cause if it is below the requested one.
 fn reached(ui: &mut Ui, player: &Player) {
     if !player.is_playing() {
         return;
@@ -256,7 +256,7 @@ fn reached(ui: &mut Ui, player: &Player) {
     ui.label(RichText::new(words).color(colour)).on_hover_text(help);
     let by = RichText::new(by).small().color(colour);
     let by = WidgetText::from(by).into_galley(ui, Some(TextWrapMode::Extend), f32::INFINITY, TextStyle::Body);
-    // Where there is no room the tooltip says it.
+    // Without room, only the tooltip says it.
     if by.size().x < ui.available_width() {
         ui.label(by).on_hover_text(help);
     }

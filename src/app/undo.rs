@@ -1,6 +1,6 @@
-//! Undo and redo of what was changed: parameters of the scene, and the view. A gesture, such as a drag on a slider, is one change.
+//! Undo and redo of parameter and view changes. A gesture, such as a slider drag, is one change.
 //!
-//! Undoing a parameter changes it at the instant shown, like any other change: it does not go back in time.
+//! Undoing a parameter change applies at the displayed instant, like any other change: it does not go back in time.
 
 use eframe::egui::{self, Key, Modifiers, Ui};
 
@@ -14,16 +14,16 @@ use crate::session::link::shown::PlotWindow;
 use crate::simulate::Quantity;
 use crate::view::{Picked, Quality, ViewOptions};
 
-/// Most changes kept; the oldest are dropped.
+/// Length of the history; the oldest changes are dropped.
 const KEPT: usize = 200;
-/// Changes of the same thing that follow each other within this time are one, s: notches of a wheel, arrows on a slider.
+/// Successive changes of one parameter within this time are merged, s: wheel notches, arrow keys on a slider.
 const TOGETHER: f64 = 0.5;
 /// Side of a button in the header, points.
 const BUTTON: f32 = 26.0;
-/// What chooses several parameters at once: it comes first.
+/// This key sets several parameters at once and must be applied first.
 const PRESET: &str = "solver.preset";
 
-/// What the user has chosen about the view.
+/// View settings chosen by the user.
 #[derive(Clone, Debug, PartialEq)]
 struct View {
     options: ViewOptions,
@@ -37,7 +37,7 @@ struct View {
 impl View {
     fn of(app: &App) -> Option<Self> {
         let mut options = app.viewport.options.clone();
-        // Not chosen by hand.
+        // These are not user choices.
         options.quality = Quality::FULL;
         options.theme = crate::view::Theme::Light;
         options.arrows.thickness = 1.0;
@@ -51,7 +51,7 @@ impl View {
         })
     }
 
-    /// The camera is where it was, apart from what it follows and how it fits the picture.
+    /// Whether the camera is unchanged, apart from following a body and fitting the picture.
     fn has_camera_of(&self, other: &Self) -> bool {
         let (a, b) = (&self.camera, &other.camera);
         let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * (1.0 + a.abs());
@@ -62,7 +62,7 @@ impl View {
         stays && (fits || (follows && near(a.distance, b.distance)) || there())
     }
 
-    /// What differs from `other`, in words; `None` if nothing does.
+    /// Name of the difference from `other`; `None` if equal.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         if self.options.magnification != other.options.magnification {
             return Some("Magnification of the play");
@@ -87,12 +87,12 @@ enum Change {
 }
 
 struct Entry {
-    /// What was changed.
+    /// Name of the change.
     name: String,
-    /// Before and after, in words; "" for the view.
+    /// Displayed values before and after; "" for the view.
     values: [String; 2],
     change: Change,
-    /// When it was last made, s of viewing.
+    /// Time of the latest edit, s of viewing.
     at: f64,
 }
 
@@ -104,12 +104,12 @@ impl Entry {
         }
     }
 
-    /// Whether `later` goes on with it.
+    /// Whether `later` continues this change.
     fn goes_on_in(&self, later: &Self) -> bool {
         self.name == later.name && self.keys() == later.keys()
     }
 
-    /// Whether it leaves everything as it was.
+    /// Whether the change has no effect.
     fn is_nothing(&self) -> bool {
         match &self.change {
             Change::Parameters(edits) => edits.iter().all(|edit| edit.before == edit.after),
@@ -136,19 +136,19 @@ impl Entry {
     }
 }
 
-/// What was changed, and what was undone of it.
+/// The undo and redo history.
 #[derive(Default)]
 pub struct Undo {
     done: Vec<Entry>,
     undone: Vec<Entry>,
-    /// The view as last noted.
+    /// The view at the latest check.
     view: Option<View>,
-    /// Whether the pointer has been down since the latest change.
+    /// Whether the pointer has stayed down since the latest change.
     held: bool,
 }
 
 impl Undo {
-    /// Forgets everything: another scene is shown.
+    /// Clears the history for a new scene.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
@@ -167,12 +167,12 @@ impl Undo {
         }
     }
 
-    /// When the latest change was made, s of viewing.
+    /// Time of the latest change, s of viewing.
     fn last(&self) -> Option<f64> {
         self.done.last().map(|last| last.at)
     }
 
-    /// What undoing would do, and redoing, in words; `None` if there is nothing.
+    /// Description of the next undo or redo; `None` if there is none.
     pub fn words(&self, redo: bool) -> Option<String> {
         let entry = if redo { &self.undone } else { &self.done }.last()?;
         let value = &entry.values[usize::from(redo)];
@@ -185,7 +185,7 @@ impl Undo {
     }
 }
 
-/// Name of the parameter `key`, and `text` as it is shown; without one, the value of the scene's file.
+/// Name of the parameter `key` and the displayed form of `text`, or of the scene file's value if that is `None`.
 fn described(scene: &Scene, original: Option<String>, key: &str, text: Option<&str>) -> (String, String) {
     let name = value::named(scene, key).map_or_else(|| key.to_owned(), |(name, _)| name);
     let value = text.map(value::typeset).or(original).unwrap_or_default();
@@ -193,7 +193,7 @@ fn described(scene: &Scene, original: Option<String>, key: &str, text: Option<&s
 }
 
 impl App {
-    /// Undoes the latest change, or redoes the one undone last. Returns whether there was one.
+    /// Undoes the latest change, or redoes the last undone one. Returns whether there was one.
     pub fn undo(&mut self, redo: bool) -> bool {
         if self.is_under_way() {
             return false;
@@ -238,7 +238,7 @@ impl App {
         true
     }
 
-    /// Notes what was changed since the frame before, and undoes or redoes if a key asks for it.
+    /// Records changes since the previous frame, and handles the undo and redo keys.
     pub(super) fn follow_changes(&mut self, ctx: &egui::Context) {
         let (now, held) = ctx.input(|input| (input.time, input.pointer.any_down() || input.any_touches()));
         let edits = self.player.take_edits();
@@ -270,8 +270,8 @@ impl App {
         }
     }
 
-    /// Notes a change of the view once the gesture that makes it is over. The steps of a lesson change the view, too: within one
-    /// only parameters are noted.
+    /// Records a view change once its gesture has ended. Lesson steps also change the view, so in a lesson only parameter changes
+    /// are recorded.
     fn follow_view(&mut self, now: f64, held: bool) {
         let view = View::of(self).filter(|_| self.course().is_none());
         let Some(view) = view else {
@@ -283,7 +283,7 @@ impl App {
             return;
         };
         match view.difference(before) {
-            // What follows a body, or fits everything, moves by itself.
+            // A camera that follows a body or fits the scene moves by itself.
             None => *before = view,
             Some(_) if held => {}
             Some(name) => {
@@ -294,7 +294,7 @@ impl App {
         }
     }
 
-    /// Undo and redo in the header.
+    /// Undo and redo buttons of the header.
     pub(super) fn undo_buttons(&mut self, ui: &mut Ui) {
         let side = theme::side(ui, BUTTON);
         for (redo, icon, name, key) in
@@ -317,7 +317,7 @@ impl App {
         }
     }
 
-    /// The same in the menu of a small window.
+    /// Undo and redo in the menu of a small window.
     pub(super) fn undo_entries(&mut self, ui: &mut Ui) {
         for (redo, name) in [(false, "Undo"), (true, "Redo")] {
             let words = self.undo.words(redo);
@@ -329,7 +329,7 @@ impl App {
         }
     }
 
-    /// What undoing would do (`redo`: redoing), in words; `None` if there is nothing.
+    /// Description of the next undo (`redo`: redo); `None` if there is none.
     pub fn undo_words(&self, redo: bool) -> Option<String> {
         self.undo.words(redo)
     }

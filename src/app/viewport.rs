@@ -1,4 +1,4 @@
-//! The 3D viewport: camera by mouse, picking, and what the interface paints over the picture.
+//! The 3D viewport: mouse camera, picking, and overlays on the picture.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -24,17 +24,17 @@ use crate::view::{
     to_f32,
 };
 
-/// Points of the probe's trail that are kept.
+/// Length of the probe's trail, points.
 const TRAIL: usize = 1500;
 
-/// Farthest camera distance by the wheel, in radii of the machine.
+/// Largest camera distance by zooming, in radii of the machine.
 const FARTHEST: f32 = 30.0;
 
-/// A finger that stays for so long, s, within so many points takes hold of what is under it.
+/// A touch that stays this long, s, within this distance, points, grips the body under it.
 const HOLD: f64 = 0.5;
 const STILL: f32 = 6.0;
 
-/// A shot of what the player shows. A macro, since the draw list is borrowed at the same time.
+/// The shot of the player's displayed instant. A macro, because the draw list is borrowed at the same time.
 macro_rules! shot {
     ($self:ident, $player:ident, $camera:expr, $screen:expr) => {
         Shot {
@@ -50,61 +50,61 @@ macro_rules! shot {
     };
 }
 
-/// Camera, view options and everything kept between two pictures of one scene.
+/// Camera, view options and data retained between pictures of one scene.
 pub struct Viewport {
-    /// What to draw and how.
+    /// The view options.
     pub options: ViewOptions,
     view: SceneView,
     camera: Camera,
-    /// Where the camera is moving to; `None` once it is there.
+    /// Target of the moving camera; `None` once reached.
     goal: Option<Camera>,
     fit_pending: bool,
-    /// Width over height of the picture that was last fitted, or of a wider one in which the camera has been moved since: a narrower
-    /// one shows as much across.
+    /// Aspect ratio (width / height) of the last fitted picture, or of a wider one in which the camera was moved since; a
+    /// narrower picture shows the same width.
     fitted: f32,
-    /// Everything has been fitted into the picture and the camera not been moved since: another shape is fitted anew.
+    /// Whether the scene is fitted and the camera was not moved since; a new aspect ratio is then refitted.
     fits: bool,
-    /// While a picture is drawn off screen: width over height of the view on the screen.
+    /// Aspect ratio of the view on the screen, while a picture is drawn off screen.
     frozen: Option<f32>,
     marks: PeakMarks,
     places: Places,
     #[cfg(not(target_arch = "wasm32"))]
     second_places: Places,
-    /// What is shown; the one before, and room for the next.
+    /// The displayed list; the next one reuses the buffers of the previous.
     list: Arc<DrawList>,
     next: DrawList,
-    /// Number of what is shown, another one for every other picture.
+    /// Unique number of the displayed picture.
     revision: u64,
-    /// The same of the second window: what it shows, and its number.
+    /// Displayed list of the second window, and its number.
     #[cfg(not(target_arch = "wasm32"))]
     second: (Arc<DrawList>, u64),
     trail: Vec<Vec3>,
     followed: Option<Picked>,
     time: f64,
-    /// The user has turned, moved or chosen the view: it is no longer the one with which a scene opens.
+    /// Whether the user has changed the view from the scene's initial one.
     moved: bool,
-    /// What the pointer holds, and whether that changed.
+    /// The pointer's grip, and whether it changed.
     grip: Option<Grip>,
-    /// When the finger on the picture came down, s of viewing; infinite once it has gone on or taken hold.
+    /// Start of the touch on the picture, s of viewing; infinite once it has moved or gripped.
     finger_since: Option<f64>,
     grip_changed: bool,
-    /// More than one finger has been down since none was.
+    /// Whether there was more than one finger since the last time there was none.
     pinched: bool,
-    /// Ball joint that was clicked, until it is taken.
+    /// The clicked ball joint, until it is taken.
     clicked: Option<usize>,
-    /// What the frames on the screen allow; `None`: the options' quality, always.
+    /// Quality control by frame time; `None` always uses the quality of the options.
     pace: Option<Pace>,
-    /// What it shows, where another picture is beside it, and the force of the longest arrow in both, N.
+    /// Title, if another picture is beside it; common reference force of the arrows in both, N.
     pub title: Option<String>,
     pub(super) common: Option<f32>,
-    /// Machine and time alone: there is no room for more.
+    /// Whether only machine and time are shown for lack of room.
     pub(super) bare: bool,
-    /// Where it is shown.
+    /// Place of the picture in the renderer.
     place: render::Place,
 }
 
 impl Viewport {
-    /// A viewport that shows all of the player's scene.
+    /// A viewport that shows the whole scene.
     pub fn new(player: &Player, options: ViewOptions) -> Self {
         let view = SceneView::new(player.running(), player.frame());
         Self {
@@ -152,21 +152,21 @@ impl Viewport {
         self.marks.reference(&self.options.arrows)
     }
 
-    /// Looks from where `other` looks.
+    /// Copies the camera of `other`.
     pub fn look_as(&mut self, other: &Self) {
         (self.camera, self.goal) = (other.camera, other.goal);
         (self.fit_pending, self.fitted, self.moved) = (other.fit_pending, other.fitted, other.moved);
         (self.frozen, self.followed, self.fits) = (other.frozen, other.followed, other.fits);
     }
 
-    /// The same with its options, as it is drawn.
+    /// Copies the camera and the effective options of `other`.
     pub fn link(&mut self, other: &Self) {
         self.options.clone_from(&other.options);
         self.options.quality = other.quality();
         self.look_as(other);
     }
 
-    /// Where the camera is or is moving to; `None` before the first picture.
+    /// Camera pose, or its target while the camera moves; `None` before the first picture.
     pub fn pose(&self) -> Option<CameraPose> {
         let camera = self.goal.unwrap_or(self.camera);
         let own = self.moved || self.followed.is_some();
@@ -179,18 +179,18 @@ impl Viewport {
         })
     }
 
-    /// Width over height of the picture that the camera was placed for.
+    /// Aspect ratio for which the camera was placed.
     pub fn shape(&self) -> f32 {
         self.fitted
     }
 
-    /// As [`Self::set_pose`], placed for a picture of this [`Self::shape`].
+    /// As [`Self::set_pose`], for a picture of aspect ratio [`Self::shape`].
     pub fn set_pose_for(&mut self, pose: CameraPose, shape: f32) {
         self.set_pose(pose);
         self.fitted = shape;
     }
 
-    /// Places the camera.
+    /// Sets the camera pose.
     pub fn set_pose(&mut self, pose: CameraPose) {
         self.camera.yaw = pose.yaw;
         self.camera.pitch = pose.pitch;
@@ -201,7 +201,7 @@ impl Viewport {
         self.fitted = pose.fitted.unwrap_or(self.fitted);
     }
 
-    /// After a jump in time: drops marks and trail from before it.
+    /// Drops earlier marks and trail after a jump in time.
     pub fn arrive(&mut self, player: &Player) {
         self.time = player.pacer.shown();
         self.marks.clear(self.time);
@@ -214,13 +214,13 @@ impl Viewport {
         marks.map(|mark| (mark.joint, mark.force.length(), mark.age)).collect()
     }
 
-    /// As [`Self::arrive`] where the run was before: the blows shortly before that instant are shown as when it was reached by playing.
+    /// As [`Self::arrive`] for an instant reached before: shows the preceding blows as in playback.
     pub fn revisit(&mut self, player: &Player) {
         self.arrive(player);
         self.recall(player);
     }
 
-    /// Shows the blows shortly before the displayed instant as when it was reached by playing.
+    /// Shows the blows before the displayed instant as in playback.
     fn recall(&mut self, player: &Player) {
         let (shown, fade) = (player.pacer.shown(), SEEN * player.pacer.scale());
         let peaks = player.impact_record().peaks(shown - fade, shown);
@@ -228,27 +228,27 @@ impl Viewport {
         self.marks.recall(player.frame(), blows, fade);
     }
 
-    /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
+    /// Shows another scene, or the same one after a reset that changed its shapes; user settings stay.
     pub fn show_scene(&mut self, player: &Player) {
         *self = Self { pace: self.pace.take().map(|_| Pace::default()), ..Self::new(player, self.options.clone()) };
     }
 
-    /// After a reset: the same shapes at t = 0.
+    /// After a reset with unchanged shapes: shows t = 0.
     pub fn restart(&mut self, player: &Player) {
         self.view = SceneView::new(player.running(), player.frame());
         self.arrive(player);
         self.followed = None;
     }
 
-    /// Updates peak marks, flashes, trail and moving camera, `dt` seconds after the last frame. Returns whether something still
-    /// moves by itself.
+    /// Updates peak marks, flashes, trail and camera, `dt` seconds after the last frame. Returns whether something is still
+    /// moving.
     pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
         let shown = player.pacer.shown();
         let fade = SEEN * player.pacer.scale();
         self.marks.update(player.frame(), player.peaks(), fade);
         if shown != self.time || player.is_playing() {
             if shown < self.time {
-                // What comes after the displayed instant has not happened yet, but what came before it has.
+                // Blows after the displayed instant are dropped, those before it restored.
                 self.trail.clear();
                 self.recall(player);
             }
@@ -278,7 +278,7 @@ impl Viewport {
         true
     }
 
-    /// Turns to a named point of view and shows everything.
+    /// Turns to a named point of view and fits the scene.
     pub fn preset(&mut self, preset: Preset) {
         self.follow(None);
         let mut goal = self.goal.unwrap_or(self.camera);
@@ -288,13 +288,13 @@ impl Viewport {
         self.moved = true;
     }
 
-    /// Shows everything from where the camera looks.
+    /// Fits the scene from the present direction.
     pub fn fit(&mut self) {
         self.follow(None);
         self.fit_pending = true;
     }
 
-    /// Looks into ball joint `joint`.
+    /// Moves close to ball joint `joint`.
     pub fn close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
@@ -304,7 +304,7 @@ impl Viewport {
         }
     }
 
-    /// Centres the view on ball joint `joint` and keeps it there.
+    /// Centres the view on ball joint `joint` and follows it.
     pub fn centre(&mut self, player: &Player, joint: usize) {
         if let Some(centre) = self.view.anchor(player.frame(), Picked::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
@@ -313,7 +313,7 @@ impl Viewport {
         }
     }
 
-    /// Moves to `goal`, and follows ball joint `joint` from now on.
+    /// Moves to `goal` and follows ball joint `joint`.
     fn glide(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
         (self.fit_pending, self.fits, self.moved) = (false, false, true);
@@ -326,12 +326,12 @@ impl Viewport {
         }
     }
 
-    /// Lets slow frames lower the quality while the picture moves, or does not.
+    /// Switches the reduction of quality at slow frame rates on or off.
     pub fn follow_frame_rate(&mut self, on: bool) {
         self.pace = on.then(Pace::default);
     }
 
-    /// With which quality the latest picture was drawn.
+    /// Quality of the latest picture.
     pub fn quality(&self) -> Quality {
         self.list.quality
     }
@@ -342,12 +342,12 @@ impl Viewport {
         [right, up]
     }
 
-    /// The ball joint that was clicked since the last call.
+    /// The ball joint clicked since the last call.
     pub fn take_clicked(&mut self) -> Option<usize> {
         self.clicked.take()
     }
 
-    /// Keeps a body or joint where it is on the screen; `None` lets go.
+    /// Fixes a body or joint at its screen position; `None` releases it.
     pub fn follow(&mut self, picked: Option<Picked>) {
         self.followed = picked;
         self.camera.follow(None);
@@ -356,13 +356,13 @@ impl Viewport {
         }
     }
 
-    /// The present pull of the pointer, if it has changed; `Some(None)` if the pointer let go.
+    /// The present pull if it has changed; `Some(None)` after a release.
     pub fn take_pull(&mut self) -> Option<Option<Pull>> {
         let changed = std::mem::take(&mut self.grip_changed);
         changed.then(|| self.grip.as_ref().map(Grip::pull))
     }
 
-    /// The ball joint in focus: the one that is followed.
+    /// The ball joint in focus, i.e. the followed one.
     pub fn focus(&self) -> Option<usize> {
         match self.followed {
             Some(Picked::Joint(joint)) => Some(joint),
@@ -370,24 +370,24 @@ impl Viewport {
         }
     }
 
-    /// What [`Self::follow`] was given.
+    /// The followed part, as set by [`Self::follow`].
     pub fn followed(&self) -> Option<Picked> {
         self.followed
     }
 
-    /// From now on the view is drawn as it is, whatever the shape of the picture: everything in a view of this `aspect` (width
-    /// by height) stays in the picture. `None`: it refits itself when that is due.
+    /// Freezes the view: pictures of any shape contain everything visible in a view of this `aspect` (width by height). `None`
+    /// resumes automatic refitting.
     pub fn freeze(&mut self, aspect: Option<f32>) {
         self.frozen = aspect;
     }
 
-    /// The camera for a picture of `aspect`, width by height: none shows less across than where it was placed, and one off screen no
-    /// less than the view on the screen.
+    /// The camera for a picture of `aspect` (width by height): it shows at least the width for which the camera was placed, and
+    /// off screen at least the view on the screen.
     fn framed(&self, aspect: f32) -> Camera {
         self.framed_as(self.frozen, aspect)
     }
 
-    /// The same with everything in it that is in a view of aspect `shape`.
+    /// The same for a picture that contains everything visible in a view of aspect `shape`.
     fn framed_as(&self, shape: Option<f32>, aspect: f32) -> Camera {
         let mut camera = self.camera;
         let shape = shape.unwrap_or(aspect);
@@ -399,7 +399,7 @@ impl Viewport {
         camera
     }
 
-    /// Moves the camera by hand in a picture of `size`.
+    /// Applies a manual camera movement in a picture of `size`.
     fn by_hand(&mut self, size: [u32; 2], act: impl FnOnce(&mut Camera)) {
         let aspect = size[0] as f32 / size[1] as f32;
         let framed = self.framed(aspect).field_of_view;
@@ -410,22 +410,22 @@ impl Viewport {
         (self.goal, self.fits, self.moved) = (None, false, true);
     }
 
-    /// Where a point of the scene, m, is drawn, points, in a picture over `rect`; `None` behind the camera.
+    /// Position, points, of a point of the scene, m, in a picture over `rect`; `None` behind the camera.
     pub fn place(&self, point: &Exact, rect: Rect) -> Option<Pos2> {
         let screen = Screen::new(rect, 1.0);
         let pixel = self.framed(screen.aspect()).project(to_f32(point), screen.size)?;
         Some(rect.min + vec2(pixel.x, pixel.y))
     }
 
-    /// The next factor of a short list for the magnification of the play.
+    /// Cycles the magnification of the play through a short list.
     pub fn next_magnification(&mut self) {
         const STEPS: [f32; 6] = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0];
         let next = STEPS.iter().find(|&&step| step > self.options.magnification * 1.001);
         self.options.magnification = *next.unwrap_or(&STEPS[0]);
     }
 
-    /// The picture with its overlays, over all of `ui`; a `plain` one shows nothing about what is under the cursor.
-    /// Names, and the machine where it is fitted, keep clear of what is painted `above` it.
+    /// The picture with its overlays over all of `ui`; a `plain` one does not describe the part under the cursor. Names and the
+    /// fitted machine avoid the rectangles `above` it.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: &[Rect]) {
         let (rect, response) =
             ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::click_and_drag());
@@ -438,13 +438,13 @@ impl Viewport {
         self.options.triad &= !self.bare;
 
         let aspect = screen.aspect();
-        // Folding the sheet or turning a phone would leave half of the mechanism outside.
-        // A touch alone makes its controls larger and the picture a little smaller: nothing moves under the finger.
+        // Collapsing the sheet or rotating a phone would leave half of the mechanism outside. A mere touch enlarges the controls
+        // and shrinks the picture a little: nothing may move under the finger.
         let reshaped = !(0.88..=1.25).contains(&(aspect / self.fitted)) && !ui.input(|i| i.pointer.any_down());
         if self.frozen.is_none() && (self.fit_pending || (reshaped && self.fits)) {
             self.fit_pending = false;
             (self.fitted, self.fits) = (aspect, true);
-            // The first picture of a scene does not move into place.
+            // The first picture of a scene is not animated.
             let first = self.list.size == [0, 0];
             let mut goal = self.goal.unwrap_or(self.camera);
             let plates = overlay::plates(rect, 0, &self.options).into_iter();
@@ -482,13 +482,13 @@ impl Viewport {
         let revision = follows.then_some(self.revision);
         let list = self.list.clone();
         painter.add(render::Viewport::revised(rect, list, revision, self.place));
-        // Of what was drawn, which may have fewer pixels than are shown.
+        // Scale of the drawn picture, which may have fewer pixels than the screen.
         let Screen { scale, .. } = screen.drawn_with(self.list.quality);
         let overlay = self.overlay(player, said);
         let theme = self.options.theme;
         overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above, &mut self.places);
         if let Some(hit) = hovered {
-            // Away from the nearer edge: the transport below stays free.
+            // Placed away from the nearer edge, so that the transport below stays free.
             let low = response.hover_pos().is_some_and(|pos| pos.y > rect.center().y);
             let align = if low { RectAlign::TOP_START } else { RectAlign::BOTTOM_START };
             let mut card = Tooltip::for_enabled(&response).at_pointer().gap(12.0);
@@ -498,7 +498,7 @@ impl Viewport {
         self.options.triad = triad;
     }
 
-    /// What is written over the picture; `said`: about ghosts.
+    /// The overlay of the picture; `said`: notes on ghosts.
     fn overlay(&self, player: &Player, said: Vec<String>) -> Overlay {
         let following = self.followed.and_then(|picked| name_of(player, picked));
         let following = following.map(|name| format!("following {name}"));
@@ -510,7 +510,8 @@ impl Viewport {
         }
     }
 
-    /// The view of the latest [`Self::ui`] in a second window, over all of `ui`, with arrows of another `thickness`. It takes no input.
+    /// The view of the latest [`Self::ui`] in a second window, over all of `ui`, with another arrow `thickness`. It takes no
+    /// input.
     #[cfg(not(target_arch = "wasm32"))]
     pub fn second_ui(&mut self, ui: &mut Ui, player: &Player, thickness: f32, above: Option<Rect>) {
         let (rect, _) = ui.allocate_exact_size(ui.available_size().max(vec2(16.0, 16.0)), Sense::hover());
@@ -534,7 +535,7 @@ impl Viewport {
         overlay::paint(&painter, rect, scale, list, theme, &overlay, above.as_slice(), &mut self.second_places);
     }
 
-    /// Describes what `screen` shows with `quality` in `self.next`; returns what is said about ghosts.
+    /// Builds the draw list for `screen` at `quality` in `self.next`; returns the notes on ghosts.
     fn list_next(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let mut list = std::mem::take(&mut self.next);
         let drawn = screen.drawn_with(quality);
@@ -552,18 +553,18 @@ impl Viewport {
         said
     }
 
-    /// The same in `self.list`, as another picture.
+    /// The same in `self.list`, as a new picture.
     fn compose(&mut self, player: &Player, camera: &Camera, screen: &Screen, quality: Quality) -> Vec<String> {
         let said = self.list_next(player, camera, screen, quality);
         self.show_next();
         said
     }
 
-    /// The same with what quality the frames allow; the picture before stays if nothing has changed.
+    /// The same at the quality permitted by the frame times; an unchanged picture is retained.
     fn compose_paced(&mut self, ui: &Ui, player: &Player, camera: &Camera, screen: &Screen) -> Vec<String> {
         let before = self.list.quality;
         let said = self.list_next(player, camera, screen, before);
-        // Bodies first: what mostly differs.
+        // Compares bodies first, which differ most often.
         let moves = self.next.solid != self.list.solid || self.next != *self.list;
         let Some(pace) = &mut self.pace else {
             return said;
@@ -599,7 +600,7 @@ impl Viewport {
             self.zoom(player, fingers.zoom_delta, fingers.center_pos, screen);
         }
         if self.pinched {
-            // The finger that stays down longer does not rotate the view.
+            // The remaining finger of a pinch does not rotate the view.
             return;
         }
         let delta = response.drag_delta() * scale;
@@ -620,7 +621,7 @@ impl Viewport {
         }
     }
 
-    /// Takes hold of a body by press and drag, or by a long touch; returns whether the pointer holds one.
+    /// Grips a body by press and drag or by a long touch; returns whether the pointer grips one.
     fn pull(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) -> bool {
         let (finger, shift, origin) = ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
         let taken =
@@ -636,7 +637,7 @@ impl Viewport {
         let Some(grip) = &mut self.grip else {
             return false;
         };
-        // Not the response's: egui takes the pointer from it after a long touch.
+        // Not from the response: egui takes the pointer from it after a long touch.
         let held = ui.input(|i| i.pointer.latest_pos().filter(|_| i.pointer.primary_down()));
         match held {
             None => {
@@ -655,8 +656,7 @@ impl Viewport {
         true
     }
 
-    /// Whether a finger has just stayed for long enough where it came down. (What egui calls a long touch does not come to what
-    /// can be dragged.)
+    /// Whether a touch has just stayed in place long enough. (egui's own long touch is not reported to draggable widgets.)
     fn finger_stays(&mut self, ui: &Ui, response: &egui::Response) -> bool {
         if !response.is_pointer_button_down_on() {
             self.finger_since = None;
@@ -681,7 +681,7 @@ impl Viewport {
         true
     }
 
-    /// Zooms in by `factor` on what is at `pos`, points.
+    /// Zooms by `factor` about the point at `pos`, points.
     fn zoom(&mut self, player: &Player, factor: f32, pos: Pos2, screen: &Screen) {
         if factor == 1.0 {
             return;
@@ -690,7 +690,7 @@ impl Viewport {
         let shot = shot!(self, player, &camera, screen);
         let hit = self.view.pick(&shot, screen.pixel(pos));
         let bounds = self.view.bounds();
-        // Over the background the zoom is about the whole machine, and neither end of its range loses it.
+        // Over the background, zooming is about the whole machine, which stays in view at both limits.
         let point = hit.map_or(bounds.centre, |hit| hit.point);
         let from = self.camera.eye().distance(bounds.centre);
         let lost = match hit {
@@ -705,7 +705,7 @@ impl Viewport {
         });
     }
 
-    /// Buttons for points of view, each added in turn; `backwards` where the layout runs from right to left.
+    /// Buttons for points of view; `backwards`: the layout runs from right to left.
     pub fn camera_buttons(&mut self, ui: &mut Ui, backwards: bool) {
         let mut buttons: Vec<Option<Preset>> = Preset::ALL.into_iter().map(Some).chain([None]).collect();
         if backwards {
@@ -826,22 +826,22 @@ impl Viewport {
             return;
         };
         if self.trail.len() == TRAIL {
-            // Half at once: shifting the whole trail for every point would be too costly.
+            // Drops half at once: shifting the trail for every point would be too costly.
             self.trail.drain(..TRAIL / 2);
         }
         self.trail.push(to_f32(&(body.position + body.rotation * probe)));
     }
 }
 
-/// Shows `next` in place of `list`, as another picture.
+/// Displays `next` in place of `list`, as a new picture.
 fn show_next(list: &mut Arc<DrawList>, next: &mut DrawList, revision: &mut u64) {
     static PICTURES: AtomicU64 = AtomicU64::new(0);
     *revision = PICTURES.fetch_add(1, Ordering::Relaxed);
-    // egui has dropped the clone of the previous frame: nothing is copied.
+    // egui has dropped the clone of the previous frame, so nothing is copied.
     std::mem::swap(Arc::make_mut(list), next);
 }
 
-/// Where the picture is in the window.
+/// Area of the picture in the window.
 #[derive(Clone, Copy)]
 struct Screen {
     /// Points.
@@ -858,12 +858,12 @@ impl Screen {
         Self { rect, size: [pixels(rect.width()), pixels(rect.height())], scale }
     }
 
-    /// Width over height.
+    /// Aspect ratio, width / height.
     fn aspect(&self) -> f32 {
         self.size[0] as f32 / self.size[1] as f32
     }
 
-    /// The same with the pixels that `quality` draws.
+    /// The same area with the resolution of `quality`.
     fn drawn_with(&self, quality: Quality) -> Self {
         Self::new(self.rect, self.scale * quality.sharpness)
     }
@@ -884,9 +884,9 @@ fn name_of(player: &Player, picked: Picked) -> Option<&str> {
     }
 }
 
-/// What is known about the part under the cursor.
+/// Describes the part under the cursor.
 fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
-    // A tooltip is as wide as its longest line, not as the first.
+    // Makes the tooltip as wide as its longest line.
     ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
         ui.label(format!("{name}  {}", value::quantity(si, unit, 3)));
@@ -932,14 +932,14 @@ mod tests {
     use crate::scene::Scene;
     use crate::view::{Cover, LabelKind};
 
-    /// A scene that is seen in pictures of several sizes at once.
+    /// A scene displayed in pictures of several sizes at once.
     struct Watched<const N: usize> {
         player: Player,
         viewports: [Viewport; N],
         ctx: egui::Context,
     }
 
-    /// Plates of a picture: of the time, of the legend, of labels.
+    /// Plates of a picture: time, legend, labels.
     #[derive(Default)]
     struct Seen {
         time: Option<Rect>,
@@ -962,7 +962,7 @@ mod tests {
             Self { viewports, player, ctx }
         }
 
-        /// Picture `at`, of `size`, points.
+        /// Draws picture `at` with `size`, points.
         fn draw(&mut self, at: usize, size: egui::Vec2) -> Seen {
             let Self { player, viewports, ctx } = self;
             let viewport = &mut viewports[at];
@@ -999,7 +999,7 @@ mod tests {
     /// Pictures in windows of 1280 × 800, 1920 × 1080 and 390 × 844.
     const PICTURES: [egui::Vec2; 3] = [vec2(980.0, 432.0), vec2(1620.0, 690.0), vec2(390.0, 296.0)];
 
-    /// The scene whose ten seconds take longest.
+    /// The scene with the longest computing time for ten seconds.
     const LONGEST: &str = "hexapod";
 
     #[test]
@@ -1013,10 +1013,10 @@ mod tests {
         watch(LONGEST);
     }
 
-    /// Watches a scene for ten seconds.
+    /// Watches a scene for ten seconds and checks its plates.
     fn watch(scene: &str) {
         const FRAMES: usize = 20;
-        // Of a plate, beyond what the cells of the cover are too coarse for; names are placed by coarser ones.
+        // Largest hidden share of a plate, from the cell size of the cover; names are placed on coarser cells.
         const HIDDEN: [f32; 2] = [0.005, 0.08];
         let mut watched = Watched::<{ PICTURES.len() }>::new(scene);
         let mut stood: [HashMap<LabelKind, _>; PICTURES.len()] = Default::default();
@@ -1055,7 +1055,7 @@ mod tests {
             watched.pass(10.0 / FRAMES as f32);
         }
         for (at, size) in PICTURES.into_iter().enumerate() {
-            // On average none more than once in two seconds, whatever passes behind it.
+            // On average a name moves at most once in two seconds, whatever passes behind it.
             let (moves, names) = (moves[at], stood[at].len());
             assert!(names > 0 && moves <= 5 * names, "{scene}, {size}: {moves} of {names}");
         }
@@ -1072,13 +1072,13 @@ mod tests {
         let expected = settled(&mut fresh, narrow);
         let mut watched = Watched::<1>::new("spcmm");
         let first = settled(&mut watched, wide);
-        // A little at a time, as a panel that opens.
+        // In small steps, like an opening panel.
         for width in [940.0, 890.0, 700.0, 600.0] {
             settled(&mut watched, vec2(width, 432.0));
         }
         assert_eq!(settled(&mut watched, narrow), expected);
         assert_eq!(settled(&mut watched, wide), first);
-        // A point of view that was chosen fits, too.
+        // A selected point of view is fitted, too.
         for watched in [&mut watched, &mut fresh] {
             watched.viewports[0].preset(Preset::Front);
         }
@@ -1101,7 +1101,7 @@ mod tests {
             let after = across(&watched.viewports[0], size);
             assert!(after[0] >= 0.999 * before[0] && after[1] >= 0.999 * before[1], "{size:?}: {before:?} {after:?}");
         }
-        // A hand on the camera makes nothing jump.
+        // Manual camera movement makes nothing jump.
         let before = across(&watched.viewports[0], [300, 900]);
         watched.viewports[0].by_hand([300, 900], |camera| camera.pan(Vec2::ZERO, [300, 900]));
         assert_eq!(across(&watched.viewports[0], [300, 900]), before);
@@ -1116,7 +1116,7 @@ mod tests {
             let ctx = egui::Context::default();
             theme::apply(&ctx, false);
             let mut output = ctx.run_ui(egui::RawInput::default(), |ui| viewport.ui(ui, &player, true, &[]));
-            // No texture is made of it.
+            // Nothing is uploaded.
             output.textures_delta.clear();
         };
         let unfitted = viewport.camera;

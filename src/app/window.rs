@@ -8,25 +8,25 @@ use super::{App, AppOptions, DesktopHost, Player, Store};
 use crate::render;
 use crate::scene::SceneError;
 
-/// Why the window could not open.
+/// Why the window failed to open.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
-    /// The scene cannot start.
+    /// The scene failed to start.
     #[error(transparent)]
     Start(#[from] SceneError),
     /// No graphics adapter.
     #[error(transparent)]
     NoAdapter(#[from] render::NoAdapter),
-    /// No display, or anything else that the window system said.
+    /// No display, or another error of the window system.
     #[error("cannot open a window: {0}")]
     Window(String),
 }
 
-/// Opens the window and returns when it is closed. Without `options` it begins with what the `store` remembers. Links copied in it are
-/// appended to the address `page`.
+/// Opens the window and returns when it is closed. Without `options` it starts from the settings in `store`. Links copied in it
+/// are appended to the address `page`.
 ///
 /// # Errors
-/// A scene that cannot start, no graphics adapter, no display.
+/// The scene fails to start, or there is no graphics adapter or display.
 pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store>) -> Result<(), WindowError> {
     let remembered = store.as_ref().map(|store| store.remembered().clone()).unwrap_or_default();
     let mut viewport = egui::ViewportBuilder::default()
@@ -42,7 +42,7 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
     let begin = || store.as_ref().map_or_else(AppOptions::first, Store::begin);
     let mut options = options.unwrap_or_else(begin);
     options.embedded = None;
-    // A scene error must keep its type and not become one of the window.
+    // Keeps a scene error typed instead of wrapping it in a window error.
     Player::new(&options.scene).map_err(|error| options.scene.locate(&error))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
         let mut app = App::new(cc, options)?;
@@ -60,12 +60,12 @@ pub fn run_native(options: Option<AppOptions>, page: String, store: Option<Store
     })
 }
 
-/// Moves a window that lies beside all screens, as one of them is gone, to the first that is left.
+/// Moves a window that lies off all screens, e.g. after one was unplugged, to the first remaining screen.
 fn bring_back(cc: &eframe::CreationContext<'_>) {
     let Some(window) = cc.winit_window() else {
         return;
     };
-    // Some platforms tell nobody where a window is.
+    // Some platforms do not report the window position.
     let Ok(place) = window.outer_position() else {
         return;
     };

@@ -1,24 +1,24 @@
-//! Zooming with wheel and pinch: the same everywhere.
+//! Zoom by wheel and pinch, shared by all views.
 
 use eframe::egui::{PointerButton, Pos2, Response, Ui};
 
-/// Zoom factor of wheel and pinch in this frame; 1 where they rest.
+/// Zoom factor of wheel and pinch in this frame; 1 without input.
 pub fn factor(ui: &Ui) -> f32 {
     let (wheel, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
     (wheel * 0.004).exp() * pinch
 }
 
-/// What wheel and pinch do to a time range in this frame.
+/// Change of a time range by wheel and pinch in this frame.
 pub struct Zoom {
     factor: f32,
-    /// The place that stays, but for the shift.
+    /// Fixed point of the zoom, before the shift.
     pub place: Pos2,
-    /// How far two fingers move it, points.
+    /// Shift by two fingers, points.
     shift: f32,
 }
 
 impl Zoom {
-    /// Over `response`: about the pointer, or midway between two fingers.
+    /// Zoom over `response` about the pointer, or about the midpoint of two fingers.
     pub fn over(ui: &Ui, response: &Response) -> Option<Self> {
         let factor = factor(ui);
         let (place, shift) = match ui.input(|input| input.multi_touch()) {
@@ -32,8 +32,8 @@ impl Zoom {
         (factor != 1.0 || shift != 0.0).then_some(Self { factor, place, shift })
     }
 
-    /// The time range (`from`, `to`), s, drawn over `width` points, after it; `time` is the instant at the place. No shorter
-    /// than `least`.
+    /// The zoomed time range, s, of (`from`, `to`) drawn over `width` points; `time` is the instant at the fixed point. The
+    /// result is at least `least` long.
     pub fn apply(&self, (from, to): (f64, f64), time: f64, width: f32, least: f64) -> (f64, f64) {
         let length = ((to - from) / f64::from(self.factor)).max(least);
         let share = (time - from) / (to - from) + f64::from(self.shift / width);
@@ -47,7 +47,7 @@ pub fn drags(ui: &Ui, response: &Response) -> bool {
     response.dragged_by(PointerButton::Primary) && ui.input(|input| input.multi_touch()).is_none()
 }
 
-/// (`from`, `to`) moved into (0, `end`), with its length unchanged.
+/// (`from`, `to`) shifted into (0, `end`) with its length unchanged.
 pub fn within((from, to): (f64, f64), end: f64) -> (f64, f64) {
     let length = to - from;
     let from = from.clamp(0.0, (end - length).max(0.0));

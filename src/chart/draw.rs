@@ -1,4 +1,4 @@
-//! Renders a description to SVG with `plotters`.
+//! Renders a sheet of charts to SVG with `plotters`.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -13,17 +13,17 @@ use crate::scene::visible;
 /// Several charts on one page with a common legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
-    /// Title over all charts; "" leaves it out.
+    /// Title above all charts; empty for none.
     pub title: String,
-    /// Row by row.
+    /// The charts, row by row.
     pub charts: Vec<Chart>,
     /// Charts per row.
     pub columns: usize,
     /// Width and height, pixels.
     pub size: (u32, u32),
-    /// A line under everything; "" leaves it out.
+    /// Note below all charts; empty for none.
     pub note: String,
-    /// Each chart has a legend of its own: the same colours stand for other things in each.
+    /// Gives each chart its own legend, for charts that use the same colours differently.
     pub apart: bool,
 }
 
@@ -38,14 +38,14 @@ const GAP: f64 = 18.0;
 /// Half the size of a marker, line width, pixels.
 const MARKER: f64 = 4.0;
 const LINE: f64 = 1.6;
-/// Average letter width over text size, on the generous side.
+/// Average letter width as a fraction of text size, a generous estimate.
 const LETTER: f64 = 0.51;
 
 const GRID: Colour = (214, 214, 214);
 const FINE_GRID: Colour = (238, 238, 238);
 
 impl Sheet {
-    /// The picture as SVG; the same description gives the same bytes.
+    /// The sheet as SVG; equal descriptions give equal bytes.
     ///
     /// # Errors
     /// A page too small for its charts.
@@ -58,8 +58,8 @@ impl Sheet {
             self.draw(&root)?;
             root.present().map_err(failed)?;
         }
-        // The page has the requested size; inside it the finer units remain. Line joins are rounded: pointed, a line would
-        // rise above its peaks.
+        // The page has the requested size; its content keeps the finer units. Round line joins, because mitred ones overshoot
+        // peaks.
         let (found, wanted) = (
             format!("width=\"{width}\" height=\"{height}\""),
             format!("width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"", self.size.0, self.size.1),
@@ -125,7 +125,7 @@ fn legend_rows(charts: &[Chart], width: f64) -> Vec<Vec<&Series>> {
     rows
 }
 
-/// Draws the legend of `charts` above `bottom`, from `left` on in `width`; returns its upper edge.
+/// Draws the legend of `charts` above `bottom`, from `left` and at most `width` wide; returns its upper edge.
 fn draw_legends(root: &Canvas, charts: &[Chart], left: f64, width: f64, bottom: f64) -> Result<f64, SheetError> {
     let rows = legend_rows(charts, width);
     let top = bottom - ROW * rows.len() as f64;
@@ -180,7 +180,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         y.narrow(low.1, high.1);
     }
     let beside = if chart.map.is_some() { heat::SCALE_WIDTH } else { 0.0 };
-    // Room for the longest word on the left.
+    // Room for the longest tick label on the left.
     let longest = y.ticks.iter().map(|&tick| text_width(&y.word(tick), TEXT)).fold(0.0, f64::max);
     let heading = style(HEADING, INK, HPos::Left, VPos::Top);
     let mut plot: Plot = ChartBuilder::on(area)
@@ -224,7 +224,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
             for part in series.points.split(|point| inside(point).is_none()) {
                 let path: Vec<(i32, i32)> =
                     part.iter().filter_map(|point| inside(point).map(|place| plot.backend_coord(&place))).collect();
-                // Finer than a quarter of a pixel is invisible.
+                // Detail below a quarter of a pixel is invisible.
                 let path = thin::line(&path, 1.0);
                 if !chart.labels.is_empty() {
                     along(&path, &mut taken);
@@ -258,7 +258,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     draw_labels(root, &plot, chart, inside, taken)
 }
 
-/// Small areas along a line, for the texts to avoid.
+/// Adds small areas along a line, which labels must avoid.
 fn along(path: &[(i32, i32)], taken: &mut Vec<Area>) {
     let step = f64::from(fine(MARKER));
     for ends in path.windows(2) {
@@ -346,7 +346,7 @@ fn draw_labels(
     let centre = style(TEXT, INK, HPos::Center, VPos::Center);
     for ((label, (x, y)), area) in labels.iter().zip(arrange(&wanted, taken, frame, unit)) {
         let middle = ((area.x + 0.5 * area.width) as i32, (area.y + 0.5 * area.height) as i32);
-        // A thin line connects a text to its point.
+        // A thin line connects a label to its point.
         let edge = (
             (*x).clamp(area.x as i32, (area.x + area.width) as i32),
             (*y).clamp(area.y as i32, (area.y + area.height) as i32),

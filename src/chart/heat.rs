@@ -21,7 +21,7 @@ impl Legend {
     pub(super) fn new(map: &Map) -> Self {
         let axis = Axis { label: String::new(), range: None, ..map.scale.clone() };
         let mut ruler = Ruler::new(&axis, map.values.iter().copied());
-        // The scale ends where the values do.
+        // The scale ends at the extreme values.
         let (from, to) = map
             .values
             .iter()
@@ -79,7 +79,7 @@ pub(super) fn cells(root: &Canvas, plot: &Plot, map: &Map, x: &Ruler, y: &Ruler)
             let a = plot.backend_coord(&(x.place(columns[0]), y.place(rows[0])));
             let b = plot.backend_coord(&(x.place(columns[1]), y.place(rows[1])));
             let filled = rgb(legend.colour(map, value)).filled();
-            // Overlap the next cells a little, which are drawn on top: no seams.
+            // Overlaps the next cells, which are drawn on top, to avoid seams.
             let more = |edge: usize, cells: usize| if edge + 1 < cells { 2 } else { 0 };
             let b = (b.0 + more(i, map.xs.len()), b.1 - more(j, map.ys.len()));
             root.draw(&Rectangle::new([a, b], filled)).map_err(failed)?;

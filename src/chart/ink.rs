@@ -13,7 +13,7 @@ use super::ticks::Ruler;
 #[error("cannot draw the chart: {0}")]
 pub struct SheetError(pub(super) String);
 
-/// The drawing library uses integers: this many units make a pixel.
+/// Drawing units per pixel, because the drawing library uses integers.
 pub(super) const FINE: u32 = 4;
 
 pub(super) const TEXT: f64 = 12.0;
@@ -57,7 +57,7 @@ pub(super) fn failed(error: impl std::fmt::Display) -> SheetError {
 }
 
 pub(super) fn style(size: f64, colour: Colour, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
-    // The library takes a line height; letters are that divided by 1.24.
+    // The library takes the line height, 1.24 times the letter size.
     TextStyle {
         font: ("sans-serif", 1.24 * size * f64::from(FINE)).into_font(),
         color: rgb(colour).to_backend_color(),

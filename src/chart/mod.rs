@@ -1,6 +1,6 @@
-//! Charts as data, and their pictures: one description gives an SVG, and a PNG and a PDF drawn from it.
+//! Charts as data. One description gives an SVG, from which PNG and PDF files are made.
 //!
-//! Knows nothing of mechanisms and needs no display.
+//! This module knows nothing of mechanisms and needs no display.
 
 mod draw;
 mod heat;
@@ -17,8 +17,8 @@ pub use ink::SheetError;
 /// A colour, red, green, blue.
 pub type Colour = (u8, u8, u8);
 
-/// Colours that can be told apart with any kind of colour vision (Okabe & Ito, "Color universal design"), dark enough for
-/// lines on white; the first is for the reference that the others are compared with.
+/// Colours distinguishable with any kind of colour vision (Okabe & Ito, "Color universal design"), dark enough for lines on
+/// white; the first is for the reference.
 pub const PALETTE: [Colour; 8] = [
     (0, 0, 0),
     (0, 114, 178),
@@ -33,10 +33,10 @@ pub const PALETTE: [Colour; 8] = [
 /// Scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// Equal differences.
+    /// Linear.
     #[default]
     Linear,
-    /// Equal ratios; values that are not positive are not shown.
+    /// Logarithmic; values that are not positive are not shown.
     Logarithmic,
 }
 
@@ -45,7 +45,7 @@ pub enum Scale {
 pub struct Axis {
     /// Quantity, sentence case.
     pub label: String,
-    /// Unit, "" for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: String,
     /// Linear or logarithmic.
     pub scale: Scale,
@@ -76,11 +76,11 @@ pub enum Marker {
     Triangle,
     /// Filled triangle, tip down.
     TriangleDown,
-    /// Filled square on its corner.
+    /// Filled square standing on a corner.
     Diamond,
-    /// Two crossing strokes.
+    /// Diagonal cross.
     Cross,
-    /// Two upright strokes.
+    /// Upright cross.
     Plus,
     /// Ring around other markers, to single them out.
     Ring,
@@ -93,7 +93,7 @@ pub enum Marker {
 /// Points drawn in one style.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Name in the legend; "" leaves it out.
+    /// Name in the legend; empty for none.
     pub label: String,
     /// (x, y); a point that is not finite breaks the line.
     pub points: Vec<(f64, f64)>,

@@ -1,4 +1,4 @@
-//! Writes the paths of the SVG as PDF, text as the outlines of its glyphs: a reader needs no fonts.
+//! Writes the paths of the SVG as PDF. Text becomes glyph outlines, so a reader needs no fonts.
 
 use pdf_writer::types::{LineCapStyle, LineJoinStyle};
 use pdf_writer::{Content, Filter, Finish as _, Pdf, Rect, Ref, TextStr};
@@ -7,11 +7,11 @@ use resvg::usvg::{Color, FillRule, Group, LineCap, LineJoin, Node, Opacity, Pain
 
 use super::{Sheet, SheetError};
 
-/// Points of a page to a pixel of the description: 72 and 96 to the inch.
+/// PDF points per pixel of the description: 72 and 96 per inch.
 const POINTS: f32 = 0.75;
 
 impl Sheet {
-    /// The picture as a PDF of one page, whose pixels are 1/96 inch; the same description gives the same bytes.
+    /// The sheet as a one-page PDF with pixels of 1/96 inch; equal descriptions give equal bytes.
     ///
     /// # Errors
     /// As [`Sheet::svg`].
@@ -19,7 +19,7 @@ impl Sheet {
         let tree = self.tree()?;
         let (width, height) = (tree.size().width() * POINTS, tree.size().height() * POINTS);
         let mut content = Content::new();
-        // A page has its origin in the lower left corner.
+        // A PDF page has its origin in the lower left corner.
         write_group(&mut content, tree.root(), Transform::from_row(POINTS, 0.0, 0.0, -POINTS, 0.0, height))?;
         let content = miniz_oxide::deflate::compress_to_vec_zlib(&content.finish(), 9);
 
@@ -122,7 +122,7 @@ fn write_outline(content: &mut Content, path: &Path) {
                 to
             }
             PathSegment::QuadTo(middle, to) => {
-                // The same curve as a cubic one.
+                // The same curve as a cubic, the only kind in PDF.
                 let towards = |from: Point| {
                     Point::from_xy(from.x + (middle.x - from.x) * 2.0 / 3.0, from.y + (middle.y - from.y) * 2.0 / 3.0)
                 };
@@ -141,7 +141,7 @@ fn rounded(point: Point) -> [f32; 2] {
     [round(point.x), round(point.y)]
 }
 
-/// To a thousandth of a point, finer than any printer.
+/// Rounds to a thousandth of a point, finer than any printer.
 fn round(points: f32) -> f32 {
     (points * 1000.0).round() / 1000.0
 }
@@ -155,7 +155,7 @@ fn rgb(paint: &Paint, opacity: Opacity) -> Result<[f32; 3], SheetError> {
     }
 }
 
-/// No chart has any of these: all its paths are opaque and of one colour.
+/// Charts never cause this error: all their paths are opaque and of one colour.
 fn unknown() -> SheetError {
     SheetError("PDF files are written of opaque paths of one colour alone".to_owned())
 }

@@ -1,4 +1,4 @@
-//! Converts SVG to PNG with `resvg`, using a bundled font: system fonts have no influence.
+//! Converts SVG to PNG with `resvg`, using bundled fonts, so that system fonts have no influence.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ impl Sheet {
         Tree::from_str(&self.svg()?, &options).map_err(failed)
     }
 
-    /// The picture as PNG, with `scale` pixels per pixel of the description.
+    /// The sheet as PNG, with `scale` pixels per pixel of the description.
     ///
     /// # Errors
     /// As [`Sheet::svg`]; a picture without area or with an edge of more than 16384 pixels.

@@ -1,4 +1,4 @@
-//! Drops invisible points of lines and clouds: pictures stay small whatever the number of points.
+//! Drops invisible points of lines and clouds, so that pictures stay small for any number of points.
 
 use std::collections::HashSet;
 

@@ -6,10 +6,10 @@ use super::{Axis, Scale};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ruler {
     scale: Scale,
-    /// Ends, in places.
+    /// Ends of the axis, as positions.
     pub from: f64,
     pub to: f64,
-    /// Places with and without a label.
+    /// Positions of the ticks with and without a label.
     pub ticks: Vec<f64>,
     pub minor: Vec<f64>,
     step: f64,
@@ -21,7 +21,7 @@ pub(super) struct Ruler {
 const MOST: f64 = 8.0;
 
 impl Ruler {
-    /// For `axis` with data at `values`.
+    /// The ruler of `axis` for data at `values`.
     pub(super) fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Self {
         let scale = axis.scale;
         let place = |value: f64| place(scale, value);
@@ -139,7 +139,7 @@ fn linear_step(span: f64) -> (f64, f64) {
     (factor * unit, factor * unit / parts)
 }
 
-/// The same in powers of ten.
+/// The same for a logarithmic axis, in decades.
 fn logarithmic_step(span: f64) -> (f64, f64) {
     let step = (span / MOST).ceil().max(1.0);
     (step, 1.0)

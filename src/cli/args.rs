@@ -71,7 +71,7 @@ pub struct SceneArguments {
 }
 
 impl SceneArguments {
-    /// What to call the scene in a message or another command.
+    /// Name of the scene in messages and in other commands.
     pub fn name(&self) -> std::path::PathBuf {
         self.scene.as_ref().map_or_else(|| "--link …".into(), Into::into)
     }
@@ -481,14 +481,14 @@ fn change(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// Where a point starts from, by its word.
+/// Parser for `--start`.
 fn starts() -> impl TypedValueParser<Value = Start> {
     let words = Start::ALL.map(|start| PossibleValue::new(start.word()).help(start.meaning()));
     let of_word = |word: String| Start::ALL.into_iter().find(|start| start.word() == word);
     PossibleValuesParser::new(words).map(move |word| of_word(word).expect("one of these"))
 }
 
-/// A whole number, also one like `1e3`; too large a number is reported where the period is known.
+/// Parses a whole number, also one like `1e3`. The upper limit is checked later, when the drive period is known.
 fn periods(text: &str) -> Result<usize, String> {
     let number = text.parse::<f64>().ok().filter(|n| *n >= 0.0 && n.fract() == 0.0);
     let whole = text.parse().ok().or(number.map(|n| n as usize));
@@ -506,7 +506,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl Default for ViewArguments {
-    /// As if no command were given.
+    /// The arguments of `jointplay` without a command.
     fn default() -> Self {
         Self { scene: None, changes: Vec::new(), link: None, lesson: None, page: None, fresh: false }
     }

@@ -9,7 +9,7 @@ use crate::mechanism::Placement;
 use crate::simulate::{Doubt, Simulation};
 use crate::units::format_quantity_digits;
 
-/// A body moved or turned by more than this is not where its scene puts it: m, rad.
+/// A body moved or turned by more than this during assembly gets a warning: m, rad.
 const FAR: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
 
 /// A body moved and turned by less than this counts as not moved: m, rad.
@@ -17,7 +17,7 @@ const NEAR: Placement = Placement { moved: 1e-6, turned: 1e-3 * DEGREE };
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Name of a joint at which trees are cut.
+/// Name of a cut joint.
 fn cut_joint(machine: &Machine, joint: usize) -> &str {
     let closing = || &machine.closing_joints[joint - machine.ball_joints.len()].name;
     let ball = machine.ball_joints.get(joint).map(|ball| &ball.name);
@@ -64,7 +64,7 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
     lines
 }
 
-/// Assembly results that the scene can hardly intend.
+/// Assembly results that are probably not intended.
 fn warnings(simulation: &Simulation) -> Vec<String> {
     let machine = simulation.machine();
     let assembly = simulation.mechanism().assembly();
@@ -99,11 +99,11 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     warnings
 }
 
-/// What is known about a scene at the start of its run.
+/// Findings about a scene at the start of its run.
 pub struct Start {
     /// Label and text of each line about the assembly.
     pub lines: Vec<(String, String)>,
-    /// Assembly results that the scene can hardly intend.
+    /// Assembly results that are probably not intended.
     pub warnings: Vec<String>,
     /// Ideal ball joints and joints that close loops whose reactions are not unique.
     pub reactions: Vec<String>,
@@ -128,7 +128,7 @@ impl Start {
         }
     }
 
-    /// The message that some forces are not unique, if that is so.
+    /// Message about forces that are not unique, if there are any.
     pub fn not_unique(&self) -> Option<String> {
         if self.reactions.is_empty() {
             return None;
@@ -156,7 +156,7 @@ impl Start {
     }
 }
 
-/// The assembly for a script: m and rad.
+/// The assembly as JSON, in m and rad.
 fn json(simulation: &Simulation) -> Json {
     let machine = simulation.machine();
     let assembly = simulation.mechanism().assembly();

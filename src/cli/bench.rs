@@ -23,7 +23,7 @@ pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
         for (n, goal) in SPEED_GOALS.into_iter().enumerate() {
             machines.push(speed(goal, &mut context.part(n + 1, parts))?);
         }
-        // At the tolerance of the shorter of its two chains.
+        // Uses the tolerance of the shorter of its two chains.
         let tolerance = machines[1].tolerance;
         let growth = growth(tolerance, &mut context.part(parts - 1, parts))?;
         Ok((rows, machines, growth))

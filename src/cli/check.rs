@@ -1,4 +1,4 @@
-//! `check`: what a scene contains, what will be computed and what will not, and what to be careful about.
+//! `check`: contents of a scene, what a run computes and what it skips, and warnings.
 
 use std::fmt::Write;
 
@@ -20,10 +20,10 @@ use crate::units::{format_quantity, format_quantity_digits, to_display};
 /// Runs `check`.
 ///
 /// # Errors
-/// Anything wrong with the scene, a start that does not close included.
+/// Any error in the scene, including joints that cannot be closed at the start.
 pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let scene = load(&arguments.scene)?;
-    // Starting the scene finds what parsing cannot: joints that do not close, rods that do not reach.
+    // Only starting the scene reveals joints that do not close and rods that do not reach.
     let mut simulation = start(&scene)?;
     let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
@@ -36,7 +36,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     print(&report(&scene, &contents, &begun, &frame, beginning.as_ref())?)
 }
 
-/// The channels of a scene, a line each: name, unit, column, what it is.
+/// The channels of a scene, one per line: name, unit, column, description.
 fn channels(all: &[Listed]) -> String {
     let width = |of: fn(&Listed) -> usize| all.iter().map(of).max().unwrap_or_default();
     let name = width(|channel| channel.name.len());
@@ -150,7 +150,7 @@ fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {
     names.map(String::as_str).collect::<Vec<_>>().join(", ")
 }
 
-/// Mass properties of a body that has them from its shapes.
+/// Mass properties of a body, computed from its shapes.
 fn of_its_shapes(body: &Body) -> String {
     let each = |values: [f64; 3], unit: &str| {
         let numbers = values.map(|value| significant(to_display(value, unit) + 0.0, 4));
@@ -223,10 +223,10 @@ fn force_element(element: &Element, report: &ElementReport) -> String {
     format!("{}: {}", element.kind.word(), exerts.join(" and "))
 }
 
-/// Ball joints whose beginning is listed at most.
+/// Largest number of ball joints listed with their first contact forces.
 const MOST_JOINTS: usize = 12;
 
-/// The largest contact force of a beginning.
+/// Largest contact force, its time and the fastest approach in the first part of a run.
 fn first_contact(peak: &Peak) -> String {
     if peak.normal == 0.0 {
         return "no contact".to_owned();
@@ -287,7 +287,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
     }
 }
 
-/// What the run will compute, and what it need not.
+/// Lists of what the run computes and of what it skips.
 fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     let with = |ideal| names(scene.machine.ball_joints.iter().filter(move |j| is_ideal(j) == ideal).map(|j| &j.name));
     let (mut computed, mut left_out) = (Vec::new(), Vec::new());
@@ -297,7 +297,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     sort(
         contents.solves_differential_equation,
         match contents.degrees_of_freedom as u64 {
-            // Purely kinematic, but with a number of constraint rows that differs from that of the coordinates.
+            // Purely kinematic, but the number of constraint rows differs from that of the coordinates.
             0 => "the motion that the drives prescribe, step by step, closed after each".to_owned(),
             free => format!("differential equations of {} of freedom", count(free, "degree")),
         },
@@ -333,7 +333,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
 /// Instants per drive period at which the ideal mechanism is examined.
 const INSTANTS: u32 = 400;
 
-/// Drive frequency for that, Hz: the paper's.
+/// Drive frequency of this check, Hz, as in the paper.
 const SLOW: f64 = 0.5;
 
 /// Reactions above this many times the weight of all bodies indicate a mechanism about to lose its stiffness.
@@ -341,9 +341,9 @@ const MOST_WEIGHTS: f64 = 5.0;
 
 /// A mechanism that comes near a singular pose.
 pub(super) enum NearSingular {
-    /// It cannot pass the pose at this time, s.
+    /// It gets stuck at this time, s.
     Stuck(f64),
-    /// Its largest reaction (N), at this instant (s).
+    /// Largest reaction, N, and its time, s.
     Loaded(f64, f64),
 }
 
@@ -361,7 +361,7 @@ impl std::fmt::Display for NearSingular {
     }
 }
 
-/// Rods that reach do not yet make a good mechanism: near a singular pose the reactions of the ideal joints explode.
+/// Looks for a nearly singular pose, where the reactions of the ideal joints explode even if all rods reach.
 pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let mut rigid = scene.clone();
     rigid.machine.formulation = Formulation::Tree;
@@ -369,7 +369,7 @@ pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let drive = rigid.machine.spcmm.as_mut()?;
     // Sliders at rest have a single pose.
     let instants = if drive.frequency > 0.0 { INSTANTS } else { 0 };
-    // Slow, so that the reactions come from weight alone: the poses are the same.
+    // At a low frequency only weight loads the joints; the poses do not depend on it.
     drive.frequency = SLOW;
     let period = 1.0 / SLOW;
     for joint in &mut rigid.machine.ball_joints {

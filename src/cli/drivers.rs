@@ -2,9 +2,9 @@
 
 /// Restarts this program with a runtime folder if it has none, before anything else is done.
 ///
-/// Mesa asks Wayland's library for a display, with a window or without one, and that library complains on standard error
-/// if `XDG_RUNTIME_DIR` does not name a folder; a named folder that does not exist it accepts silently. The environment
-/// can be changed safely only for a new program.
+/// Mesa asks Wayland's library for a display even without a window. That library complains on standard error if
+/// `XDG_RUNTIME_DIR` does not name a folder, but silently accepts one that does not exist. The environment can be changed
+/// safely only for a new program.
 #[cfg(target_os = "linux")]
 pub fn restart_with_runtime_dir() {
     use std::os::unix::process::CommandExt;
@@ -22,7 +22,7 @@ pub fn restart_with_runtime_dir() {
     let mut arguments = std::env::args_os();
     let name = arguments.next().unwrap_or_else(|| program.clone().into());
     let error = Command::new(program).arg0(name).args(arguments).env(FOLDER, Path::new("/nonexistent")).exec();
-    // Then continue with the complaints.
+    // Continues despite the complaints.
     log::info!("cannot restart: {error}");
 }
 

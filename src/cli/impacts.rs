@@ -15,9 +15,9 @@ use crate::simulate::{Impact, Simulation};
 pub struct ImpactsFile {
     file: RowsFile,
     impacts: Vec<Impact>,
-    /// Those that ended before this time, s, are another run's.
+    /// Impacts that ended before this time, s, belong to an earlier run.
     since: f64,
-    /// Of the latest step.
+    /// Impacts of the latest step.
     latest: Vec<Impact>,
 }
 
@@ -48,7 +48,7 @@ impl ImpactsFile {
         &self.impacts
     }
 
-    /// Writes them with `meta`, their provenance; nothing has its final name yet. Also returns the number of rows.
+    /// Writes the impacts with their provenance `meta`, under temporary names. Also returns the number of rows.
     ///
     /// # Errors
     /// As [`RowsFile::fill`].
@@ -68,9 +68,9 @@ impl ImpactsFile {
 pub struct Restitution {
     /// Number of impacts.
     pub impacts: usize,
-    /// Of these, undisturbed ones that were no slower than the floor.
+    /// Undisturbed impacts among them that were no slower than the floor.
     pub undisturbed: usize,
-    /// Median of effective less requested restitution over the undisturbed ones; `None` without any.
+    /// Median of effective minus requested restitution over the undisturbed impacts; `None` without any.
     pub median_excess: Option<f64>,
 }
 

@@ -32,7 +32,7 @@ pub fn listen() {
     });
 }
 
-/// Whether the run is to end.
+/// Whether the run has been asked to end.
 pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
@@ -45,7 +45,7 @@ struct Signals {
 }
 
 impl Signals {
-    /// Records a signal; whether to exit at once: on the third, or on the second if it does not just echo the first.
+    /// Records a signal and returns whether to exit at once: on the third, or on the second unless it just echoes the first.
     fn must_exit(&mut self, now: Instant) -> bool {
         self.count += 1;
         let first = *self.first.get_or_insert(now);

@@ -1,4 +1,4 @@
-//! Runs of a share link: what was done on the way is done again after the same steps, so that page and program compare by the same hash.
+//! Runs of a share link. Live changes are replayed after the same steps, so that page and program can compare state hashes.
 
 use std::collections::VecDeque;
 
@@ -8,14 +8,14 @@ use crate::app::{Entry, Event, Link};
 use crate::scene::LiveScene;
 use crate::scene::Scene;
 
-/// The rest of a link's run.
+/// The remaining replay of a link's run.
 pub struct Way {
     entries: VecDeque<Entry>,
-    /// The scene as its file gives it.
+    /// The scene as parsed from its file.
     original: Scene,
-    /// Instants at which steps end.
+    /// Section instants, at which steps end.
     sections: Option<Schedule>,
-    /// Where it ends: accepted steps, or else an instant, s.
+    /// End of the run: number of accepted steps, or else a time, s.
     steps: Option<u64>,
     time: Option<f64>,
     hash: Option<u64>,
@@ -31,7 +31,7 @@ pub fn parse(text: &str) -> Result<Link, Failure> {
 }
 
 impl Way {
-    /// The way to the instant of `link`.
+    /// The replay up to the instant of `link`.
     ///
     /// # Errors
     /// The link's scene without its changes cannot be read.
@@ -62,11 +62,11 @@ impl Way {
         self.hash
     }
 
-    /// Does what was done before the next step, and takes that step, which ends at `end`, s, at the latest; without one it ends
-    /// where it will, as in the window. None where the link's instant is reached.
+    /// Applies the changes due before the next step, then takes that step, which ends at `end`, s, at the latest. Without `end`
+    /// the step is not truncated, as in the window, and none is taken once the link's instant is reached.
     ///
     /// # Errors
-    /// In words: a change that is refused, a step that is refused and was not in the link's run.
+    /// Text: a rejected change, or a rejected step that was not rejected in the link's run.
     pub fn step(&mut self, simulation: &mut LiveScene, end: Option<f64>) -> Result<(), String> {
         self.do_due(simulation)?;
         if end.is_none() && self.is_there(simulation) {
@@ -89,13 +89,13 @@ impl Way {
         Ok(())
     }
 
-    /// Whether a refused step was refused in the link's run, too.
+    /// Whether the link's run also rejected this step.
     fn expects_stop(&mut self, simulation: &LiveScene) -> bool {
         let steps = simulation.statistics().steps;
         self.entries.pop_front_if(|entry| entry.event == Event::Stop && entry.steps == steps).is_some()
     }
 
-    /// The state compared with the link's, in words; the error if they differ.
+    /// Compares the state with the link's, in words; an error if they differ.
     pub fn verdict(&self, simulation: &LiveScene) -> Result<String, String> {
         let found = simulation.state_hash();
         match self.hash {

@@ -1,4 +1,4 @@
-//! Name of the machine the program runs on: timings mean something only beside it.
+//! Name of the machine, without which timings mean nothing.
 
 /// Model of the processor, as far as the system reports it.
 pub fn name() -> String {

@@ -1,4 +1,4 @@
-//! Analyses by the clock of this machine, with a progress bar, until Ctrl-C.
+//! Analyses timed on this machine, with a progress bar, until Ctrl-C.
 
 use std::ops::ControlFlow;
 
@@ -12,7 +12,7 @@ const PARTS: f64 = 1000.0;
 /// Runs `analysis`; an error of `scene` names the line of its file.
 ///
 /// # Errors
-/// As the analysis; Ctrl-C.
+/// Errors of the analysis; Ctrl-C.
 pub fn measure<T>(
     quiet: bool,
     scene: Option<&Scene>,
@@ -38,7 +38,7 @@ pub fn measure<T>(
     })
 }
 
-/// Processor time of this thread, which does the stepping, s: other load on the machine does not count.
+/// Processor time of this thread, which does the stepping, s; it excludes other load on the machine.
 #[cfg(unix)]
 fn clock() -> impl FnMut() -> f64 {
     use rustix::time::{ClockId, clock_gettime};

@@ -52,7 +52,7 @@ pub fn main() -> u8 {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if error.use_stderr() => {
-            // The message quotes what was typed.
+            // The message quotes user input, so it is printed with control characters visible.
             complain(error.render().to_string().trim_end());
             return Failure::USAGE;
         }
@@ -68,7 +68,7 @@ pub fn main() -> u8 {
     }
 }
 
-/// Threads to compute with: as many as `asked` for, or one for each core.
+/// Number of threads: `asked`, or one per core.
 fn threads(asked: Option<u16>) -> usize {
     let cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
     asked.map_or_else(cores, usize::from)
@@ -125,7 +125,7 @@ fn view(arguments: &ViewArguments) -> Result<(), Failure> {
             WindowError::NoAdapter(_) => Failure::NO_ADAPTER,
             WindowError::Window(_) => Failure::INPUT_OUTPUT,
         };
-        // The window system's own message does not say what works instead.
+        // The window system's own message offers no alternative.
         let message = if matches!(error, WindowError::Window(_)) && no_display() {
             "cannot open a window: there is no display; `jointplay render` draws frames without one".to_owned()
         } else {
@@ -190,7 +190,7 @@ fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
     }
 }
 
-/// Starts a scene; an error names the line of its file and the change that it concerns.
+/// Starts a scene; an error names the line of its file and the change concerned.
 fn start(scene: &Scene) -> Result<LiveScene, Failure> {
     LiveScene::new(scene).map_err(|error| scene.locate(&error).into())
 }
@@ -223,7 +223,7 @@ fn warn(text: &str) {
     complain(&format!("warning: {text}"));
 }
 
-/// Writes to standard error; if that is closed, there is nobody to tell.
+/// Writes to standard error, ignoring failures.
 fn complain(text: &str) {
     let _ = writeln!(io::stderr(), "{}", visible(text));
 }

@@ -3,9 +3,9 @@
 use super::Failure;
 use crate::app::{NO_PAGE, is_page};
 
-/// Environment variable with the address that links are appended to: when the program starts, or else when it was built.
+/// Environment variable with the address that links are appended to, read at start-up or else at build time.
 const PAGE: &str = "JOINTPLAY_PAGE";
-/// That of the build.
+/// Its value at build time.
 const BUILT: Option<&str> = option_env!("JOINTPLAY_PAGE");
 
 /// The address that links are appended to, from `--page` or else from [`PAGE`]; "" for none.

@@ -1,4 +1,4 @@
-//! The peaks of force elements and of all joints but ball joints, in words and as JSON.
+//! Peak loads of force elements and of joints other than ball joints, in words and as JSON.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -6,26 +6,26 @@ use super::output::significant;
 use crate::machine::JointKind;
 use crate::simulate::{LoadPeak, Simulation};
 
-/// Units of force and torque, and their members of a summary: value and time.
+/// Units of force and torque, with the summary keys of the peak value and its time.
 const LOADS: [(&str, &str, &str); 2] =
     [("N", "peak_force_N", "peak_force_time_s"), ("N m", "peak_torque_Nm", "peak_torque_time_s")];
 
 /// An element or a joint with the peaks of its force and its torque.
 pub struct Part<'a> {
-    /// What it is and its name.
+    /// Kind of part and its name.
     pub label: String,
     name: &'a str,
     kind: &'static str,
     peaks: [LoadPeak; 2],
-    /// Peaks up to these are rounding.
+    /// Peaks up to these are rounding errors, N and N m.
     rounding: [f64; 2],
 }
 
-/// A peak below this part of the largest of all parts is rounding.
+/// A peak below this fraction of the largest peak of all parts is a rounding error.
 const ROUNDING: f64 = 1e-12;
 
 impl Part<'_> {
-    /// Its kind and peaks.
+    /// Kind and peaks, in words.
     pub fn words(&self) -> String {
         let known = self.peaks.iter().zip(self.rounding).zip(LOADS);
         let known =
@@ -38,7 +38,7 @@ impl Part<'_> {
     }
 }
 
-/// All parts whose peaks `simulation` keeps.
+/// All parts whose peaks `simulation` records.
 pub fn parts(simulation: &Simulation) -> Vec<Part<'_>> {
     let machine = simulation.machine();
     let elements = machine.elements.iter().map(|element| ("Element", &element.name, element.kind.word()));
@@ -52,7 +52,7 @@ pub fn parts(simulation: &Simulation) -> Vec<Part<'_>> {
         .collect()
 }
 
-/// Adds them to a summary, by name.
+/// Adds the peaks to a summary, by name.
 pub fn describe(simulation: &Simulation, facts: &mut Map<String, Json>) {
     let parts = parts(simulation);
     for (i, (_, value, time)) in LOADS.into_iter().enumerate() {

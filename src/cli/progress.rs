@@ -33,7 +33,7 @@ pub fn bar(wanted: bool, length: u64) -> ProgressBar {
     bar
 }
 
-/// Reports the progress of `bar` whenever `wait` returns, which gives the time since the start; until the work is over.
+/// Reports the progress of `bar` until the work is over, whenever `wait` returns; `wait` gives the time since the start.
 fn tell(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut say: impl FnMut(&str)) {
     // Progress before the first report may be from an earlier run, and says nothing about the speed.
     let mut first = None;

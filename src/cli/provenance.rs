@@ -17,7 +17,7 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
     // The last change of a key wins, here as in the scene.
     let changed: Map<String, Json> = scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
     meta.insert("changed_parameters".into(), Json::Object(changed));
-    // Its presence tells that the file of the scene is not all of it.
+    // Present only if the scene needs files besides its own.
     let checksum = |text: &str| json!(format!("{:08x}", crc32fast::hash(&file_bytes(text))));
     insert_files(&mut meta, "scene_files_crc32", scene, checksum);
     meta.insert("formulation".into(), json!(scene.machine.formulation));
@@ -29,13 +29,13 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
     meta
 }
 
-/// Adds the texts of `scene`: with the changed parameters they reproduce it, wherever its files went.
+/// Adds the texts of `scene`, which reproduce it with the changed parameters even if its files are gone.
 pub fn insert_texts(meta: &mut Map<String, Json>, scene: &Scene) {
     meta.insert("scene_text".into(), json!(scene.source.text));
     insert_files(meta, "scene_files", scene, |text| json!(text));
 }
 
-/// Adds under `key` what `of` makes of the text of each file that `scene` names; nothing if it names none.
+/// Adds under `key` the value of `of` for the text of each file that `scene` names, if any.
 fn insert_files(meta: &mut Map<String, Json>, key: &str, scene: &Scene, of: impl Fn(&str) -> Json) {
     let texts = scene.source.beside.iter();
     let files: Map<String, Json> = texts.map(|(name, text)| (name.clone(), of(text))).collect();

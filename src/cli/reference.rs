@@ -1,4 +1,4 @@
-//! `reference`: the page of the scene format, whose tables follow from the rows by which the reader goes.
+//! `reference`: the page about the scene format, with tables generated from the reader's own rows.
 
 use super::tables::Table;
 use crate::scene::{
@@ -7,9 +7,9 @@ use crate::scene::{
 };
 use crate::units::{Dimension, dimension_name, format_quantity, si_unit, unit_table};
 
-/// The page as it was when the program was built.
+/// The page at build time.
 const PAGE: &str = include_str!("../../docs/scene-format.md");
-/// What stands before and after a table in the page.
+/// Markers before and after a table in the page.
 const START: &str = "<!-- table ";
 const END: &str = "<!-- end of table -->";
 
@@ -18,10 +18,10 @@ pub fn page() -> String {
     fill(PAGE).unwrap_or_else(|name| unreachable!("a test fills the page: {name}"))
 }
 
-/// `page` with its tables drawn anew.
+/// `page` with its tables regenerated.
 ///
 /// # Errors
-/// The name of a table that there is not, or that does not end.
+/// The name of a table that is unknown or has no end marker.
 pub fn fill(page: &str) -> Result<String, String> {
     let mut parts = page.split(START);
     let mut out = parts.next().unwrap_or_default().to_owned();
@@ -38,7 +38,7 @@ pub fn fill(page: &str) -> Result<String, String> {
     Ok(out)
 }
 
-/// What stands under a name in the page.
+/// Content of the table `name` in the page; `None` for an unknown name.
 fn draw(name: &str) -> Option<String> {
     Some(match name {
         "units" => unit_table(),
@@ -49,12 +49,12 @@ fn draw(name: &str) -> Option<String> {
     })
 }
 
-/// Whether the tables of the page draw this one: there is a table of its name, or it is a force element.
+/// Whether the page shows this table, under its own name or among the force elements.
 pub fn has(page: &str, table: &FileTable) -> bool {
     is_element(table) || page.contains(&format!("{START}{} -->", table.name))
 }
 
-/// The keys of a table, one a row.
+/// The keys of a table, one per row.
 fn keys(table: &FileTable) -> String {
     let by = match table.variants {
         Some(Variants::Word(by, _)) => by,
@@ -90,14 +90,14 @@ fn keys(table: &FileTable) -> String {
     Table::new(&heads.join(" | "), rows).markdown()
 }
 
-/// Keys of a table but those that another has, too.
+/// Keys of a table without those shared with `table.also`.
 fn own(table: &FileTable) -> impl Iterator<Item = &FileKey> {
     let shared = |key: &FileKey| Some(table.also?.key(key.name, None).is_some());
     let own = move |key: &&FileKey| shared(key) != Some(true);
     table.keys.iter().filter(own)
 }
 
-/// What a key is: of a parameter, whose page says more, the first sentence.
+/// Description of a key; only the first sentence for a parameter, whose own page says more.
 fn what(key: &FileKey) -> String {
     match key.takes {
         ValueType::Parameter(_) => {
@@ -108,14 +108,14 @@ fn what(key: &FileKey) -> String {
     }
 }
 
-/// A text with a capital letter first.
+/// `text` with its first letter capitalised.
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).collect()
 }
 
-/// What a table is called in Markdown.
+/// Name of a table in Markdown.
 fn called(table: &FileTable) -> String {
     match table.head.starts_with('[') {
         true => format!("`{}`", table.head),
@@ -123,7 +123,7 @@ fn called(table: &FileTable) -> String {
     }
 }
 
-/// What a key of `table` takes, in words.
+/// Type and range of a key of `table`, in words.
 pub fn value(key: &FileKey, table: &FileTable) -> String {
     let dimension = |of: Dimension| match of {
         Dimension::None => "number",
@@ -173,7 +173,7 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
     }
 }
 
-/// A range after the dimension of its numbers; empty where it is no limit to speak of.
+/// A range, appended to a dimension; empty if it is practically unlimited.
 fn bounds(dimension: Dimension, (least, most): (f64, f64)) -> String {
     /// Beyond any sensible value, in SI units.
     const HUGE: f64 = 1e5;
@@ -190,7 +190,7 @@ fn bounds(dimension: Dimension, (least, most): (f64, f64)) -> String {
     }
 }
 
-/// What holds where a key is left out, in words.
+/// Default of an omitted key, in words.
 pub fn absent(key: &FileKey) -> String {
     match (key.absent, key.takes) {
         (_, ValueType::Parameter(name)) => {
@@ -211,7 +211,7 @@ pub fn absent(key: &FileKey) -> String {
     }
 }
 
-/// The laws of drives.
+/// The drive laws.
 fn laws() -> String {
     let row = |kind: &crate::scene::DriveLaw| vec![format!("`{}`", kind.word), kind.help.to_owned()];
     Table::new("law | motion", DRIVE_LAWS.iter().map(row)).markdown()

@@ -24,7 +24,7 @@ use crate::simulate::Frame;
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 256;
 
-/// Instants k x `every`, k = 0..=`last`, of a run of `duration`.
+/// Row times k x `every`, k = 0..=`last`, of a run of length `duration`, in s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Times {
     every: f64,
@@ -39,7 +39,7 @@ impl Times {
         if every <= 0.0 {
             return Err(Failure::usage("--every 0: the interval between rows must be greater than 0"));
         }
-        // 20 ms by 0.1 ms is 200 intervals, however the two round.
+        // 20 ms / 0.1 ms must give 200 intervals despite rounding.
         let intervals = duration / every;
         let whole = intervals.round();
         let last = if (intervals - whole).abs() <= 1e-9 * whole { whole } else { intervals.floor() };
@@ -51,11 +51,11 @@ impl Times {
         (k as f64 * self.every).min(self.duration)
     }
 
-    /// The first row at `from`, s, or later, and not before the state at `time`.
+    /// Index of the first row at or after both `from` and `time`, s.
     fn first(&self, from: f64, time: f64) -> u64 {
         let from = time.max(from * (1.0 - 1e-9));
         let mut k = (from / self.every) as u64;
-        // The division rounds.
+        // Corrects for rounding in the division.
         while k > 0 && self.at(k - 1) >= from {
             k -= 1;
         }
@@ -80,7 +80,7 @@ struct End {
 /// Runs `run`.
 ///
 /// # Errors
-/// Any: bad input before it starts; the divergence guard, Ctrl-C and the file system afterwards.
+/// Bad input, before the run starts; later the divergence guard, Ctrl-C or the file system.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut way = way(arguments)?;
     let asked = arguments.duration.as_deref().map(|text| quantity::duration("--duration", text)).transpose()?;
@@ -119,7 +119,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut simulation = start(&scene)?;
     let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
-    // The columns are those of the start, also of a run that goes on.
+    // Columns are determined at t = 0, also for a resumed run.
     simulation.sample(0.0, &mut frame);
     let from = match &arguments.from_state {
         Some(path) => go_on(&mut simulation, path, &scene, duration)?,
@@ -213,7 +213,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         }
     }
     let mut meta = facts.clone();
-    // Files of the same run are the same, byte for byte: the machine's speed is left out.
+    // Repeated runs must write identical files, so timings are left out.
     meta.shift_remove("wall_s");
     meta.shift_remove("ratio");
     meta.shift_remove("slower_than_asked");
@@ -247,7 +247,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
     let mut failure = end.failure.or(verdict);
     if let (Some(state), Some(path)) = (state, &arguments.save_state) {
-        // A run that was stopped would be stopped again.
+        // A diverged run would diverge again when resumed.
         if end.status != Status::Diverged {
             match state.text(&simulation) {
                 Ok(content) => {
@@ -255,7 +255,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
                     facts.insert("state_out".into(), json!(path.display().to_string()));
                     summary::line(&mut text, "State", &path.display().to_string());
                 }
-                // The rows are worth having without it.
+                // The rows are still useful without the saved state.
                 Err(error) => failure = failure.or(Some(error)),
             }
         }
@@ -268,7 +268,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     failure.map_or(Ok(()), Err)
 }
 
-/// What was done on the way of the run of `--link`, if there is one.
+/// Replay of the run behind `--link`, if given.
 #[cfg(feature = "gui")]
 fn way(arguments: &RunArguments) -> Result<Option<Way>, Failure> {
     let text = arguments.scene.link.as_deref();
@@ -280,10 +280,10 @@ fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
     Ok(None)
 }
 
-/// Puts `simulation`, which has just started, into the state of the file `path`; returns the time from which it goes on, s.
+/// Loads the state file `path` into the freshly started `simulation`; returns the time at which the run resumes, s.
 ///
 /// # Errors
-/// As [`state::read`]; a `duration`, s, that is over by then.
+/// As [`state::read`]; a `duration`, s, before the saved time; a state that does not fit the simulation.
 fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
     let Checkpoint { state, time } = state::read(path, scene)?;
     if duration < time {
@@ -296,11 +296,11 @@ fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) 
     Ok(time)
 }
 
-/// What looks at the simulation around every step.
+/// Observers called around every step.
 struct StepObservers<'a> {
     impacts: Option<&'a mut ImpactsFile>,
     state: Option<&'a mut StateFile>,
-    /// What was done on the way of a link's run, and where the run is to end, s; by default where the link's is.
+    /// Replay of a link. It ends at `end`, s, or by default at the link's instant.
     way: Option<&'a mut Way>,
     end: Option<f64>,
 }
@@ -316,7 +316,7 @@ impl StepObservers<'_> {
 /// Steps to `duration` and fills `table` with the rows at `from` and later; `stopwatch` runs only while the simulation steps.
 ///
 /// # Errors
-/// The disk that takes the rows.
+/// A disk error while rows are written.
 fn simulate(
     simulation: &mut LiveScene,
     (from, duration): (f64, f64),
@@ -373,7 +373,8 @@ fn simulate(
     }
 }
 
-/// Steps until `row` is reached, the run ends, or a check is due; in words, why it stopped. A row never shortens a step.
+/// Steps until time `row` is reached, the run ends, or a check is due; a row never shortens a step. The error says why stepping
+/// stopped.
 fn step_some(
     simulation: &mut LiveScene,
     row: f64,
@@ -398,7 +399,7 @@ fn step_some(
     Ok(())
 }
 
-/// Nanoseconds: the bar counts in whole numbers.
+/// Simulated time in ns, because the progress bar counts in integers.
 fn position(time: f64) -> u64 {
     (time * 1e9) as u64
 }

@@ -1,5 +1,5 @@
-//! `schema`: a JSON schema of scene files (draft 7), for editors. It follows from the rows by which the reader goes, and allows
-//! whatever the reader does not refuse for its form alone.
+//! `schema`: a JSON schema of scene files (draft 7), for editors. It is generated from the reader's own rows and rejects only
+//! what the reader rejects for its form alone.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -9,7 +9,7 @@ use crate::units::{Dimension, unit_names};
 
 /// The schema as text.
 pub fn page() -> String {
-    // A schema is a tree of texts: writing it cannot fail.
+    // Serialising plain JSON cannot fail.
     serde_json::to_string_pretty(&schema()).unwrap_or_default() + "\n"
 }
 
@@ -32,13 +32,13 @@ fn merge(to: &mut Json, more: Json) {
     }
 }
 
-/// A table: all its keys, so that an editor knows them, and rules about those that only some of its variants have.
+/// Schema of a table: all its keys, so that an editor knows them, and rules for keys that only some variants have.
 fn of_table(table: &FileTable) -> Json {
     let mut properties = Map::new();
     for key in table.keys {
         let mut schema = of_key(key, table);
         if let Some(Json::Object(other)) = properties.get(key.name) {
-            // What it takes, its variant says.
+            // Its type depends on the variant, whose rules state it.
             let both = [&other["description"], &schema["description"]];
             let both = both.map(|text| text.as_str().unwrap_or_default());
             schema = json!({ "description": both.join("\n\n") });
@@ -76,7 +76,7 @@ fn of_table(table: &FileTable) -> Json {
     schema
 }
 
-/// What distinguishes one variant of a table.
+/// Rules of one variant of a table.
 fn of_variant(table: &FileTable, word: &'static str) -> Json {
     let mut properties = Map::new();
     for key in table.keys {
@@ -93,7 +93,7 @@ fn of_variant(table: &FileTable, word: &'static str) -> Json {
     schema
 }
 
-/// Which of `keys` must be given.
+/// Requires the mandatory ones among `keys`.
 fn needs(keys: &[&FileKey]) -> Json {
     let needed = keys.iter().filter(|key| matches!(key.absent, DefaultRule::Fault));
     let needed: Vec<&str> = needed.map(|key| key.name).collect();
@@ -215,7 +215,7 @@ fn whole(least: u64, most: u64) -> Json {
     json!({ "type": ["integer", "string"], "minimum": least, "maximum": most, "pattern": "^\\s*\\+?[0-9]+\\s*$" })
 }
 
-/// A value as a scene file writes it, as JSON.
+/// Converts a value in scene file syntax to JSON.
 fn example(like: &str) -> Option<Json> {
     let text = format!("like = {like}");
     let mut table: Map<String, Json> = toml::from_str(&text).ok()?;

@@ -1,4 +1,4 @@
-//! `run --save-state` and `--from-state`: the state at the end of a run in a file, from which a later run goes on with the
+//! `run --save-state` and `--from-state`: a file with the state at the end of a run, from which a later run resumes with the
 //! same bits.
 
 use std::fs::File;
@@ -14,12 +14,12 @@ use crate::scene::LiveScene;
 use crate::scene::{Scene, visible_line};
 use crate::simulate::SavedState;
 
-/// Counts the versions of the file's layout.
+/// Version of the file layout.
 const FORMAT: u64 = 3;
-/// Largest file that is read, bytes.
+/// Size limit of a state file, bytes.
 const LARGEST: u64 = 1 << 30;
 
-/// Where the state of a run goes: claimed, and known to be writable, before the run starts.
+/// Output file for the state of a run, claimed and known to be writable before the run starts.
 pub struct StateFile {
     file: OutputFile,
     saved: Option<SavedState>,
@@ -35,18 +35,18 @@ impl StateFile {
         Ok(Self { file, saved: None })
     }
 
-    /// To be called before every step of a run that ends at `end`, s: the state kept is that before the first step that the
-    /// end of the run cuts short, as a longer run would not.
+    /// To be called before every step of a run that ends at `end`, s. Saves the state before the first step that `end`
+    /// truncates, because a longer run would not truncate it.
     pub fn watch(&mut self, simulation: &LiveScene, end: f64) {
         if self.saved.is_none() && simulation.is_cut_by(end) {
             self.saved = Some(simulation.saved());
         }
     }
 
-    /// The state as the text of a file.
+    /// The state as file content.
     ///
     /// # Errors
-    /// A value that is not a number, for which JSON has no word.
+    /// A value that is not finite, which JSON cannot represent.
     pub fn text(&self, simulation: &LiveScene) -> Result<String, Failure> {
         let saved = match &self.saved {
             Some(saved) => saved,
@@ -55,7 +55,7 @@ impl StateFile {
         let scene = simulation.pending();
         let mut meta = provenance::meta(scene);
         meta.insert("state_format".into(), json!(FORMAT));
-        // Rows of a run that goes on begin here.
+        // Rows of a resumed run begin here.
         meta.insert("time_s".into(), json!(simulation.time()));
         meta.insert("step_end_s".into(), json!(saved.time()));
         provenance::insert_texts(&mut meta, scene);
@@ -71,16 +71,16 @@ impl StateFile {
         Ok(Json::Object(content).to_string())
     }
 
-    /// Writes that text; nothing has its final name yet.
+    /// Writes `text` under a temporary name.
     ///
     /// # Errors
-    /// Whatever the file system reports.
+    /// A file system error.
     pub fn fill(self, text: &str) -> Result<PendingFile, Failure> {
         Ok(self.file.fill(|out| out.write_all(text.as_bytes()))?)
     }
 }
 
-/// A state from which a run goes on.
+/// A state from which a run resumes.
 pub struct Checkpoint {
     /// The state.
     pub state: SavedState,
@@ -135,7 +135,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Checkpoint, Failure> {
     Ok(Checkpoint { state, time })
 }
 
-/// Refuses the state with `meta` of another scene than `scene`, in words.
+/// Rejects a state whose `meta` describes a scene other than `scene`; the error is text.
 fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
     if meta["scene_text"] != *scene.source.text {
         return Err(format!(
@@ -176,7 +176,7 @@ fn word(value: &Json) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// CRC-32 of the content in the shortest form, which does not depend on how a file was laid out: eight hexadecimal digits.
+/// CRC-32 of the content as compact JSON, independent of the file's layout, as eight hexadecimal digits.
 fn checksum(content: &Map<String, Json>) -> String {
     let text = serde_json::to_string(content).unwrap_or_default();
     format!("{:08x}", crc32fast::hash(text.as_bytes()))

@@ -1,4 +1,4 @@
-//! What a run did, for a person or for a script.
+//! Summary of a run, as text or as JSON.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -28,12 +28,12 @@ pub enum Status {
 
 words! { Status { Done => "done", Interrupted => "interrupted", Diverged => "diverged" } }
 
-/// What the stepping took.
+/// Start and cost of the stepping.
 #[derive(Clone, Copy, Debug)]
 pub struct Stepping {
     /// Simulated time at which it began, s.
     pub from: f64,
-    /// Seconds of it.
+    /// Wall-clock time, s.
     pub wall: f64,
 }
 
@@ -143,7 +143,7 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
             let impacts = count(statistics.impacts[i], "impact");
             match statistics.floored[i] {
                 0 => format!("{impacts}, {peak}"),
-                // There the damping term divides by the floor: they rebound higher than requested.
+                // Below the floor the damping term divides by the floor, so these rebound higher than requested.
                 slow => format!("{impacts} ({slow} slower than impact_speed_floor), {peak}"),
             }
         };
@@ -214,19 +214,19 @@ pub fn line(text: &mut String, label: &str, words: &str) {
     let _ = writeln!(text, "{label:<17} {words}");
 }
 
-/// Adds to a summary that a file was written.
+/// Adds a line about a written file to a summary.
 pub fn written(text: &mut String, rows: usize, what: &str, path: &Path) {
     let rows = count(rows as u64, what);
     line(text, "Written", &format!("{rows} to {}", path.display()));
 }
 
-/// A number of things: `1 row`, `2 rows`.
+/// A count with its noun: `1 row`, `2 rows`.
 pub fn count(number: u64, what: &str) -> String {
     let plural = if number == 1 { "" } else { "s" };
     format!("{number} {what}{plural}")
 }
 
-/// Whether real time was requested, by the preset of that name, and not reached.
+/// Whether the real-time preset was chosen but not reached.
 fn slower_than_asked(scene: &Scene, ratio: Option<f64>) -> bool {
     scene.machine.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
 }

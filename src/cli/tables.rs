@@ -1,14 +1,14 @@
-//! Tables as data, and their forms: HTML and Markdown for pages, CSV for programs, aligned columns for terminals. Pages are
-//! templates whose gaps are filled with them.
+//! Tables as data, written as HTML or Markdown for pages, CSV for programs, or aligned columns for terminals. Pages are
+//! templates with gaps for them.
 
 use std::fmt::Write as _;
 
 use super::output::significant;
 
-/// Rows of plain words under heads.
+/// Rows of plain text under headings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Says in a page what the rows are; "" if the text around the table does.
+    /// Caption in a page; empty if the surrounding text describes the rows.
     title: String,
     heads: Vec<String>,
     /// Class of each column in HTML: `n` for numbers, `verdict` for words that [`BADGES`] marks, "" for words.
@@ -49,7 +49,7 @@ impl Table {
             format!("<{tag}{class}>{text}</{tag}>")
         };
         let row = |tag: &str, cells: &[String]| -> String {
-            // Of the heads only those of numbers are set as their columns.
+            // Only headings of number columns get the class of their column.
             let class = |class: &'_ String| if tag == "td" || class == "n" { class.clone() } else { String::new() };
             self.classes.iter().zip(cells).map(|(of, text)| cell(tag, &class(of), text)).collect()
         };
@@ -82,7 +82,7 @@ impl Table {
         std::iter::once(&self.heads).chain(&self.rows).map(line).collect()
     }
 
-    /// In columns for a terminal: numbers to the right, words to the left.
+    /// As aligned columns for a terminal: numbers right, words left.
     pub fn text(&self) -> String {
         let is_number = |text: &String| {
             let first = text.chars().next();
@@ -128,12 +128,12 @@ pub fn number(value: impl Into<Option<f64>>) -> String {
     value.map_or_else(String::new, |v| significant(v, 12))
 }
 
-/// A cell that says whether something holds.
+/// A yes/no cell.
 pub fn yes(holds: bool) -> String {
     if holds { "yes" } else { "no" }.to_owned()
 }
 
-/// Labelled values for a terminal, a line each.
+/// Labelled values for a terminal, one per line.
 pub fn lines<'a>(values: impl IntoIterator<Item = (&'a str, String)>) -> String {
     values.into_iter().map(|(label, value)| format!("{label:<20}{value}\n")).collect()
 }
@@ -142,7 +142,7 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// As in print: beta as its letter, powers of ten raised, minus signs.
+/// Typesets a text: the letter β, powers of ten as superscripts, true minus signs.
 pub fn typeset(text: &str) -> String {
     const BETWEEN: [char; 6] = [' ', ',', ';', ':', '(', ')'];
     let set = |part: &str| {

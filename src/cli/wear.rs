@@ -23,7 +23,7 @@ const COLUMNS: [&str; 12] = [
     "friction_work_J_m2",
 ];
 
-/// Writes `map` to `file` with `meta`, its provenance; nothing has its final name yet. Also returns the number of rows.
+/// Writes `map` to `file` with its provenance `meta`, under temporary names. Also returns the number of rows.
 ///
 /// # Errors
 /// As [`RowsFile::fill`].

@@ -5,12 +5,11 @@ use std::{sync::mpsc, thread};
 
 use super::{Failure, interrupt};
 
-/// Runs `work` for each job of `todo`, and hands the results to `receive` on this thread in the order in which they come.
-/// After Ctrl-C or a failure no further job begins. `work` is given a function that says whether to go on, and returns `None`
-/// if it did not.
+/// Runs `work` for each job of `todo` and passes the results to `receive` on this thread as they arrive. No job starts after
+/// Ctrl-C or a failure. `work` gets a function that says whether to continue, and returns `None` if it stopped early.
 ///
 /// # Errors
-/// Of the jobs that failed, or whose result was refused by `receive`, the first in the order of `todo`.
+/// The error of `work` or `receive` whose job comes first in `todo`.
 pub fn run_jobs<T: Send>(
     todo: &[usize],
     threads: usize,

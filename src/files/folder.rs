@@ -1,4 +1,4 @@
-//! Folders that appear whole, with a manifest that names their files.
+//! Folders that appear complete or not at all, with a manifest of their files.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -32,19 +32,19 @@ pub struct Folder {
     place: PathBuf,
     replace: bool,
     temporary: TempDir,
-    /// Of the temporary folder, held as long as that is in use.
+    /// Lock on the temporary folder, held while the folder is in use.
     _lock: Option<File>,
     /// Names of its files, relative to the folder.
     files: RefCell<BTreeSet<String>>,
 }
 
 impl Folder {
-    /// Makes a temporary folder beside `path`; removes what killed runs left there. `replace` permits existing results of
+    /// Creates a temporary folder beside `path` and removes leftovers of killed runs. `replace` permits existing results of
     /// this program.
     ///
     /// # Errors
-    /// `path` cannot be given to a new folder: it is a file, the command runs in it, or it contains something that may not
-    /// be replaced. Nothing can be written beside it.
+    /// `path` is a file, contains the working directory, or contains something that may not be replaced; its parent folder is
+    /// not writable.
     pub fn claim(path: &Path, replace: bool) -> Result<Self, FileError> {
         let failed = |error: io::Error| FileError::of(path, &error);
         let place = place(path).map_err(failed)?;
@@ -83,7 +83,7 @@ impl Folder {
     /// # Errors
     /// Input/output.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<(), FileError> {
-        // The folder appears whole: its files need no protection of their own.
+        // The folder appears as a whole, so its files need no temporary names.
         let OutputFile { path, place, .. } = self.file(name)?;
         fs::write(place, content).map_err(|error| FileError::of(&path, &error))
     }
@@ -99,7 +99,7 @@ impl Folder {
         let failed = |error: io::Error| FileError::of(&self.path, &error);
         let [new, old] = [NEW, OLD].map(|name| self.temporary.path().join(name));
         if !has_content(&self.place) {
-            // Renaming onto a folder works if that is empty; elsewhere than on Unix it has to be removed first.
+            // A rename replaces an empty folder on Unix; elsewhere the folder must be removed first.
             if cfg!(not(unix)) && self.place.is_dir() {
                 fs::remove_dir(&self.place).map_err(failed)?;
             }
@@ -109,10 +109,10 @@ impl Folder {
             return Err(FileError::NotEmpty(self.path.clone()));
         }
         fs::rename(&self.place, &old).map_err(failed)?;
-        // Checked where nobody adds anything any more.
+        // Checked under the temporary name, where nobody adds files any more.
         let named = check_own(&self.path, &old).and_then(|()| fs::rename(&new, &self.place).map_err(failed));
         if named.is_err() && fs::rename(&old, &self.place).is_err() {
-            // The next run tries again.
+            // Keeps the old folder; the next run gives it its name back.
             self.temporary.disable_cleanup(true);
         }
         named
@@ -123,11 +123,11 @@ fn has_content(path: &Path) -> bool {
     fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some())
 }
 
-/// Refuses to replace anything in the folder at `place` that this program did not write.
+/// Fails if the folder at `place` contains anything that this program did not write.
 fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
     let manifest = fs::read(place.join(MANIFEST)).unwrap_or_default();
     let manifest: Json = serde_json::from_slice(&manifest).unwrap_or_default();
-    // Other programs write files of that name, too.
+    // Other programs also write manifests of that name.
     let own = manifest["program"] == PROGRAM;
     let listed = manifest["files"].as_array().into_iter().flatten().filter_map(Json::as_str);
     let listed: BTreeSet<&str> = listed.chain([MANIFEST]).filter(|_| own).collect();
@@ -151,7 +151,7 @@ fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
 fn collect(folder: &Path, before: &str, names: &mut Vec<String>) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = format!("{before}{}", entry.file_name().display());
-        // A link to a folder is a file here.
+        // A symbolic link to a folder counts as a file.
         if entry.file_type().is_ok_and(|kind| kind.is_dir()) && has_content(&entry.path()) {
             collect(&entry.path(), &format!("{name}/"), names);
         } else {

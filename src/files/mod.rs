@@ -1,5 +1,5 @@
-//! Output files and folders. Each is written under a temporary name beside its final one, then renamed: it appears complete or
-//! not at all. Reading needs nothing of this.
+//! Output files and folders. Each is written under a temporary name beside its final one, then renamed, so that it appears
+//! complete or not at all. Reading does not use this module.
 
 mod folder;
 mod names;
@@ -23,10 +23,10 @@ pub const PROGRAM: &str = env!("CARGO_PKG_NAME");
 /// Why an output cannot be written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FileError {
-    /// Something already has its name.
+    /// The name is taken.
     #[error("{} already exists", .0.display())]
     Exists(PathBuf),
-    /// A folder that is not empty has its name.
+    /// A folder of that name is not empty.
     #[error("{} already exists and is not empty", .0.display())]
     NotEmpty(PathBuf),
     /// Anything else.

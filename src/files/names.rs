@@ -1,15 +1,15 @@
-//! What a name leads to: links, and different names for one file.
+//! Path resolution: links, and different names for one file.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Where `path` lies or would lie: without links, in a folder that exists.
+/// Location of `path`, existing or not, with links resolved; its folder must exist.
 ///
 /// # Errors
 /// No such folder; circular links.
 pub(super) fn place(path: &Path) -> io::Result<PathBuf> {
-    // By components, which drops a trailing slash.
+    // Going through components drops a trailing slash.
     let path: PathBuf = path.components().collect();
     match fs::canonicalize(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => match (fs::read_link(&path), path.file_name()) {

@@ -10,7 +10,7 @@ use super::FileError;
 use super::names::{parent, place};
 use super::temporary;
 
-/// Takes the content of a file.
+/// Writer for the content of a file.
 pub type Content<'a> = BufWriter<&'a File>;
 
 /// A file to be written.
@@ -24,8 +24,8 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Checks that `path` can be written, by writing and removing an empty file beside it; removes what killed runs left
-    /// there. `replace` permits an existing file.
+    /// Checks that `path` can be written, by writing and removing an empty file beside it; removes leftovers of killed runs.
+    /// `replace` permits an existing file.
     ///
     /// # Errors
     /// It exists and `replace` is not given, it is not a file, or its folder is missing or read-only.
@@ -51,7 +51,7 @@ impl OutputFile {
         &self.path
     }
 
-    /// Lets `fill` write the content; nothing has the final name yet.
+    /// Lets `fill` write the content under a temporary name.
     ///
     /// # Errors
     /// Input/output.
@@ -75,12 +75,12 @@ impl OutputFile {
     /// Lets `fill` write the content, then gives it its final name.
     ///
     /// # Errors
-    /// Input/output; the final name is then as it was.
+    /// Input/output; an existing file is then unchanged.
     pub fn write(self, fill: impl FnOnce(&mut Content) -> io::Result<()>) -> Result<(), FileError> {
         publish(vec![self.fill(fill)?])
     }
 
-    /// A nameless file beside it for what does not fit in memory.
+    /// An unnamed file in the same folder, for data that does not fit in memory.
     ///
     /// # Errors
     /// Input/output.
@@ -94,7 +94,7 @@ fn is_taken(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok()
 }
 
-/// A file with its content, but not yet its name.
+/// A complete file that still has its temporary name.
 #[derive(Debug)]
 pub struct PendingFile {
     target: OutputFile,
@@ -104,11 +104,12 @@ pub struct PendingFile {
 /// Gives files their final names, one after the other.
 ///
 /// # Errors
-/// Input/output; the files before the one that failed then have their names.
+/// Input/output; files before the failed one then have their final names.
 pub fn publish(files: Vec<PendingFile>) -> Result<(), FileError> {
     for PendingFile { target: OutputFile { path, place, replace }, file } in files {
         let named = if replace { file.persist(&place) } else { file.persist_noclobber(&place) };
-        // Some file systems can neither refuse to replace nor link. Only another program can come in between.
+        // Some file systems support neither a rename without replacement nor hard links. Only another program could create the
+        // file in between.
         let named = named.or_else(|failed| if is_taken(&place) { Err(failed) } else { failed.file.persist(&place) });
         named.map_err(|failed| FileError::of(&path, &failed.error))?;
     }
@@ -124,7 +125,7 @@ pub fn open_or_create(path: &Path, beginning: &[u8]) -> Result<File, FileError> 
     if matches!(length, None | Some(0)) {
         let target = OutputFile::claim(path, length.is_some());
         match target.and_then(|target| target.write(|file| file.write_all(beginning))) {
-            // Another run was faster.
+            // Another run created it first.
             Ok(()) | Err(FileError::Exists(_)) => {}
             Err(error) => return Err(error),
         }

@@ -9,10 +9,10 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 
 use super::names::parent;
 
-/// Where a temporary folder keeps the folder that is to be replaced, between two renames.
+/// Name of the folder being replaced, inside the temporary folder, between two renames.
 pub(super) const OLD: &str = "old";
 
-/// Prefix of the temporary names for `target`; of one length, so that any file name can be a target.
+/// Prefix of the temporary names for `target`, of fixed length, so that any file name can be a target.
 fn prefix(target: &Path) -> String {
     let name = target.file_name().unwrap_or_default();
     format!(".jointplay-{:08x}-", crc32fast::hash(name.as_encoded_bytes()))
@@ -21,22 +21,22 @@ fn prefix(target: &Path) -> String {
 /// A file beside `target`.
 pub(super) fn file(target: &Path) -> io::Result<NamedTempFile> {
     loop {
-        // The default of `tempfile` can be read by its owner alone.
+        // By default, `tempfile` files can be read only by their owner.
         let file = Builder::new().prefix(&prefix(target)).make_in(parent(target), |path| File::create_new(path))?;
-        // On a file system without locks nothing is removed either.
+        // A failure is harmless: on a file system without locks no leftovers are removed either.
         let _ = file.as_file().lock();
-        // Before it was locked, another run may have taken it for a leftover.
+        // Another run may have removed it as a leftover before it was locked.
         if file.path().exists() {
             return Ok(file);
         }
     }
 }
 
-/// A folder beside `target`, and its lock. Elsewhere than on Unix a folder has none, and its leftovers stay.
+/// A folder beside `target`, and its lock. Outside Unix there is no lock, and leftovers stay.
 pub(super) fn folder(target: &Path) -> io::Result<(TempDir, Option<File>)> {
     loop {
         let folder = Builder::new().prefix(&prefix(target)).tempdir_in(parent(target));
-        // The message would name the temporary folder.
+        // The full message would name the temporary folder.
         let folder = folder.map_err(|error| error.kind())?;
         let lock = File::open(folder.path()).and_then(|lock| lock.lock().map(|()| lock)).ok();
         if folder.path().exists() {
@@ -45,8 +45,8 @@ pub(super) fn folder(target: &Path) -> io::Result<(TempDir, Option<File>)> {
     }
 }
 
-/// Removes what killed runs with this target left; leaves alone what a live run has locked. A folder that was about to be
-/// replaced gets its name back.
+/// Removes leftovers of killed runs with this target, except those locked by a live run. A folder that was about to be replaced
+/// gets its name back.
 pub(super) fn clear(target: &Path) {
     let prefix = prefix(target);
     for entry in fs::read_dir(parent(target)).into_iter().flatten().flatten() {

@@ -57,7 +57,7 @@ fn an_existing_file_is_replaced_only_where_that_is_allowed() {
     fs::write(&path, "mine").unwrap();
     let exists = FileError::Exists(path.clone());
     assert_eq!(OutputFile::claim(&path, false).unwrap_err(), exists);
-    // One that appears during the run is not lost either.
+    // A file that appears during the run is not overwritten either.
     assert_eq!(early.write(|file| file.write_all(b"new")), Err(exists));
     assert_eq!(fs::read(&path).unwrap(), b"mine");
     write(&path, "new", true).unwrap();
@@ -173,10 +173,10 @@ fn leftovers_of_a_killed_run_go_and_those_of_a_live_one_stay() {
     let [a, out] = ["a", "out"].map(|name| folder.path().canonicalize().unwrap().join(name));
     let pending = OutputFile::claim(&a, true).unwrap().fill(|file| file.write_all(b"live")).unwrap();
     let live = Folder::claim(&out, false).unwrap();
-    // Of another target, or not of this program.
+    // A file of another target, or of another program.
     fs::write(folder.path().join(".jointplay-00000000-012345"), "x").unwrap();
     let before = count(folder.path());
-    // A kill closes what holds the lock and removes nothing.
+    // A killed process releases its lock and removes nothing.
     let _ = temporary::file(&a).unwrap().keep().unwrap();
     let left = temporary::folder(&out).unwrap().0.keep();
     fs::write(left.join("half"), "x").unwrap();

@@ -4,7 +4,7 @@ use gif::{Encoder, Frame, Repeat};
 
 use super::{Encode, FilmError};
 
-/// Most frames per second: browsers take delays below 2 hundredths of a second for a mistake and show such films slowly.
+/// Largest frame rate, 1/s: browsers take delays below 2 hundredths of a second for errors and play such films slowly.
 const MOST_RATE: f64 = 50.0;
 /// Trade-off of the palette search, 1 (best) to 30.
 const SPEED: i32 = 10;
@@ -15,7 +15,7 @@ pub struct Gif {
     size: [usize; 2],
     rate: f64,
     frames: u64,
-    /// The frame before, as it was given.
+    /// The previous frame, as given.
     before: Vec<u8>,
     /// The changed rectangle.
     changed: Vec<u8>,
@@ -24,7 +24,7 @@ pub struct Gif {
 /// Width and height of a film of `size` pixels with `rate` frames per second, as the file holds them.
 ///
 /// # Errors
-/// More than a GIF holds.
+/// A size or rate beyond the limits of GIF.
 pub fn check([width, height]: [u32; 2], rate: f64) -> Result<[u16; 2], FilmError> {
     let too_much = |limit| FilmError::TooMuch { width, height, rate, limit };
     if !(rate > 0.0 && rate <= MOST_RATE) {
@@ -51,7 +51,7 @@ impl Gif {
         })
     }
 
-    /// Left, top, width and height of what differs from the frame before; one pixel where nothing does.
+    /// Left, top, width and height of the area that differs from the previous frame; one pixel if none does.
     fn difference(&self, rgba: &[u8]) -> [usize; 4] {
         let [width, height] = self.size;
         if self.before.is_empty() {
@@ -91,7 +91,7 @@ impl Encode for Gif {
         }
         let mut frame = Frame::from_rgba_speed(across as u16, down as u16, &mut self.changed, SPEED);
         (frame.left, frame.top) = (left as u16, top as u16);
-        // Rounded times, not rounded intervals: the film as a whole keeps its pace.
+        // Rounding times rather than intervals preserves the pace of the whole film.
         let hundredths = |frames: u64| (100.0 * frames as f64 / self.rate).round();
         frame.delay = (hundredths(self.frames + 1) - hundredths(self.frames)) as u16;
         self.encoder.write_frame(&frame).map_err(refused)?;

@@ -1,13 +1,13 @@
-//! Frames to H.264: colours as ITU-R BT.709 says, the level that ITU-T H.264 asks for, and the encoder.
+//! Encodes frames as H.264, with colours by ITU-R BT.709 and levels by ITU-T H.264.
 
 use rusty_h264_common::{Profile, YuvFrame};
 use rusty_h264_encoder::{Encoder, EncoderConfig, Preset};
 
 use super::FilmError;
 
-/// Quantisation, 0 (finest) to 51: edges of drawn lines stay clean.
+/// Quantisation, 0 (finest) to 51; this value keeps edges of drawn lines clean.
 const QUANTISATION: u8 = 20;
-/// Time between frames that stand for themselves, s: how exactly a player can jump.
+/// Interval between key frames, s; players can seek to these.
 const KEY_INTERVAL: f64 = 2.0;
 
 /// Levels of ITU-T H.264, Table A-1: `level_idc`, largest number of macroblocks of a frame and per second.
@@ -56,7 +56,7 @@ pub struct H264 {
 /// The level of a film of `size` pixels with `rate` frames per second.
 ///
 /// # Errors
-/// H.264 has none for it.
+/// An odd size, or no level of H.264 allows the film.
 pub fn check([width, height]: [u32; 2], rate: f64) -> Result<u8, FilmError> {
     if width == 0 || height == 0 || width % 2 == 1 || height % 2 == 1 {
         return Err(FilmError::Odd { width, height });
@@ -81,7 +81,7 @@ impl H264 {
         config.gop_size = key_every as u32;
         config.framerate = rate as f32;
         config.preset = Preset::Balanced;
-        // Otherwise it would hold back the frames of two seconds.
+        // Otherwise the encoder would hold back two seconds of frames.
         config.mbtree = false;
         let encoder = Encoder::new(config).map_err(|error| FilmError::Encoder(error.to_string()))?;
         Ok(Self {
@@ -92,7 +92,7 @@ impl H264 {
         })
     }
 
-    /// The next frame, as NAL units behind start codes, and whether it stands for itself.
+    /// Encodes a frame; returns its NAL units behind start codes, and whether it is a key frame.
     pub fn encode(&mut self, rgba: &[u8]) -> Result<(Vec<u8>, bool), FilmError> {
         to_yuv(rgba, &mut self.frame);
         let key = self.frames.is_multiple_of(self.key_every);
@@ -102,8 +102,8 @@ impl H264 {
     }
 }
 
-/// Red, green, blue to luma and colour differences, ITU-R BT.709-6 items 3.2 to 3.4, 8 bits in the narrow range; the colour of
-/// a square of four pixels is their mean.
+/// Converts RGB to luma and colour differences, ITU-R BT.709-6 items 3.2 to 3.4, 8 bits in the narrow range. Each square of
+/// four pixels shares its mean colour.
 fn to_yuv(rgba: &[u8], frame: &mut YuvFrame) {
     let (width, height) = (frame.width, frame.height);
     assert_eq!(rgba.len(), 4 * width * height, "a frame of the film's size");
@@ -135,7 +135,7 @@ fn to_yuv(rgba: &[u8], frame: &mut YuvFrame) {
     }
 }
 
-/// Shares of red and blue in luma, ITU-R BT.709-6 item 3.2.
+/// Weights of red and blue in luma, ITU-R BT.709-6 item 3.2.
 const RED: f32 = 0.2126;
 const BLUE: f32 = 0.0722;
 

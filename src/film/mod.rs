@@ -1,5 +1,5 @@
-//! Films: frames in, one file out, as MP4 with H.264 or as GIF. Everything stays in memory, so that a cancelled film leaves
-//! nothing behind, and the page makes films as the program does. Knows no mechanism and needs no display.
+//! Encodes frames as a film, MP4 with H.264 or GIF. Everything stays in memory, so that a cancelled film leaves nothing behind
+//! and the page makes films as the program does. This module knows no mechanism and needs no display.
 
 mod gif;
 mod h264;
@@ -7,13 +7,13 @@ mod mp4;
 
 use crate::words::words;
 
-/// Most bytes of a film: what a page can hold beside the rest.
+/// Size limit of a film, bytes, which fits in the memory of a page.
 const MOST_BYTES: usize = 1 << 30;
 
 /// Kind of file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Format {
-    /// H.264 in MP4: every player, exact times.
+    /// H.264 in MP4: plays everywhere, with exact times.
     #[default]
     Mp4,
     /// GIF: plays by itself in slides and pages; 256 colours a frame, times in whole hundredths of a second.
@@ -26,17 +26,17 @@ words!(Format {
 });
 
 impl Format {
-    /// The format that a file's name ends in.
+    /// The format by the extension of a file name.
     pub fn of_name(name: &str) -> Option<Self> {
         let (_, ending) = name.rsplit_once('.')?;
         let ending = ending.to_ascii_lowercase();
         Self::ALL.into_iter().find(|format| format.word() == ending)
     }
 
-    /// Whether it holds a film of `size` pixels with `rate` frames per second.
+    /// Checks that the format can hold a film of `size` pixels with `rate` frames per second.
     ///
     /// # Errors
-    /// Why not.
+    /// The reason if it cannot.
     pub fn check(self, size: [u32; 2], rate: f64) -> Result<(), FilmError> {
         match self {
             Self::Mp4 => h264::check(size, rate).map(drop),
@@ -64,7 +64,7 @@ pub enum FilmError {
         /// Requested height.
         height: u32,
     },
-    /// More than any level of H.264 allows, or than GIF can say.
+    /// More than any level of H.264 allows, or than GIF can represent.
     #[error("a film of {width}x{height} pixels with {rate} frames a second: {limit}")]
     TooMuch {
         /// Requested width.
@@ -82,17 +82,17 @@ pub enum FilmError {
     /// No frame was added.
     #[error("a film needs at least one frame")]
     Empty,
-    /// The encoder or the container refused; a defect of theirs or ours.
+    /// The encoder or muxer failed, a bug in it or in this program.
     #[error("the film cannot be encoded: {0}")]
     Encoder(String),
 }
 
-/// What takes the frames of one kind of file.
+/// Encoder of one file format.
 trait Encode {
     /// Appends a frame: rows from the top, red, green, blue, opacity (ignored), sRGB-encoded.
     fn add(&mut self, rgba: &[u8]) -> Result<(), FilmError>;
 
-    /// Bytes so far, about.
+    /// Approximate size so far, bytes.
     fn bytes(&self) -> usize;
 
     /// The complete file.

@@ -12,11 +12,11 @@ use shiguredo_mp4::{BoxSize, BoxType, TrackKind};
 use super::h264::H264;
 use super::{Encode, FilmError};
 
-/// Ticks of the clock per frame: a rate as 29.97 keeps its three decimals.
+/// Clock ticks per frame, so that a rate such as 29.97 keeps its three decimals.
 const TICKS: u32 = 1000;
 
-/// `colr` (ISO/IEC 14496-12, 12.1.5): the numbers of BT.709 for primaries, transfer and matrix, narrow range. Players guess
-/// otherwise, each in its own way.
+/// `colr` (ISO/IEC 14496-12, 12.1.5): BT.709 codes for primaries, transfer and matrix, narrow range. Without it, players guess
+/// differently.
 const COLOURS: [u8; 11] = [b'n', b'c', b'l', b'x', 0, 1, 0, 1, 0, 1, 0];
 
 /// An MP4 being written.
@@ -49,7 +49,7 @@ impl Encode for Mp4 {
         let first = self.file.len();
         let parts = parse_annexb_nal_units(&unit).map_err(refused)?;
         for part in &parts {
-            // These stand in the sample entry.
+            // Parameter sets are stored in the sample entry.
             if !matches!(part.nal_unit_type, H264NalUnitType::Sps | H264NalUnitType::Pps) {
                 let length = part.data.len() as u32;
                 self.file.extend_from_slice(&length.to_be_bytes());

@@ -13,24 +13,24 @@ use crate::view::DrawList;
 struct Resources {
     renderer: Renderer,
     finish: Finish,
-    /// For pictures in egui's textures.
+    /// Last pass for pictures in egui's textures.
     still: Option<Finish>,
     /// One for each [`Place`].
     shown: [Option<Shown>; 3],
 }
 
-/// Where one of the pictures that share the graphics is shown.
+/// Where a picture is shown; all places share one renderer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// In the window.
     Window,
-    /// Beside the first in the window.
+    /// Beside the first picture in the window.
     Beside,
     /// In a second window.
     Second,
 }
 
-/// What is drawn to, and which picture it holds.
+/// A target, and the revision of the picture in it.
 struct Shown {
     target: RenderTarget,
     group: wgpu::BindGroup,
@@ -45,8 +45,8 @@ pub fn install(state: &egui_wgpu::RenderState) {
     state.renderer.write().callback_resources.insert(resources);
 }
 
-/// Draws `list` at `list.size` on a texture of its own, and makes it known to egui; `None` without [`install`].
-/// `egui_wgpu::Renderer::free_texture` lets go of it.
+/// Draws `list` at `list.size` to a new texture and registers it with egui; `None` without [`install`]. Free it with
+/// `egui_wgpu::Renderer::free_texture`.
 pub fn draw_still(state: &egui_wgpu::RenderState, list: &DrawList) -> Option<egui::TextureId> {
     let (device, queue) = (&state.device, &state.queue);
     let mut renderer = state.renderer.write();
@@ -80,14 +80,14 @@ impl Viewport {
         Self::revised(rect, list, None, Place::Window)
     }
 
-    /// The same; where the picture before in this `place` had this `revision`, too, it is the same one and only shown again.
+    /// The same, but a picture with the same `revision` as the previous one in this `place` is shown again without redrawing.
     pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>, place: Place) -> egui::Shape {
         egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision, place }).into()
     }
 }
 
 impl Resources {
-    /// What `list` is drawn to in `place`.
+    /// The renderer, and the target for `list` in `place`.
     fn target_for(&mut self, device: &wgpu::Device, list: &DrawList, place: Place) -> (&mut Renderer, &mut Shown) {
         // A window can briefly be 0 pixels wide, or wider than the largest texture.
         let limit = device.limits().max_texture_dimension_2d;
@@ -118,7 +118,7 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let (renderer, shown) = resources.target_for(device, &self.list, self.place);
         let before = std::mem::replace(&mut shown.revision, self.revision);
         if before.is_none() || before != self.revision {
-            // The first picture comes as early as it can.
+            // The first picture does not wait for other pipelines.
             if before.is_some() {
                 renderer.make_another_pipeline(device, &shown.target);
             }

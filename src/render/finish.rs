@@ -1,16 +1,16 @@
-//! The last pass: light becomes the bytes of a picture.
+//! The last pass: converts light to the bytes of a picture.
 
 use super::target::{ColorEncoding, extent};
 use super::{shaders, wgpu};
 
-/// Tone-maps, encodes and dithers what was drawn.
+/// Tone-maps, encodes and dithers the picture.
 pub(super) struct Finish {
     pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
 }
 
 impl Finish {
-    /// To an attachment of format `to`, of what was kept like `keeping`.
+    /// The pass from light encoded as `keeping` to an attachment of format `to`.
     pub fn new(device: &wgpu::Device, keeping: ColorEncoding, to: wgpu::TextureFormat) -> Self {
         let shader = shaders::module(device, &shaders::FINISH);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -62,7 +62,7 @@ impl Finish {
         Self { pipeline, layout }
     }
 
-    /// What [`Self::draw`] reads.
+    /// Bind group of `light` for [`Self::draw`].
     pub fn group(&self, device: &wgpu::Device, light: &wgpu::TextureView) -> wgpu::BindGroup {
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("finish"),
@@ -78,7 +78,7 @@ impl Finish {
         pass.draw(0..3, 0..1);
     }
 
-    /// To all of `picture`.
+    /// Records the pass to all of `picture`.
     pub fn encode(&self, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, picture: &wgpu::TextureView) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("finish"),
@@ -97,7 +97,7 @@ impl Finish {
 /// Format of a picture. Not an sRGB one: the last pass encodes.
 pub(super) const PICTURE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// What a picture of `size` pixels is drawn on, to be read back or shown.
+/// A texture for a picture of `size` pixels, to be read back or shown.
 pub(super) fn picture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
     use wgpu::TextureUsages as Usage;
     device.create_texture(&wgpu::TextureDescriptor {

@@ -1,4 +1,4 @@
-//! What is in view, and the region of the shadow map that serves it.
+//! View culling, and the region of the shadow map.
 
 use glam::{Mat4, Vec3, Vec4};
 
@@ -12,7 +12,7 @@ pub(super) struct Ball {
 }
 
 impl Ball {
-    /// Around an instance of a mesh with these `bounds`, middle and half size; `round`: a part of the unit sphere.
+    /// Bounding sphere of an instance of a mesh with these `bounds`, centre and half size; `round`: a part of the unit sphere.
     pub fn around(instance: &Instance, bounds: &[Vec3; 2], round: bool) -> Self {
         let rows = instance.world_from_mesh.map(Vec4::from);
         let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
@@ -29,7 +29,7 @@ impl Ball {
     }
 }
 
-/// The edges of a picture: planes through the eye.
+/// View frustum: planes through the eye.
 pub(super) struct Sight {
     planes: [Vec4; 5],
 }
@@ -42,14 +42,14 @@ impl Sight {
         Self { planes: planes.map(unit) }
     }
 
-    /// Whether some of `ball` may be in the picture; true if it has no place.
+    /// Whether part of `ball` may be in the picture; true for a position that is NaN.
     pub fn shows(&self, ball: &Ball) -> bool {
         let outside = |plane: &Vec4| plane.dot(ball.centre.extend(1.0)) < -ball.radius;
         !self.planes.iter().any(outside)
     }
 }
 
-/// What the shadow map shows: a square across the light, and the depths between which things cast shadows, m.
+/// Region of the shadow map: a square across the light, and the depth range of the casters, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Region {
     pub centre: Vec3,
@@ -57,8 +57,8 @@ pub(super) struct Region {
     depths: [f32; 2],
 }
 
-/// The region that serves what is in view: all `casters` that are (the flag), and those whose shadows on the floor (a point of
-/// it, and up) are.
+/// The region needed for the view: all `casters` in view (the flag), and those whose shadows on the floor (a point of it, and
+/// up) are in view.
 pub(super) fn shadow_region(casters: &[(Ball, bool)], light: Vec3, floor: Option<(Vec3, Vec3)>, eye: &Eye) -> Region {
     let sight = Sight::new(eye);
     let steep = floor.filter(|(_, up)| light.dot(*up) > 0.05);
@@ -67,7 +67,7 @@ pub(super) fn shadow_region(casters: &[(Ball, bool)], light: Vec3, floor: Option
         let along = (ball.centre - point).dot(up) / light.dot(up);
         let shadow = Ball {
             centre: ball.centre - light * along,
-            // As long as the light is low.
+            // Elongated by a low light.
             radius: ball.radius / light.dot(up),
         };
         sight.shows(&shadow).then_some(())
@@ -108,7 +108,7 @@ pub(super) fn shadow_region(casters: &[(Ball, bool)], light: Vec3, floor: Option
 const STEP: f32 = 1.1;
 
 impl Region {
-    /// Orthographic view from the light on a map of so many `texels`.
+    /// Orthographic view from the light on a map with a side of `texels`.
     pub fn light_from_world(&self, light: Vec3, texels: u32) -> Mat4 {
         let up = light.any_orthonormal_vector();
         let right = up.cross(light);

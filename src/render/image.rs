@@ -30,8 +30,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// Encodes as PNG; `texts` are its keyword and text pairs (`Software`, `Description`, …). Letters of a text beyond Latin-1,
-    /// which PNG cannot hold, become `?`.
+    /// Encodes as PNG; `texts` are its keyword and text pairs (`Software`, `Description`, …). Characters beyond Latin-1, which
+    /// PNG cannot hold, become `?`.
     ///
     /// # Errors
     /// A keyword that PNG cannot hold.

@@ -4,22 +4,22 @@ use std::f32::consts::{PI, TAU};
 
 use crate::view::{Mesh, MeshData};
 
-/// How finely the shared meshes are divided, up to a radius on the screen.
+/// A level of detail of the shared meshes.
 pub(super) struct Level {
-    /// Around a bar or a sphere.
+    /// Sectors around a bar or a sphere.
     pub sectors: u32,
-    /// Largest radius, pixels: up to it no corner shows.
+    /// Largest radius on the screen at which no corner shows, pixels.
     pub pixels: f32,
 }
 
-/// The finest first.
+/// Levels of detail, the finest first.
 pub(super) const LEVELS: [Level; 4] = [level(64, f32::INFINITY), level(32, 18.0), level(16, 4.5), level(8, 1.1)];
 
 const fn level(sectors: u32, pixels: f32) -> Level {
     Level { sectors, pixels }
 }
 
-/// The shared meshes, by [`Mesh::index`], with so many sectors around.
+/// The shared meshes, by [`Mesh::index`], with `sectors` sectors around.
 pub(super) fn shared(sectors: u32) -> [MeshData; Mesh::SHARED] {
     let stacks = sectors / 2;
     [sphere(sectors, stacks), cylinder(sectors), cone(sectors), cube(), socket(sectors, stacks / 2)]
@@ -113,13 +113,13 @@ fn cube() -> MeshData {
     mesh
 }
 
-/// How deep a socket's cut face goes from its outer edge to its inner one, in inner radii: a ball before it stands clear of it.
+/// Depth of a socket's cut face between its outer and inner edge, in inner radii: a ball in front of it stands clear of it.
 const CUT: f32 = 0.2;
-/// About the slope of the cut face.
+/// Approximate normal of the cut face, outwards and up.
 const CUT_NORMAL: [f32; 2] = [-0.6, 0.8];
 
 /// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside). Each comes twice,
-/// to be seen from the front and from behind: in this order any sight passes them from far to near.
+/// for its front and its back, in an order that is from far to near for any line of sight.
 fn socket(nu: u32, half: u32) -> MeshData {
     let face = |nv: u32, point: &dyn Fn(f32, f32) -> ([f32; 4], [f32; 3])| {
         let mut mesh = MeshData::default();
@@ -151,7 +151,7 @@ fn socket(nu: u32, half: u32) -> MeshData {
     mesh
 }
 
-/// Adds a face, or what is seen of it from behind.
+/// Adds a face, or its back.
 fn append(mesh: &mut MeshData, face: &MeshData, from_behind: bool) {
     let first = mesh.vertices.len() as u32;
     let side = if from_behind { -1.0 } else { 1.0 };

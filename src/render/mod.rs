@@ -1,7 +1,7 @@
 //! Draws a [`crate::view::DrawList`] to a texture with wgpu: the same path in a window, in the browser (WebGPU, WebGL2) and
 //! headless.
 //!
-//! `passes.rs` lists the passes. They leave linear light (`target.rs`), which the last, `finish.rs`, tone-maps and encodes.
+//! `passes.rs` lists the passes. They write linear light (`target.rs`); the last, `finish.rs`, tone-maps and encodes it.
 
 mod callback;
 mod finish;

@@ -24,7 +24,7 @@ pub struct Offscreen {
     timer: Option<Timer>,
 }
 
-/// Where pictures of one size are drawn.
+/// Target and readback buffer for pictures of one size.
 struct Frame {
     target: RenderTarget,
     group: wgpu::BindGroup,
@@ -118,7 +118,7 @@ impl Offscreen {
     }
 }
 
-/// Measures the time of the adapter.
+/// Measures the time of the adapter by timestamp queries.
 struct Timer {
     stamps: wgpu::QuerySet,
     resolved: wgpu::Buffer,
@@ -156,7 +156,7 @@ impl Timer {
 }
 
 impl Offscreen {
-    /// Draws `list` and tells how long the adapter took for it; `None` where it has no timestamps. For benchmarks.
+    /// Draws `list` and returns the time on the adapter; `None` without timestamps. For benchmarks.
     ///
     /// # Errors
     /// A size the device cannot draw, or a lost device.
@@ -187,13 +187,13 @@ impl Offscreen {
         Ok(Some(std::time::Duration::from_nanos(nanoseconds as u64)))
     }
 
-    /// Triangles that a picture of `list` asks the adapter for, those of its shadows among them. For benchmarks.
+    /// Number of triangles that the adapter draws for a picture of `list`, its shadows included. For benchmarks.
     pub fn triangles(&mut self, list: &DrawList) -> u64 {
         self.renderer.triangles(list)
     }
 
-    /// Draws `list` and tells how long that took here: sorting and packing instances, uploading them, recording the passes. What
-    /// the adapter does with them is waited for afterwards. For benchmarks.
+    /// Draws `list` and returns the CPU time for it: sorting, packing and uploading instances, recording the passes. Waits for
+    /// the adapter afterwards. For benchmarks.
     ///
     /// # Errors
     /// A size the device cannot draw, or a lost device.
@@ -210,7 +210,7 @@ impl Offscreen {
         Ok(spent)
     }
 
-    /// The frame that is kept, or a new one if `list` does not fit it.
+    /// The stored frame, or a new one if it does not fit `list`.
     fn take_frame(&mut self, list: &DrawList) -> Frame {
         let fits = |frame: &Frame| frame.target.fits(list, list.size);
         if let Some(frame) = self.frame.take().filter(fits) {
@@ -228,16 +228,16 @@ impl Offscreen {
     }
 }
 
-/// The last pass, to `picture`.
+/// Records the last pass, to `picture`.
 fn encode(finish: &Finish, encoder: &mut wgpu::CommandEncoder, group: &wgpu::BindGroup, picture: &wgpu::Texture) {
     finish.encode(encoder, group, &picture.create_view(&Default::default()));
 }
 
 #[cfg(test)]
 impl Offscreen {
-    /// What the last pass makes of a row of texels: light, and the share of the theme's colours.
+    /// Output of the last pass for a row of texels: light, and the share of the theme's colours.
     pub(super) fn finished(&self, texels: &[[f32; 4]]) -> Image {
-        // Only zero and normal numbers that 11 bits hold.
+        // Handles only zero and normal numbers with 11 significant bits.
         let half = |x: &f32| match x.to_bits() {
             0 => 0,
             bits => ((bits >> 13) - (112 << 10)) as u16,

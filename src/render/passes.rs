@@ -1,4 +1,4 @@
-//! The passes of a picture, in order: what each draws, with which shader, and how it meets what is already there.
+//! The passes of a picture, in order: what each draws, with which shader, blending and depth test.
 
 use super::wgpu;
 use wgpu::CompareFunction::{Always, Greater, Less, LessEqual};
@@ -13,7 +13,7 @@ pub(super) enum Draws {
     Floor,
     /// Lines among the solid things.
     Lines,
-    /// Lines before everything.
+    /// Lines in front of everything.
     Marks,
     /// Instances of meshes.
     Meshes(Group),
@@ -34,7 +34,7 @@ pub(super) enum Group {
     GhostEdges,
     Arrows,
     Overlay,
-    /// What casts shadows: all solid, faded and clear things, seen from the light.
+    /// Shadow casters: all solid, faded and clear things, seen from the light.
     Casters,
 }
 
@@ -50,9 +50,9 @@ pub(super) enum Blend {
     Nothing,
     /// Replaces.
     Opaque,
-    /// Light that was shaded, in proportion to its opacity.
+    /// Shaded light, blended by its opacity.
     Light,
-    /// A colour of the theme, in proportion to its opacity: the last pass leaves its share as it is.
+    /// A colour of the theme, blended by its opacity; the last pass does not tone-map its share.
     Given,
 }
 
@@ -70,7 +70,7 @@ pub(super) struct Pass {
     pub write_depth: bool,
 }
 
-/// Something solid: the nearest is seen.
+/// An opaque pass with depth test.
 const fn solid(label: &'static str, group: Group, fragment: &'static str) -> Pass {
     Pass {
         label,
@@ -84,12 +84,12 @@ const fn solid(label: &'static str, group: Group, fragment: &'static str) -> Pas
     }
 }
 
-/// Something seen through.
+/// A translucent pass.
 const fn clear(label: &'static str, group: Group, fragment: &'static str, blend: Blend) -> Pass {
     Pass { blend, write_depth: false, ..solid(label, group, fragment) }
 }
 
-/// Something without a mesh.
+/// A pass without meshes.
 const fn flat(label: &'static str, draws: Draws, vertex: &'static str, fragment: &'static str) -> Pass {
     Pass { draws, vertex, cull: None, ..clear(label, Group::Solid, fragment, Blend::Given) }
 }
@@ -108,7 +108,7 @@ pub(super) const PASSES: &[Pass] = &[
     flat("lines", Draws::Lines, "vs_line", "fs_line"),
     clear("faded", Group::Faded, "fs_faded", Blend::Light),
     clear("halos", Group::Halos, "fs_halo", Blend::Given),
-    // The mesh has both sides of its faces, in the order in which any sight passes them.
+    // The mesh has both sides of its faces, in an order that is from far to near for any line of sight.
     Pass { vertex: "vs_joint", ..clear("sockets", Group::Sockets, "fs_socket", Blend::Light) },
     // After the sockets, whose glass would tint their colours.
     Pass { cull: None, compare: Always, ..clear("wear behind others", Group::Wear, "fs_wear_behind", Blend::Given) },
@@ -141,7 +141,7 @@ impl Pass {
         self.fragment.is_none()
     }
 
-    /// How its colour joins the one that is there. The fourth channel of the picture is the share of the theme's colours in it.
+    /// Its blend state. The fourth channel of the picture is the share of the theme's colours in it.
     pub fn blend_state(&self) -> Option<wgpu::BlendState> {
         let over = |source| wgpu::BlendComponent {
             src_factor: source,

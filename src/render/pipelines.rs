@@ -20,7 +20,7 @@ pub(super) struct Pipelines {
     pub shadow: wgpu::BindGroupLayout,
     shader: wgpu::ShaderModule,
     keeping: ColorEncoding,
-    /// For one sample per pixel, and for several.
+    /// Pipelines by pass, for one sample per pixel and for several.
     passes: [[OnceLock<wgpu::RenderPipeline>; PASSES.len()]; 2],
 }
 
@@ -72,13 +72,13 @@ impl Pipelines {
         }
     }
 
-    /// Of `PASSES[index]`, made when first asked for; `samples` is 4 or 1.
+    /// The pipeline of `PASSES[index]`, created on first use; `samples` is 4 or 1.
     pub fn pass(&self, device: &wgpu::Device, samples: u32, index: usize) -> &wgpu::RenderPipeline {
         let make = || pipeline(device, self, samples, &PASSES[index]);
         self.passes[usize::from(samples > 1)][index].get_or_init(make)
     }
 
-    /// Makes the next one that nothing has asked for yet, so that a later picture need not wait for it.
+    /// Creates the next pipeline not used yet, so that a later picture need not wait for it.
     pub fn make_another(&self, device: &wgpu::Device, samples: u32) {
         let made = &self.passes[usize::from(samples > 1)];
         if let Some(index) = made.iter().position(|made| made.get().is_none()) {

@@ -4,20 +4,20 @@ use std::sync::{Arc, OnceLock};
 
 use super::{Image, RenderError, wgpu};
 
-/// Where a picture of one size is read back.
+/// Buffer for reading back pictures of one size.
 pub struct Readback {
     buffer: wgpu::Buffer,
     size: [u32; 2],
     stride: u32,
 }
 
-/// Whether a picture has come back; empty until then.
+/// Result of a readback; empty until the picture arrives.
 pub type Arrival = Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>;
 
 /// Largest side of a picture that the device can draw, pixels.
 ///
 /// # Errors
-/// [`RenderError::Size`]: a side of `size` is beyond that, or 0.
+/// [`RenderError::Size`]: a side is beyond that, or 0.
 pub fn check_size(device: &wgpu::Device, [width, height]: [u32; 2]) -> Result<u32, RenderError> {
     let limit = device.limits().max_texture_dimension_2d;
     if (1..=limit).contains(&width) && (1..=limit).contains(&height) {
@@ -26,13 +26,13 @@ pub fn check_size(device: &wgpu::Device, [width, height]: [u32; 2]) -> Result<u3
     Err(RenderError::Size { width, height, limit })
 }
 
-/// What the device reports, as the error of a picture.
+/// Wraps an error of the device as the error of a picture.
 pub fn device_error(error: impl ToString) -> RenderError {
     RenderError::Device(error.to_string())
 }
 
 impl Readback {
-    /// For pictures of `size`.
+    /// A buffer for pictures of `size`, pixels.
     pub fn new(device: &wgpu::Device, size: [u32; 2]) -> Self {
         let [width, height] = size;
         let stride = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -50,7 +50,7 @@ impl Readback {
         self.size
     }
 
-    /// Copies `picture`, once it is drawn.
+    /// Records the copy of `picture`, after drawing.
     pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, picture: &wgpu::Texture) {
         encoder.copy_texture_to_buffer(
             picture.as_image_copy(),
@@ -66,18 +66,18 @@ impl Readback {
         );
     }
 
-    /// Asks for the picture, after the copy was submitted. It comes while the device is polled.
+    /// Requests the picture, after the copy was submitted. It arrives while the device is polled.
     pub fn request(&self) -> Arrival {
         let arrival = Arrival::default();
         let report = arrival.clone();
         self.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // It is reported once.
+            // The callback runs once.
             let _ = report.set(result);
         });
         arrival
     }
 
-    /// The picture, after it has come; the next may then be copied.
+    /// The picture, after it has arrived; the next may then be copied.
     ///
     /// # Errors
     /// The device fails.

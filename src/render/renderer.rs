@@ -49,7 +49,7 @@ struct Loaded {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     count: u32,
-    /// Middle and half size of its box.
+    /// Centre and half size of its bounding box.
     bounds: [Vec3; 2],
 }
 
@@ -93,7 +93,7 @@ impl Shadow {
     }
 }
 
-/// Instances of one mesh within the instance buffer: first those that are in view.
+/// Instances of one mesh within the instance buffer: those in view come first.
 struct Batch {
     level: usize,
     mesh: usize,
@@ -102,14 +102,14 @@ struct Batch {
     count: u32,
 }
 
-/// Draws draw lists; keeps pipelines, meshes and instance buffers between pictures.
+/// Renders draw lists; reuses pipelines, meshes and instance buffers between pictures.
 pub struct Renderer {
     pipelines: Pipelines,
     globals: wgpu::Buffer,
     globals_group: wgpu::BindGroup,
     shadow: Shadow,
     sampler: wgpu::Sampler,
-    /// The shared meshes by level of detail, the finest first and with the plates; then by [`Mesh::index`].
+    /// Meshes by level of detail, the finest first, then by [`Mesh::index`]; only the finest level has the plates.
     meshes: Vec<Vec<Loaded>>,
     plates: Arc<[MeshData]>,
     instances: Growing,
@@ -117,13 +117,13 @@ pub struct Renderer {
     marks: Growing,
     /// All instances of a picture, group by group.
     packed: Vec<Instance>,
-    /// Solid things: where they are, and whether they are in view.
+    /// Bounding spheres of shadow casters, and whether they are in view.
     casters: Vec<(Ball, bool)>,
     keeping: ColorEncoding,
 }
 
 impl Renderer {
-    /// Creates pipelines and shared meshes on `device`, which is `adapter`'s.
+    /// Creates pipelines and shared meshes on `device`, which belongs to `adapter`.
     pub fn new(device: &wgpu::Device, adapter: &wgpu::Adapter) -> Self {
         let keeping = ColorEncoding::on(adapter);
         let pipelines = Pipelines::new(device, keeping);
@@ -169,12 +169,12 @@ impl Renderer {
         }
     }
 
-    /// A target for pictures of `size` pixels with 4 samples or 1 in each.
+    /// A target for pictures of `size` pixels with 4 samples or 1 per pixel.
     pub fn target(&self, device: &wgpu::Device, size: [u32; 2], samples: u32) -> RenderTarget {
         RenderTarget::new(device, size, samples, self.keeping)
     }
 
-    /// What brings its targets to attachments of a `format`.
+    /// The last pass, from its targets to attachments of `format`.
     pub(super) fn finish(&self, device: &wgpu::Device, format: wgpu::TextureFormat) -> Finish {
         Finish::new(device, self.keeping, format)
     }
@@ -244,12 +244,12 @@ impl Renderer {
         }
     }
 
-    /// Makes one of the pipelines that no picture for `target` has needed so far, so that none has to wait for it later.
+    /// Creates one pipeline that no picture for `target` has needed so far, so that a later one need not wait for it.
     pub(super) fn make_another_pipeline(&self, device: &wgpu::Device, target: &RenderTarget) {
         self.pipelines.make_another(device, target.samples());
     }
 
-    /// Triangles of meshes that the passes of `list` draw.
+    /// Number of triangles of meshes that the passes of `list` draw.
     #[cfg(not(target_arch = "wasm32"))]
     pub(super) fn triangles(&mut self, list: &DrawList) -> u64 {
         let batches = self.pack(list, list.size);
@@ -292,7 +292,7 @@ impl Renderer {
         }
     }
 
-    /// Packs all instances of `list` for a picture of `size`, and notes what casts shadows.
+    /// Packs all instances of `list` for a picture of `size`, and collects the shadow casters.
     fn pack(&mut self, list: &DrawList, size: [u32; 2]) -> [Vec<Batch>; Group::COUNT] {
         let mut packing = Packing {
             eye: &list.eye,
@@ -379,12 +379,12 @@ impl Renderer {
     }
 }
 
-/// Whether it is a ball that shows its socket's wall or where it touches.
+/// Whether it is a ball shaded by its socket's wall or marked at its contact point.
 fn faces(instance: &&Instance) -> bool {
     instance.other[3] > 0.0 || instance.touch[3] > 0.0
 }
 
-/// What casts shadows.
+/// Groups that cast shadows.
 const CASTERS: [Group; 4] = [Group::Solid, Group::Balls, Group::Faded, Group::ClearBalls];
 
 /// Sorts instances by mesh, level of detail and whether they are in view.
@@ -397,7 +397,7 @@ struct Packing<'a> {
 }
 
 impl Packing<'_> {
-    /// Those of one mesh in any order; unseen ones are kept only if they cast shadows.
+    /// Packs instances of one mesh in any order; those out of view are packed only if they cast shadows.
     fn mesh<'i>(
         &mut self,
         mesh: usize,
@@ -435,7 +435,7 @@ impl Packing<'_> {
         }
     }
 
-    /// Those of one mesh as they come: translucent ones run from far to near.
+    /// Packs instances of one mesh in the given order: translucent ones run from far to near.
     fn in_order(&mut self, mesh: usize, all: &[Instance], batches: &mut Vec<Batch>) {
         let sight = fit::Sight::new(self.eye);
         let bounds = self.meshes[0][mesh].bounds;
@@ -464,7 +464,7 @@ impl Packing<'_> {
         });
     }
 
-    /// Level of detail for an instance: of those whose corners do not show the coarsest.
+    /// Level of detail for an instance: the coarsest whose corners do not show.
     fn level(&self, mesh: usize, instance: &Instance, seen: bool) -> usize {
         if mesh >= Mesh::SHARED {
             return 0;
@@ -503,8 +503,8 @@ impl Growing {
     }
 }
 
-/// Whether a pass over `draws` changes the picture: most have nothing to do in most pictures, and their pipelines take a software
-/// driver a tenth of a second each.
+/// Whether a pass over `draws` changes the picture. Most passes are empty in most pictures, and a software driver needs a tenth
+/// of a second to create each pipeline.
 fn draws_something(draws: Draws, list: &DrawList, batches: &[Vec<Batch>; Group::COUNT]) -> bool {
     match draws {
         Draws::Everywhere => true,
@@ -545,9 +545,9 @@ fn load(device: &wgpu::Device, mesh: &MeshData) -> Loaded {
     }
 }
 
-/// Radius across an instance's axis, pixels, at the nearer of its origin and its tip (0, 0, 1): what its roundness is seen
-/// by. Infinite where either is not in front of the eye. Of one that is not `seen`, but casts a shadow, what it would be if it
-/// were looked at.
+/// Radius across an instance's axis, pixels, at the nearer of its origin and its tip (0, 0, 1): the size of its visible
+/// curvature. Infinite if either is not in front of the eye. For an instance that is not `seen` but casts a shadow, the radius
+/// if it were looked at.
 fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance, seen: bool) -> f32 {
     let rows = instance.world_from_mesh.map(Vec4::from);
     let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);

@@ -1,4 +1,4 @@
-//! The shaders. WGSL has no includes: a module is its files one after another.
+//! The shaders. WGSL has no includes: a module is the concatenation of its files.
 
 use super::wgpu;
 
@@ -20,9 +20,9 @@ macro_rules! module {
     };
 }
 
-/// All passes but the last, where light is kept linear.
+/// All passes but the last, for linear light.
 pub(super) const LINEAR: Module = module!("scene": "colour.wgsl", "light.wgsl", "linear.wgsl", "scene.wgsl");
-/// The same where each pass encodes.
+/// The same for light encoded by each pass.
 pub(super) const ENCODED: Module = module!("scene, encoded": "colour.wgsl", "light.wgsl", "encoded.wgsl", "scene.wgsl");
 /// The last pass.
 pub(super) const FINISH: Module = module!("finish": "colour.wgsl", "finish.wgsl");

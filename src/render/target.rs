@@ -3,20 +3,20 @@
 use super::wgpu;
 use crate::view::DrawList;
 
-/// Depth of the picture.
+/// Format of the depth buffer.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth24Plus;
-/// How light is kept between the passes.
+/// Encoding of light between the passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorEncoding {
     /// Linear and brighter than white, 16-bit floats: the last pass tone-maps and encodes.
     Linear,
-    /// Tone-mapped and encoded by each pass, 8 bits: where the adapter cannot blend or resolve float samples. Blending is then
-    /// that of encoded colours.
+    /// Tone-mapped and encoded by each pass, 8 bits: where the adapter cannot blend or resolve float samples. Encoded colours
+    /// are then blended.
     Encoded,
 }
 
 impl ColorEncoding {
-    /// What `adapter` can do.
+    /// The encoding that `adapter` supports.
     pub fn on(adapter: &wgpu::Adapter) -> Self {
         Self::with(&adapter.get_texture_format_features(Self::Linear.format()))
     }
@@ -41,19 +41,19 @@ impl ColorEncoding {
     }
 }
 
-/// Colour and depth, and the light that is left.
+/// Colour and depth attachments, and the resolved light.
 pub struct RenderTarget {
     size: [u32; 2],
     samples: u32,
-    /// Colour of several samples, resolved to `light`; `None`: `light` itself is drawn to.
+    /// Multisampled colour, resolved to `light`; `None`: `light` itself is drawn to.
     pub(super) several: Option<wgpu::TextureView>,
     pub(super) depth: wgpu::TextureView,
     pub(super) light: wgpu::TextureView,
 }
 
 impl RenderTarget {
-    /// A target of `size` pixels (each at least 1 and at most the device's `max_texture_dimension_2d`) with 1 or 4 samples in each;
-    /// every backend supports four.
+    /// A target of `size` pixels (each at least 1 and at most the device's `max_texture_dimension_2d`) with 1 or 4 samples per
+    /// pixel; every backend supports four.
     pub(super) fn new(device: &wgpu::Device, size: [u32; 2], samples: u32, keeping: ColorEncoding) -> Self {
         use wgpu::TextureUsages as Usage;
         let texture = |label, format, sample_count, usage| {
@@ -89,7 +89,7 @@ impl RenderTarget {
         self.samples
     }
 
-    /// Whether it is one for `list` at `size` pixels.
+    /// Whether it suits `list` at `size` pixels.
     pub(super) fn fits(&self, list: &DrawList, size: [u32; 2]) -> bool {
         (self.size, self.samples) == (size, list.quality.samples)
     }

@@ -47,7 +47,7 @@ fn picture_of(
     list
 }
 
-/// Close-up of the pendulum's joint, and the pixel of a point.
+/// Close-up of the pendulum's joint: scene, frame and camera.
 fn close_up(options: &ViewOptions) -> (Scene, Frame, Camera) {
     let (scene, frame) = fixture::pendulum();
     let view = SceneView::new(&scene, &frame);
@@ -178,7 +178,7 @@ fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
     camera.yaw += std::f32::consts::PI;
     let mut list = picture(&scene, &frame, &options, &camera, false);
     list.solid = Default::default();
-    // The half that is kept.
+    // The remaining half.
     let opacity = |socket: &&crate::view::Instance| (socket.colour[3] * 1e6) as u32;
     let near = *list.sockets.iter().max_by_key(opacity).expect("a socket");
     let centre = Vec3::from(near.world_from_mesh.map(|row| row[3]));
@@ -210,15 +210,15 @@ fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
     assert!(difference(coarse, fine) < 6, "{coarse:?} {fine:?}");
 }
 
-/// Sockets 0, 1 and 2 behind one another in the middle of the picture, listed in this `order`, each with a body of its own; and
-/// the camera, which has 2 nearest, or from `behind` 0.
+/// Sockets 0, 1 and 2 behind one another in the middle of the picture, listed in this `order`, each with its own body. Socket 2
+/// is nearest to the camera, or 0 if it looks from `behind`.
 fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
     let (mut scene, mut frame) = fixture::pendulum();
     let mut camera = SceneView::new(&scene, &frame).camera();
     (camera.yaw, camera.pitch) = (0.4, 0.0);
     (camera.target, camera.distance) = (Vec3::ZERO, 0.16);
     let (right, up, back) = camera.axes();
-    // No cut in the middle of the picture.
+    // No socket is cut in the middle of the picture.
     let openings = [right + up - back, up - right + 0.5 * back, right - 2.0 * up - 1.5 * back];
     let double = |v: Vec3| Vec3d::new(v.x.into(), v.y.into(), v.z.into());
     let (joint, report) = (scene.machine.ball_joints[0].clone(), frame.joints[0]);
@@ -282,7 +282,7 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
         let same = whole.iter().all(|picture| *picture == whole[0]);
         assert!(same, "the order in the scene is seen");
 
-        // Mean light of the middle on either grey.
+        // Mean light in the middle of the picture on each grey.
         let mut middle = |sockets: &dyn Fn(&crate::view::Instance) -> bool| {
             greys.map(|grey| {
                 let mut list = glass.clone();
@@ -298,13 +298,13 @@ fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_
                 {
                     sum = [0, 1, 2].map(|k| sum[k] + pixel[k] / 64.0);
                 }
-                // There the tone mapping takes away a constant part of what is shaded.
+                // In this range tone mapping subtracts a constant from shaded light.
                 assert!(sum.iter().all(|c| (0.04..0.76).contains(c)), "{sum:?}");
                 sum
             })
         };
         let given = middle(&|_| false);
-        // Of each socket alone, what it lets through, and its own light.
+        // Transmittance and own light of each socket alone.
         let alone: Vec<(f32, [f32; 3])> = centres
             .iter()
             .map(|centre| {
@@ -397,7 +397,7 @@ fn a_hit_joint_lights_up_and_themes_differ() {
         let [red, _, blue] = at(picture, &camera, beside).map(i32::from);
         red - blue
     };
-    // From the socket's edge on.
+    // Outwards from the socket's edge.
     let warmer = (0..60).filter(|k| {
         let distance = 0.0186 + 1e-4 * *k as f32;
         warmth(&hit, distance) - warmth(&quiet, distance) > 20
@@ -578,19 +578,19 @@ fn every_standard_view_shows_what_moves() {
     let mut device = offscreen();
     let mut draw = |list: &DrawList| device.render(list).expect("a picture");
     let options = ViewOptions { floor: false, ..bare() };
-    // There are some hundred of them: small.
+    // About a hundred pictures: small.
     let size = SIZE.map(|n| n / 2);
     for name in crate::scene::BUILT_IN {
         let scene = Scene::load(name, &[]).expect("built in");
         let mut frame = Frame::default();
         let mut simulation = crate::simulate::Simulation::new(&scene.machine).expect("starts");
-        // Twelve loose joints take their time.
+        // Twelve loose joints take long to simulate.
         let later = (scene.machine.ball_joints.len() <= 8).then_some(0.3);
         for (turn, time) in std::iter::once(0.0).chain(later).enumerate() {
             simulation.advance_to(time).expect("runs");
             simulation.sample(time, &mut frame);
             let view = SceneView::new(&scene, &frame);
-            // Later from every other side.
+            // At the later instant only every other view.
             for preset in Preset::ALL.into_iter().step_by(1 + turn) {
                 let mut camera = view.camera();
                 camera.preset(preset);
@@ -767,7 +767,7 @@ fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
     assert!(worst.is_some_and(|worst| worst <= 1), "bytes are copied: {worst:?}");
 }
 
-/// Channel of a theme's colour as light.
+/// An encoded pixel as linear light.
 fn light_of(pixel: [u8; 3]) -> [f32; 3] {
     let [r, g, b] = pixel.map(|c| f32::from(c) / 255.0);
     Colour([r, g, b, 1.0]).linear()
@@ -827,7 +827,7 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
     let (scene, touching, mut camera) = close_up(&options);
     let report = &touching.joints[0];
     let outwards = to_f32(&report.eccentricity).normalize();
-    // From where the touching point is in the middle.
+    // View with the contact point in the middle.
     let ball = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
     camera.target = ball;
     let mut best = camera;
@@ -952,7 +952,7 @@ fn the_longest_chain_asks_for_few_triangles_from_afar_and_from_within() {
     }
 }
 
-/// A scene and a frame of it, moved.
+/// A scene and a frame of it, moved by `by`, m.
 fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
     use crate::machine::Geometry::{Box, Capsule, Cylinder};
     let (mut scene, mut frame) = (scene.clone(), frame.clone());

@@ -1,4 +1,4 @@
-//! The clock that measures what stepping takes; it comes from outside, so that tests hold it still.
+//! The clock that measures stepping time; it is injected, so that tests can control it.
 
 use std::sync::OnceLock;
 

@@ -1,4 +1,4 @@
-//! The panels of the window within another page.
+//! Panels of a window embedded in another page.
 
 /// A panel beside the picture of an embedded window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -7,7 +7,7 @@ pub enum Part {
     Controls,
     /// Lanes of the ball joints.
     Timeline,
-    /// The plots on show.
+    /// The visible plots.
     Plots,
     /// The chaos bench.
     Bench,
@@ -21,10 +21,10 @@ const PARTS: [(&str, Part); 4] =
 pub struct Embedded(Vec<Part>);
 
 impl Embedded {
-    /// Reads words separated by commas or spaces; none for the picture and its bar alone.
+    /// Reads words separated by commas or spaces; without any, only the picture and its bar are shown.
     ///
     /// # Errors
-    /// An unknown word; lists those there are.
+    /// An unknown word; lists the allowed ones.
     pub fn read(text: &str) -> Result<Self, String> {
         let words = text.split([',', ' ']).filter(|word| !word.is_empty());
         let parts = words.map(|word| {
@@ -48,7 +48,7 @@ impl Embedded {
         words.map(|(word, _)| *word).collect::<Vec<_>>().join(",")
     }
 
-    /// Whether it has this one.
+    /// Whether it includes `part`.
     pub fn has(&self, part: Part) -> bool {
         self.0.contains(&part)
     }

@@ -6,17 +6,17 @@ use crate::machine::{Machine, Output, Vec3};
 use crate::simulate::{Frame, Simulation, Snapshot, StartError, Stopped, closed};
 use crate::view::output_point;
 
-/// States kept to go back to; at this number every second one is dropped.
+/// Most snapshots; at this number every second one is dropped.
 const KEPT: usize = 32;
-/// Initial interval between them, s.
+/// Initial interval between snapshots, s.
 const APART: f64 = 1e-2;
-/// While the run is recorded, the ideal motion follows it if less than this behind, s, in at most this many steps.
+/// The ideal motion follows the recording if it is less than this behind, s, in at most this many steps.
 const NEAR: f64 = 0.02;
 const STEPS: u32 = 512;
 /// Stepping budget per frame on the way to the displayed instant, s.
 const BUDGET: f64 = 4e-3;
 
-/// Gravity of a run over time: the changes to the run that a motion computed beside it must follow.
+/// Gravity of a run over time, which the ideal motion must follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gravity {
     /// Start time, s, and value, m/s^2, in order.
@@ -29,8 +29,8 @@ impl Gravity {
         Self { since: vec![(f64::NEG_INFINITY, gravity)] }
     }
 
-    /// The run has taken a step from `start`, s, under `gravity`; later entries belong to another future and are dropped.
-    /// Returns whether there were any, or whether the gravity is new.
+    /// Notes a step of the run from `start`, s, under `gravity`. Later entries belong to an abandoned future and are dropped.
+    /// Returns whether any were dropped or gravity changed.
     pub fn observe(&mut self, start: f64, gravity: Vec3) -> bool {
         let kept = self.since.partition_point(|(time, _)| *time <= start);
         let forgets = kept < self.since.len();
@@ -67,16 +67,17 @@ pub struct Ideal {
 
 struct Motion {
     simulation: Simulation,
-    /// At the latest requested instant that was reached.
+    /// Frame at the latest requested instant reached.
     frame: Frame,
-    /// In order of time; the first is the start.
+    /// Snapshots in order of time; the first is the start.
     kept: Vec<(f64, Snapshot)>,
     apart: f64,
     stopped: Option<Stopped>,
 }
 
 impl Ideal {
-    /// Of `scene`, at its start. If its loops do not close, or it is too large with closed joints, [`Self::fault`] says so.
+    /// The ideal motion of `machine`, at its start. [`Self::fault`] reports loops that do not close and a machine too large
+    /// with closed joints.
     pub fn new(machine: &Machine) -> Self {
         let motion = Simulation::new(&closed(machine)).map(|mut simulation| {
             let mut frame = Frame::default();
@@ -92,7 +93,7 @@ impl Ideal {
         Self { output: machine.output.clone(), motion }
     }
 
-    /// Advances to `time`, s, to which the run is recorded, if that is near.
+    /// Advances to `time`, s, up to which the run is recorded, if that is near.
     pub(crate) fn follow(&mut self, time: f64, gravity: &Gravity) {
         if let Ok(motion) = &mut self.motion
             && time - motion.simulation.time() < NEAR
@@ -115,7 +116,7 @@ impl Ideal {
         }
     }
 
-    /// Gravity has changed at `time`, s, or the run branched there.
+    /// Drops states after `time`, s, where gravity changed or the run branched.
     pub(crate) fn forget_after(&mut self, time: f64) {
         if let Ok(motion) = &mut self.motion {
             motion.kept.retain(|(kept, _)| *kept <= time);
@@ -143,7 +144,7 @@ impl Ideal {
         Some(output_point(&self.output, frame)? - output_point(&self.output, ideal)?)
     }
 
-    /// Why there is none, or none after some time.
+    /// Why there is no ideal motion, or why it ended.
     pub fn fault(&self) -> Option<String> {
         match &self.motion {
             Err(error) => Some(format!("with ideal joints, {error}")),
@@ -156,7 +157,7 @@ impl Ideal {
 }
 
 impl Motion {
-    /// Samples the state at `time`, s, into the frame, if it may take the steps needed to get there.
+    /// Samples the state at `time`, s, into the frame, if `may_step` allows the steps needed.
     fn place(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
         if time < self.simulation.step_start() {
             self.go_back(time);
@@ -176,7 +177,7 @@ impl Motion {
         self.simulation.sample(time, &mut self.frame);
     }
 
-    /// Keeps the present state if the last one kept is old enough.
+    /// Stores a snapshot if the last one is old enough.
     fn keep(&mut self, now: f64) {
         let newest = self.kept.last().map_or(f64::NEG_INFINITY, |kept| kept.0);
         if now < newest + self.apart {
@@ -193,7 +194,7 @@ impl Motion {
         self.kept.push((now, self.simulation.snapshot()));
     }
 
-    /// Restores the latest state kept at or before `time`, s.
+    /// Restores the latest snapshot at or before `time`, s.
     fn go_back(&mut self, time: f64) {
         let known = self.kept.partition_point(|(kept, _)| *kept <= time);
         let Some((_, snapshot)) = self.kept.get(known.max(1) - 1) else {
@@ -227,7 +228,7 @@ mod tests {
         panic!("never comes there");
     }
 
-    /// The output point of `machine` at `time`, by a run of its own.
+    /// Output point of `machine` at `time`, from an independent run.
     fn alone(machine: &Machine, output: &Output, time: f64) -> Vec3 {
         let mut frame = Frame::default();
         let mut run = Simulation::new(machine).expect("starts");
@@ -242,11 +243,11 @@ mod tests {
             let scene = scene(name, &[]);
             let [mut with, mut without] = [(); 2].map(|()| Player::new(&scene).expect("starts"));
             with.set_ideal(true);
-            // Many loose joints take their time.
+            // Many loose joints take long to simulate.
             let part = if scene.machine.ball_joints.len() > 3 { 0.4 } else { 1.0 };
             for (turn, time) in [0.013, 0.03, 0.021_3].map(|time| part * time).into_iter().enumerate() {
                 if turn == 2 {
-                    // Back, and another way there.
+                    // Back to the start and there again.
                     with.reset().expect("starts");
                     without.reset().expect("starts");
                 }
@@ -320,7 +321,7 @@ mod tests {
         let expected = output_point(&scene.machine.output, &frame).expect("has a body");
         let off = (there(&player) - expected).norm();
         assert!(off < 1e-9, "{off:e}");
-        // Switched on late, it still knows of the change.
+        // Switched on late, it still applies the change.
         player.set_ideal(false);
         player.set_ideal(true);
         reach(&mut player);
@@ -398,7 +399,7 @@ mod tests {
         assert!(gravity.observe(2.0, g(0.0)));
         assert_eq!(gravity.at(0.5), g(-9.81));
         assert_eq!((gravity.at(1.0), gravity.next(1.0)), (g(-5.0), 2.0));
-        // Back to 0.9: what came after is gone.
+        // Back to 0.9 s: later entries are gone.
         assert!(gravity.observe(0.9, g(-9.81)));
         assert_eq!((gravity.at(3.0), gravity.next(0.0)), (g(-9.81), f64::INFINITY));
         assert!(gravity.observe(1.2, g(1.0)) && gravity.observe(1.2, g(2.0)));

@@ -1,5 +1,4 @@
-//! Share links: a scene, what was changed in it, and how to take a run to the same instant again, as the query or the
-//! fragment of a URL.
+//! Share links: a scene, its changes and the instant of a run, as the query or fragment of a URL.
 //!
 //! A link carries the log of a run but no state: its values are checked by the same table as user input, a person can read and
 //! write it, and it does not depend on internal data structures. The price is stepping from t = 0, which takes no longer than
@@ -19,9 +18,9 @@ use crate::view::Picked;
 use crate::words::{Words as _, words};
 use shown::{Instruments, PlotWindow};
 
-/// Longest link written and read, characters: what mail, chats and every browser still pass on.
+/// Longest link written and read, characters: mail, chats and every browser still accept it.
 pub const LONGEST_LINK: usize = 32_000;
-/// Most bytes that a packed part of a link may unpack to: the size limit of a scene file.
+/// Size limit of an unpacked part of a link, bytes: that of a scene file.
 const LARGEST_UNPACKED: usize = LARGEST_FILE as usize;
 
 /// Short names of parameters.
@@ -58,7 +57,7 @@ const WORDS: [&str; 22] = [
     "theme",
 ];
 
-/// Latest instant that a link may lead to, s: a run there takes days.
+/// Latest instant that a link may name, s: running there takes days.
 const LATEST: f64 = 1e6;
 /// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
@@ -70,7 +69,7 @@ pub enum ThemeChoice {
     Light,
     /// Light on dark.
     Dark,
-    /// As the system has them.
+    /// As in the system.
     #[default]
     System,
 }
@@ -81,7 +80,7 @@ words!(ThemeChoice {
     System => "system",
 });
 
-/// A link that cannot be read: what is wrong and what is allowed.
+/// A link that cannot be read: the cause and the allowed values.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{}", place(.key, .value), visible(.message))]
 pub struct LinkError {
@@ -89,7 +88,7 @@ pub struct LinkError {
     pub key: String,
     /// Value at fault, shortened.
     pub value: String,
-    /// What is wrong and what is allowed.
+    /// Cause and allowed values.
     pub message: String,
 }
 
@@ -124,21 +123,21 @@ pub struct CameraPose {
     pub pitch: f32,
     /// Eye to target, m.
     pub distance: f32,
-    /// What it looks at, m.
+    /// Point it looks at, m.
     pub target: [f32; 3],
-    /// Width over height of the picture into which everything was fitted, if the camera has not been moved since; a picture of
-    /// another shape is fitted anew. `None`: the user has placed it.
+    /// Width over height of the picture that the camera was fitted to, if not moved since; another aspect is refitted. `None`:
+    /// placed by the user.
     pub fitted: Option<f32>,
 }
 
-/// What a link says.
+/// A parsed link.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Link {
     /// The scene.
     pub scene: SceneText,
-    /// Changes that the run starts with, and what was changed on the way.
+    /// Changes at the start of the run, and events during it.
     pub log: Log,
-    /// Steps to take; without it the run goes to `time`.
+    /// Steps to take; without it the run continues to `time`.
     pub steps: Option<u64>,
     /// Time to show, s.
     pub time: Option<f64>,
@@ -154,29 +153,29 @@ pub struct Link {
     pub follow: Option<String>,
     /// Plots shown.
     pub plots: Option<Vec<Quantity>>,
-    /// Names of the channels that plots of their own show.
+    /// Names of the channels with plots of their own.
     pub channels: Option<Vec<String>>,
-    /// Time that they show.
+    /// Time window of the plots.
     pub window: Option<PlotWindow>,
     /// Instruments that are on.
     pub instruments: Option<Instruments>,
     /// Name of the built-in lesson that it belongs to.
     pub lesson: Option<String>,
-    /// Step of it, counted from 1.
+    /// Step of the lesson, counted from 1.
     pub step: Option<usize>,
-    /// Its panels within another page.
+    /// Panels when embedded in another page.
     pub embedded: Option<Embedded>,
     /// Whether the run plays once the state is reached; by default, only if the link names no instant.
     pub playing: Option<bool>,
-    /// Light, dark, or as the system asks.
+    /// Light, dark, or as in the system.
     pub theme: Option<ThemeChoice>,
     /// Version of the program that made the link.
     pub version: Option<String>,
-    /// Texts of the files that the scene names: they are in no link, but kept with it ([`Self::keep`]).
+    /// Texts of the files that the scene references. No link carries them; [`Self::keep`] stores them with it.
     pub beside: Texts,
 }
 
-/// What is said of a text that [`is_page`] refuses.
+/// Message for a text that [`is_page`] rejects.
 pub const NO_PAGE: &str = "not an address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. https://example.org/lab/";
 
 /// Whether `text` can be the address of a page, to which links are appended.
@@ -193,12 +192,12 @@ pub fn is_link(text: &str) -> bool {
         || (text.contains('=') && !text.ends_with(".toml") && !is_file(text))
 }
 
-/// A page has no files by name.
+/// A browser has no files by name.
 fn is_file(text: &str) -> bool {
     cfg!(not(target_arch = "wasm32")) && std::path::Path::new(text).is_file()
 }
 
-/// The panels that a link asks for, though it cannot be opened.
+/// The panels that a link requests, even if it cannot be opened.
 pub fn embedded_in(text: &str) -> Option<Embedded> {
     let parts = text.split(['?', '#']);
     let mut words = parts.flat_map(|part| form_urlencoded::parse(part.as_bytes()));
@@ -208,7 +207,7 @@ pub fn embedded_in(text: &str) -> Option<Embedded> {
 
 impl Link {
     /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands alone;
-    /// otherwise the query's pairs come first and the fragment's override them. Or what [`Self::keep`] gives.
+    /// otherwise the query's pairs come first and the fragment's override them. Also reads the output of [`Self::keep`].
     ///
     /// # Errors
     /// An unknown word, an invalid value, a packed part that does not unpack. Whether the scene has the parameters and allows
@@ -226,7 +225,7 @@ impl Link {
         Self::read(text)
     }
 
-    /// As [`Self::parse`], of any length.
+    /// As [`Self::parse`], without the length limit.
     fn read(text: &str) -> Result<Self, LinkError> {
         let (before, fragment) = text.split_once('#').unwrap_or((text, ""));
         let query = match before.split_once('?') {
@@ -306,7 +305,7 @@ impl Link {
                         _ => return Err(wrong("allowed 0 (paused) and 1 (playing)")),
                     });
                 }
-                // An address that the page makes, `web/main.js`.
+                // Set by the page, `web/main.js`.
                 "kept" => {
                     return Err(fault(
                         "kept",
@@ -358,7 +357,7 @@ impl Link {
         Ok(link)
     }
 
-    /// The pairs as in a query or a fragment, without the leading sign.
+    /// The pairs as in a query or a fragment, without the leading `?` or `#`.
     pub fn format(&self) -> String {
         let mut out = form_urlencoded::Serializer::new(String::new());
         let mut packed = Vec::new();
@@ -407,10 +406,10 @@ impl Link {
         out.finish()
     }
 
-    /// As [`Self::format`], short enough to pass on; with a note where something had to be left out.
+    /// As [`Self::format`], within the length limit; with a note if something had to be left out.
     ///
     /// # Errors
-    /// A scene file that is too large to travel in a link, or that names other files, in words.
+    /// A message if the scene file is too large for a link or references other files.
     pub fn format_short(&self, wanted: &Scene) -> Result<(String, Option<String>), String> {
         if let Some(name) = wanted.source.beside.keys().next() {
             return Err(format!(
@@ -441,7 +440,7 @@ impl Link {
         ))
     }
 
-    /// The scene with the changes that the run starts with.
+    /// Loads the scene with the changes at the start of the run.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -482,9 +481,9 @@ impl Link {
         }
     }
 
-    /// Whether the link, read from `text`, asks for nothing of a run: no scene, change, instant, lesson or look.
+    /// Whether the link, read from `text`, requests nothing: no scene, change, instant, lesson or view.
     pub fn is_of_nothing(&self, text: &str) -> bool {
-        // The default scene by its name is asked for.
+        // Naming the default scene is a request.
         let bare = Self { theme: self.theme, embedded: self.embedded.clone(), ..Self::default() };
         !text.contains("scene=") && *self == bare
     }
@@ -502,7 +501,7 @@ impl Default for SceneText {
 }
 
 impl SceneText {
-    /// Where `scene` comes from.
+    /// Source of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let text = &scene.source.text;
         if built_in_text(&scene.name) == Some(text) {

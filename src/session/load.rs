@@ -1,11 +1,11 @@
-//! Brings a new run to a section of a sweep by the same steps that the sweep took, within a time budget per frame.
+//! Runs a scene to a section of a sweep by the same steps as the sweep, within a time budget per frame.
 
 use super::player::Player;
 use crate::analysis::section::Schedule;
 use crate::analysis::source::SceneSource;
 use crate::analysis::sweep_task::SweptPoint;
 
-/// One sweep point on the way: its settings, and when its steps end.
+/// One sweep point on the way: its settings and its step ends.
 #[derive(Clone, Debug, PartialEq)]
 struct Leg {
     settings: Vec<(String, String)>,
@@ -28,8 +28,8 @@ pub struct Load {
 pub type Arrival = Result<(), String>;
 
 impl Load {
-    /// The way to section `section` (discarded ones included) of point `index` of a sweep over `scene` with `periods` periods
-    /// per point. `None` if a point on the way is missing.
+    /// Plans the run to section `section` (discarded ones included) of point `index` of a sweep over `scene` with `periods`
+    /// periods per point. `None` if a point on the way is missing.
     pub fn new<'a>(
         scene: &SceneSource,
         points: impl Fn(usize) -> Option<&'a SweptPoint>,

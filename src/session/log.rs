@@ -1,4 +1,4 @@
-//! What was done to a run since its start: enough to take the same steps again and get the same bits.
+//! The events of a run since its start: enough to repeat the same steps and get the same bits.
 //!
 //! A change happens between two steps, so the number of steps taken says exactly when. Sampling and drawing never change a step
 //! and are not logged.
@@ -8,7 +8,7 @@ use crate::machine::Vec3;
 use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
 use crate::simulate::{Effect, Pull};
 
-/// Largest stiffness in N/m, and damping in N s/m, of a hand in a log.
+/// Largest stiffness in N/m, and damping in N s/m, of a pull in a log.
 const STIFFEST: f64 = 1e9;
 
 /// What happened between two steps.
@@ -26,18 +26,18 @@ pub enum Event {
         /// Key.
         key: String,
     },
-    /// From here on steps end at `first`, at `first + interval`, and so on, at `sections` instants, s.
+    /// Steps end at `first`, at `first + interval`, and so on, at `sections` instants, s.
     Sections {
-        /// The first.
+        /// First instant, s.
         first: Number,
-        /// From one to the next.
+        /// Interval, s.
         interval: Number,
-        /// How many.
+        /// Number of instants.
         sections: u64,
     },
     /// The user pulled, or let go.
     Pull(Option<Pulled>),
-    /// A step was tried and the divergence guard refused it.
+    /// The divergence guard refused a step.
     Stop,
 }
 
@@ -51,11 +51,11 @@ impl Event {
         }
     }
 
-    /// Makes the change in `run`; `original` is the scene as its file gives it. Sections and a refused step change nothing: they are
-    /// for whoever steps the run.
+    /// Applies the event to `run`; `original` is the scene as loaded from its file. Sections and a refused step change nothing
+    /// here: the caller that steps the run handles them.
     ///
     /// # Errors
-    /// As [`Simulation::set`]; nothing has changed then.
+    /// As [`Simulation::set`]; the run is left unchanged.
     pub fn apply(&self, run: &mut LiveScene, original: &Scene) -> Result<Effect, SetError> {
         match self {
             Self::Set { key, value } => {
@@ -74,7 +74,7 @@ impl Event {
         }
     }
 
-    /// The instants at which steps end from here on.
+    /// The step ends that this event prescribes.
     pub fn schedule(&self) -> Option<Schedule> {
         let Self::Sections { first, interval, sections } = self else {
             return None;
@@ -146,7 +146,7 @@ pub struct Entry {
 /// The start of a run and every event since.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Log {
-    /// Changes of the scene's file that the run started with, in order.
+    /// Changes to the scene file at the start of the run, in order.
     pub base: Vec<(String, String)>,
     /// Events in order.
     pub entries: Vec<Entry>,
@@ -195,7 +195,7 @@ impl Log {
     /// Reads what [`Self::text`] wrote.
     ///
     /// # Errors
-    /// The line that is not an entry.
+    /// A line that is not an entry.
     pub fn read(base: Vec<(String, String)>, text: &str) -> Result<Self, String> {
         let mut log = Self { base, entries: Vec::new() };
         let mut before = 0_u64;

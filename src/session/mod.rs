@@ -1,4 +1,4 @@
-//! A run as a person handles it: played, taken back, recorded, changed, with companions beside it. Nothing of a window.
+//! An interactive run: played, rewound, recorded and changed, with companion runs. Independent of any window.
 
 pub mod clock;
 pub mod embedded;

@@ -4,17 +4,17 @@ use crate::machine::Mat3;
 use crate::scene::Scene;
 use crate::simulate::{Frame, RECORDED_JOINTS};
 
-/// Points kept of each ball joint.
+/// Points stored per ball joint.
 const KEPT: usize = 4096;
 /// A ball that has moved by less than this fraction of its clearance counts as unmoved.
 const GRAIN: f32 = 1e-3;
 
-/// Where a ball's centre was.
+/// Position of a ball's centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// s.
+    /// Time, s.
     pub time: f64,
-    /// From the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
+    /// Position from the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
     pub place: [f32; 3],
 }
 
@@ -44,7 +44,7 @@ impl Paths {
         Self { joints: joints.map(path).collect() }
     }
 
-    /// Records an instant of the run. One earlier than the latest begins another future: what came after it is dropped.
+    /// Records an instant of the run. An instant before the latest starts a new branch: later points are dropped.
     pub fn record(&mut self, frame: &Frame) {
         for (path, joint) in self.joints.iter_mut().zip(&frame.joints) {
             let points = &mut path.points;
@@ -63,7 +63,7 @@ impl Paths {
                 continue;
             }
             if points.len() == KEPT {
-                // Half at once: shifting all of them for every point would be too costly.
+                // Half at once: shifting all points for each new one would be too costly.
                 points.drain(..KEPT / 2);
             }
             let time = frame.time;

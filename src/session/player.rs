@@ -1,4 +1,4 @@
-//! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
+//! A running scene with its transport controls: playing, pacing, recording, peaks and warnings. No egui here.
 
 pub mod contact_history;
 pub mod impact_record;
@@ -35,18 +35,18 @@ const FINEST_BIN: f64 = 2e-6;
 ///
 /// There is one displayed instant, the pacer's: frame, peaks, sections and link all refer to it. The simulation itself is ahead
 /// by part of its latest step, which stays hidden until its time. The record extends as far as the run was ever shown
-/// ([`Self::reached`]): a past instant is displayed by restoring a kept state and taking the same steps again.
+/// ([`Self::reached`]): a past instant is displayed by restoring a keyframe and repeating the same steps.
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
     /// Clock that measures stepping time.
     pub clock: Clock,
     simulation: LiveScene,
-    /// The run before a change made within the displayed step: it still holds what that step did until the change.
+    /// The run as it was before a change within the displayed step; samples that step up to the change.
     unchanged: Option<Box<LiveScene>>,
-    /// The scene as its file gives it.
+    /// The scene as loaded from its file.
     original: Scene,
-    /// What is allowed but may not do what the user expects.
+    /// Warnings about settings that are valid but may surprise the user.
     warnings: Vec<Known>,
     playing: bool,
     /// Time runs backwards while it plays.
@@ -54,16 +54,16 @@ pub struct Player {
     stopped: Option<Stopped>,
     frame: Frame,
     peaks: Vec<Peak>,
-    /// Peaks of the latest step that are still to come.
+    /// Peaks of the latest step after the displayed instant.
     coming: Vec<Peak>,
     /// Peaks since the previous frame.
     passed: Vec<Peak>,
     channels: Channels,
-    /// By what names channels are picked.
+    /// Name patterns of the picked channels.
     picks: Vec<String>,
-    /// Record of the channels, followed by the clearance of each recorded ball joint, and by the picked channels.
+    /// Record of the channels, then the clearance of each recorded ball joint, then the picked channels.
     history: History,
-    /// Record, in full detail, of the past stretch that was last retraced.
+    /// Full-resolution record of the time window last retraced.
     near: Option<Box<History>>,
     contact_history: ContactHistory,
     impact_record: ImpactRecord,
@@ -74,37 +74,37 @@ pub struct Player {
     settling: Settling,
     paths: Paths,
     keyframes: Keyframes,
-    /// Latest instant ever displayed, s, and most steps taken.
+    /// Latest instant ever displayed, s, and largest number of steps taken.
     reached: f64,
     most_steps: u64,
     /// The future abandoned when the run branched from its past.
     left: Option<Box<AbandonedFuture>>,
     sought: Option<ImpactSearch>,
-    /// What was done since the start.
+    /// Events since the start.
     log: Log,
-    /// Changes of parameters since they were last taken.
+    /// Parameter changes since the last `take_edits`.
     edits: Vec<Edit>,
-    /// Whether the run is copied before a change; the parameter of the gesture under way, which is one change; and the latest copy with
-    /// the parameter that was changed after it.
+    /// Whether to copy the run before a change; the key of the current gesture, which counts as one change; the latest copy
+    /// with the key changed after it.
     keeps_before: bool,
     gesture: Option<String>,
     before: Option<(Box<Self>, String)>,
-    /// Number of log entries before the displayed instant; and the time of every entry, s.
+    /// Number of log entries before the displayed instant, and the time of every entry, s.
     applied: usize,
     event_times: Vec<f64>,
-    /// Instants at which steps end.
+    /// Prescribed step ends.
     sections: Option<Schedule>,
     watch: RunWatch,
     twin: Option<Box<Twin>>,
     /// Gravity since the start, for the ideal motion.
     gravity: Gravity,
     ideal: Option<Box<Ideal>>,
-    /// Simulated time and the stepping time that it took, s, both fading.
+    /// Simulated time and stepping time, s, as exponentially decaying sums.
     stepped: f64,
     stepping: f64,
 }
 
-/// A change of a parameter: the texts before and after, `None` where the scene's file decides.
+/// A parameter change: value text before and after; `None` stands for the scene file's value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Edit {
     /// Key.
@@ -115,22 +115,22 @@ pub struct Edit {
     pub after: Option<String>,
 }
 
-/// Text of `key` among `changes`.
+/// Latest value text of `key` in `changes`.
 fn changed(changes: &[(String, String)], key: &str) -> Option<String> {
     changes.iter().rev().find(|(other, _)| other == key).map(|(_, text)| text.clone())
 }
 
-/// Seconds of viewing that the automatic window of the plots shows.
+/// Viewing time covered by the automatic plot window, s.
 const VIEWING: f64 = 5.0;
 
-/// Stepping time over which the capacity is averaged, s, and the least that gives a value.
+/// Averaging time of the capacity, s of stepping, and the least that yields a value.
 const MEASURED: f64 = 0.3;
 const LEAST_MEASURED: f64 = 1e-3;
 
-/// Most instants recorded within one long step.
+/// Most instants recorded within one step.
 const MOST_RECORDED: f64 = 64.0;
 
-/// What to know about a scene before it runs.
+/// A warning about a scene before it runs.
 #[derive(Clone)]
 struct Known {
     /// As [`Warning::key`].
@@ -139,14 +139,14 @@ struct Known {
 }
 
 impl Known {
-    /// All of `scene`.
+    /// All warnings about `scene`.
     fn of(scene: &Scene) -> Vec<Self> {
         let known = |warning: Warning| Self { key: warning.key(), sentence: warning.to_string() };
         let slow = too_slow(scene).map(|slow| Self { key: Some("solver.preset"), sentence: slow.to_string() });
         scene.machine.warnings().into_iter().map(known).chain(slow).collect()
     }
 
-    /// Whether it is about `key`, the scene's or a ball joint's.
+    /// Whether it concerns `key`, a parameter of the scene or of a ball joint.
     fn is_about(&self, key: &str) -> bool {
         let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
         self.key.is_some_and(|own| own == last.unwrap_or(key))
@@ -160,7 +160,7 @@ impl Player {
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         let simulation = LiveScene::new(scene)?;
-        // The text has been parsed before; should that fail now, a control's default is its present value.
+        // The text parsed before; if it fails now, a control's default is its present value.
         let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
             .unwrap_or_else(|_| scene.clone());
         let channels = Channels::of(&scene.machine);
@@ -213,8 +213,7 @@ impl Player {
         Ok(player)
     }
 
-    /// A copy of the run with its record, paused, without its twin: it goes on as this run would have done without what is done to it
-    /// from now on.
+    /// A paused copy of the run and its record, without the twin, unaffected by later changes to this run.
     fn copy(&self) -> Self {
         let run = |run: &LiveScene| LiveScene::of(&run.snapshot());
         let scene = self.simulation.running();
@@ -265,27 +264,27 @@ impl Player {
         }
     }
 
-    /// Whether the run is copied before a change of a parameter, for [`Self::take_before`].
+    /// Sets whether the run is copied before each parameter change, for [`Self::take_before`].
     pub(crate) fn keep_before(&mut self, on: bool) {
         self.keeps_before = on;
     }
 
-    /// The next change of a parameter is another one, even if it is the same parameter's.
+    /// Ends the current gesture: the next change counts as a new one, even for the same parameter.
     pub(crate) fn end_gesture(&mut self) {
         self.gesture = None;
     }
 
-    /// The run as it was before the latest change since this was last asked, if it was copied, and the key of the parameter.
+    /// Takes the copy made before the latest parameter change, with the key; `None` if none was made since the last call.
     pub(crate) fn take_before(&mut self) -> Option<(Box<Self>, String)> {
         self.before.take()
     }
 
-    /// Whether all of the record was made with the parameters in force now, and nobody pulled.
+    /// Whether the whole record used the current parameters and no pull acted.
     pub(crate) fn is_as_started(&self) -> bool {
         self.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_waiting()
     }
 
-    /// Shows `time`, s, as far as the run can be taken there while `may_step`; whether it got there, or as far as it goes.
+    /// Displays `time`, s, stepping while `may_step`. Returns true once it is reached or the run cannot continue.
     pub(crate) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
         if time <= self.reached {
             if time != self.pacer.shown() {
@@ -297,17 +296,17 @@ impl Player {
         }
     }
 
-    /// By what names channels are picked.
+    /// Name patterns of the picked channels.
     pub(crate) fn picks(&self) -> &[String] {
         &self.picks
     }
 
-    /// The run as it is, if it is to be kept before a change of `key`.
+    /// Copies the run before a change of `key`, if requested and not within the same gesture.
     fn before_change(&self, key: &str) -> Option<Box<Self>> {
         (self.keeps_before && self.gesture.as_deref() != Some(key)).then(|| Box::new(self.copy()))
     }
 
-    /// `key` was changed in the run that was `before`; nothing if it has the same value.
+    /// Stores `before`, the copy made before `key` changed, unless the value is the same.
     fn changed_from(&mut self, before: Option<Box<Self>>, key: &str) {
         let changed = |before: &Self| before.pending().changes != self.pending().changes;
         if let Some(before) = before.filter(|before| changed(before)) {
@@ -330,7 +329,7 @@ impl Player {
         self.simulation.running()
     }
 
-    /// What is displayed.
+    /// The displayed frame.
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
@@ -345,17 +344,17 @@ impl Player {
         &self.channels
     }
 
-    /// Channels of the record that hold the clearances of the ball joints in force at the time.
+    /// Record channels that hold the clearances of the ball joints over time.
     pub fn clearances(&self) -> std::ops::Range<usize> {
         self.channels.len()..self.history.channels() - self.channels.picked().len()
     }
 
-    /// Channels of the record that hold the picked ones.
+    /// Record channels that hold the picked channels.
     pub fn picked(&self) -> std::ops::Range<usize> {
         self.clearances().end..self.history.channels()
     }
 
-    /// Records the channels that match `patterns`, too, from now on; those of an earlier call that do not, no more.
+    /// Also records the channels that match `patterns`, from now on. Earlier picks that do not match are dropped.
     pub fn pick(&mut self, patterns: &[String]) {
         if self.picks == patterns {
             return;
@@ -377,7 +376,7 @@ impl Player {
         }
         self.keyframes.rearrange(channels, &from);
         self.channels.ask(&mut self.recorded);
-        // They begin with the instant on show.
+        // New channels start at the displayed instant.
         let mut frame = std::mem::take(&mut self.recorded);
         let time = self.recorded_to;
         self.run_at(time).sample(time, &mut frame);
@@ -396,14 +395,14 @@ impl Player {
         &self.paths
     }
 
-    /// What was done to the run from its start to the displayed instant.
+    /// Events from the start of the run to the displayed instant.
     pub fn log(&self) -> Log {
         let mut log = self.log.clone();
         log.entries.truncate(self.applied);
         log
     }
 
-    /// What the chaos bench keeps of the run.
+    /// Orbit and sections of the run for the chaos bench.
     pub fn watch(&self) -> &RunWatch {
         &self.watch
     }
@@ -454,14 +453,14 @@ impl Player {
         self.twin = on.then(|| Box::new(Twin::new(&self.simulation)));
     }
 
-    /// The twin begins anew from the present state.
+    /// Restarts the twin from the present state.
     fn restart_twin(&mut self) {
         if let Some(twin) = &mut self.twin {
             twin.restart(&self.simulation);
         }
     }
 
-    /// From now on steps end at the instants of `schedule`.
+    /// Makes steps end at the instants of `schedule` from now on.
     pub(crate) fn end_steps_at(&mut self, schedule: Schedule) {
         let event = Event::Sections {
             first: Number(schedule.first),
@@ -473,14 +472,14 @@ impl Player {
         self.note(event);
     }
 
-    /// Logs what was just done.
+    /// Logs an event at the present step.
     fn note(&mut self, event: Event) {
         self.log.push(self.steps(), event);
         self.event_times.push(self.simulation.time());
         self.applied = self.log.entries.len();
     }
 
-    /// Instants of the schedule that are still to come.
+    /// Number of scheduled instants still ahead.
     pub(crate) fn sections_to_come(&self) -> usize {
         let now = self.simulation.time();
         self.sections.map_or(0, |schedule| schedule.sections - schedule.passed(now))
@@ -491,17 +490,17 @@ impl Player {
         self.simulation.statistics().steps
     }
 
-    /// Length of the past that plots show by default, s: a few seconds of viewing.
+    /// Default time window of the plots, s: a few seconds of viewing.
     pub fn automatic_window(&self) -> f64 {
         VIEWING * self.pacer.scale()
     }
 
-    /// Whether time passes.
+    /// Whether the run is playing, in either direction.
     pub fn is_playing(&self) -> bool {
         self.playing
     }
 
-    /// Plays or pauses. A stopped run does not continue before it is reset or taken back.
+    /// Plays or pauses. A stopped run resumes only after a reset or after going back in time.
     pub fn set_playing(&mut self, playing: bool) {
         self.set_paused();
         self.playing = playing && self.stopped.is_none();
@@ -520,7 +519,7 @@ impl Player {
         self.pacer.jump(self.pacer.shown());
     }
 
-    /// Whether time passes backwards.
+    /// Whether the run is playing backwards.
     pub fn is_playing_backwards(&self) -> bool {
         self.playing && self.backwards
     }
@@ -535,7 +534,7 @@ impl Player {
         self.settling.has_settled()
     }
 
-    /// Advances by one frame, `dt` seconds after the last, and refreshes what is displayed.
+    /// Advances by one frame, `dt` seconds after the last, and updates the display.
     pub fn advance(&mut self, dt: f64) {
         if let Some(sought) = self.sought {
             self.seek(sought);
@@ -553,8 +552,8 @@ impl Player {
         self.hand_out_peaks();
     }
 
-    /// Goes on for a spell between two frames, `since` seconds after the first of them began. Returns whether the run is still behind;
-    /// `None` while there is nothing to do before the next frame.
+    /// Steps for a while between two frames, `since` seconds after the first began. Returns whether the run is still behind;
+    /// `None` if nothing remains to do before the next frame.
     pub fn step_between(&mut self, since: f64) -> Option<bool> {
         if !self.playing || self.backwards || self.sought.is_some() {
             return None;
@@ -569,7 +568,7 @@ impl Player {
         another.then_some(behind)
     }
 
-    /// Steps until `target`, s, while the pacer allows it; how long that took, s.
+    /// Steps to `target`, s, while the pacer allows it. Returns the time spent, s.
     fn pursue(&mut self, target: f64, may_step: fn(&Pacer, f64) -> bool) -> f64 {
         if self.simulation.time() >= target {
             return 0.0;
@@ -591,40 +590,40 @@ impl Player {
         self.stepping = self.stepping * keep + stepping;
     }
 
-    /// Recent simulated seconds per second of stepping, recording included; `None` until enough was stepped.
+    /// Recent simulated seconds per second of stepping, recording included; `None` until enough steps were measured.
     pub fn capacity(&self) -> Option<f64> {
         (self.stepping > LEAST_MEASURED).then(|| self.stepped / self.stepping)
     }
 
-    /// What keeps the run below the asked time scale; `None` while it keeps up.
+    /// What holds the run below the requested time scale; `None` while it keeps up.
     pub fn limit(&self) -> Option<Limit> {
         self.pacer.limit(self.capacity())
     }
 
-    /// What the latest frame took beyond stepping, s, if it was `dt` s long.
+    /// Part of the latest frame of `dt` s not spent stepping, s.
     pub fn drawing(&self, dt: f64) -> f64 {
         if self.playing && !self.backwards { self.pacer.drawing() } else { dt }
     }
 
-    /// One accepted step, shown at once.
+    /// Takes one accepted step and displays its end.
     pub fn single_step(&mut self) {
         self.set_playing(false);
         if self.stopped.is_some() {
             return;
         }
         self.go_on();
-        // Record to the start of the step, not to the displayed instant within the one before.
+        // Record to the start of the new step, not only to the displayed instant within the previous one.
         self.record_until(self.simulation.time());
         self.step();
         self.show_latest();
     }
 
-    /// Pauses and runs on until `time`, s, however long that takes: the start of a headless frame.
+    /// Pauses and steps to `time`, s, without a time budget: the start of a headless frame.
     pub fn run_to(&mut self, time: f64) {
         self.run_towards(time, || true);
     }
 
-    /// The same while `may_step`; whether it went so far, or as far as the run goes.
+    /// The same while `may_step`. Returns true once `time` is reached or the run cannot continue.
     pub fn run_towards(&mut self, time: f64, mut may_step: impl FnMut() -> bool) -> bool {
         self.set_playing(false);
         self.go_on();
@@ -639,7 +638,7 @@ impl Player {
         goes
     }
 
-    /// Displays `time`, s, limited to what is left of the latest step: this never goes back.
+    /// Displays `time`, s, clamped to the rest of the latest step: this never goes back.
     pub(crate) fn show(&mut self, time: f64) {
         let shown = time.max(self.recorded_to).min(self.simulation.time());
         self.pacer.jump(shown);
@@ -649,7 +648,7 @@ impl Player {
     /// Back to t = 0 with every change applied.
     ///
     /// # Errors
-    /// As [`Simulation::reset`]; nothing has changed then.
+    /// As [`Simulation::reset`]; the run is left unchanged.
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation.reset()?;
         self.stopped = None;
@@ -676,7 +675,7 @@ impl Player {
     /// Changes a parameter to a value as a user writes it.
     ///
     /// # Errors
-    /// As [`Simulation::set`]; nothing has changed then.
+    /// As [`Simulation::set`]; the run is left unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
         let run_before = self.before_change(key);
         if self.has_future() {
@@ -693,7 +692,7 @@ impl Player {
         Ok(effect)
     }
 
-    /// Notes what differs from the changes `before`.
+    /// Records the edits relative to the changes `before`.
     fn note_edits(&mut self, before: &[(String, String)]) {
         let after = &self.simulation.pending().changes;
         for (key, _) in before.iter().chain(after) {
@@ -713,7 +712,7 @@ impl Player {
         std::mem::take(&mut self.edits)
     }
 
-    /// Gives `key` the value `text` again, or without one that of the scene's file.
+    /// Restores `key` to the value `text`, or to the scene file's value if `None`.
     ///
     /// # Errors
     /// As [`Self::set`].
@@ -727,7 +726,7 @@ impl Player {
         }
     }
 
-    /// Makes a change of the run at its latest state. The rest of the latest step is still shown as it was.
+    /// Applies a change at the latest state. The rest of the latest step is still displayed as computed.
     fn apply(&mut self, event: &Event) -> Result<Effect, SetError> {
         let Self { simulation: run, unchanged, original, pacer, .. } = self;
         let effect = if pacer.shown() >= run.time() || run.step_start() >= run.time() {
@@ -749,10 +748,10 @@ impl Player {
         SOLVER_KEYS.into_iter().filter(given).collect()
     }
 
-    /// Resets a parameter to its value in the scene's file.
+    /// Resets a parameter to its value in the scene file.
     ///
     /// # Errors
-    /// As [`Simulation::set_value`]; nothing has changed then.
+    /// As [`Simulation::set_value`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.original.get(key)?;
         let run_before = self.before_change(key);
@@ -769,14 +768,14 @@ impl Player {
     /// Starts, changes or ends a pull on a body.
     ///
     /// # Errors
-    /// As [`Simulation::pull`]; the run is as it was then.
+    /// As [`Simulation::pull`]; the run is left unchanged.
     pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SetError> {
         if self.simulation.pulled() == pull {
             return Ok(());
         }
         pull.map_or(Ok(()), |pull| self.simulation.check_pull(&pull))?;
         self.branch();
-        // Of several moves between two steps only the last one counts.
+        // Only the last of several moves between two steps counts.
         let steps = self.steps();
         let moved = |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
         if pull.is_some() && self.log.entries.last().is_some_and(moved) {
@@ -793,7 +792,7 @@ impl Player {
         self.warnings = Known::of(self.pending());
         self.watch.begin(self.simulation.running(), self.simulation.time());
         self.settling = Settling::new(self.simulation.running());
-        // Where the run is taken again, it has begun only later.
+        // While the run is retraced, the twin may begin later than now.
         let now = self.simulation.time();
         if self.twin.as_ref().is_some_and(|twin| twin.begins() <= now) {
             self.restart_twin();
@@ -811,22 +810,22 @@ impl Player {
         self.pending().changes.iter().any(|(key, _)| self.is_waiting(key))
     }
 
-    /// What is allowed but may not do what the user expects, in sentences.
+    /// Warnings, as sentences, about settings that are valid but may surprise the user.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
         self.warnings.iter().map(|known| &*known.sentence)
     }
 
-    /// What to know about the present value of `key`, if anything.
+    /// Warning about the present value of `key`, if any.
     pub fn warning(&self, key: &str) -> Option<&str> {
         self.warnings.iter().find(|known| known.is_about(key)).map(|known| &*known.sentence)
     }
 
-    /// Value that the scene's file gives `key`.
+    /// Value of `key` in the scene file.
     pub fn original(&self, key: &str) -> Option<Value> {
         self.original.get(key).ok()
     }
 
-    /// One step, after recording the rest of the one before; false if the guard stopped it.
+    /// Records the rest of the previous step and takes one step; false if the divergence guard stopped it.
     pub(crate) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.keep();
@@ -851,7 +850,7 @@ impl Player {
                 self.playing = false;
                 self.stopped = Some(stopped);
                 match self.log.entries.get(self.applied) {
-                    // As it was the first time.
+                    // Retraced: the stop is already in the log.
                     Some(entry) if entry.event == Event::Stop => self.applied += 1,
                     _ => self.note(Event::Stop),
                 }
@@ -882,7 +881,7 @@ impl Player {
             for part in 1..=parts as u32 {
                 let end =
                     if f64::from(part) == parts { until } else { start + (until - start) * f64::from(part) / parts };
-                // A peak between two instants adds one more.
+                // A peak between two instants adds another instant.
                 let close = end - 1e-3 * (end - start) / parts;
                 while let Some(peak) = self.next_peak().filter(|peak| *peak < close) {
                     self.record(peak);
@@ -932,7 +931,7 @@ impl Player {
         self.recorded = frame;
     }
 
-    /// Reads what is recorded of `frame`.
+    /// Reads the recorded channels of `frame`.
     fn read(&mut self, frame: &Frame) {
         self.channels.read(frame, &mut self.values);
         let joints = frame.joints.iter().take(self.clearances().len());
@@ -940,7 +939,7 @@ impl Player {
         self.channels.read_picked(frame, &mut self.values);
     }
 
-    /// Adds what was read at `time`, s, to the record.
+    /// Appends the values read at `time`, s, to the record.
     fn push(&mut self, time: f64) {
         self.history.push(time, &self.values);
         if let Some(near) = &mut self.near {
@@ -948,7 +947,7 @@ impl Player {
         }
     }
 
-    /// Adds the peaks up to `time`, s, to the record and to those of the frame.
+    /// Adds the peaks up to `time`, s, to the record and to the frame's peaks.
     fn pass_peaks(&mut self, time: f64) {
         self.passed.resize(self.coming.len(), Peak::default());
         let all = time >= self.simulation.time();
@@ -957,7 +956,7 @@ impl Player {
         }
         for joint in 0..self.coming.len() {
             let peak = self.coming[joint];
-            // A contact that began without a force yet began with the end of the step.
+            // A contact that carries no force yet began at the end of the step.
             if !all && (peak.normal <= 0.0 || peak.time > time) {
                 continue;
             }
@@ -1002,7 +1001,7 @@ impl Player {
         self.watch.show(shown);
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
-        // The hand is shown where it is now, though the run feels it only from its next step on.
+        // The hand is shown at its current position, although it acts only from the next step on.
         frame.pull = self.simulation.pull_in(&frame);
         if !self.playing && self.unchanged.is_some() {
             self.show_changed_clearances(&mut frame);
@@ -1010,8 +1009,7 @@ impl Player {
         self.frame = frame;
     }
 
-    /// Who changes the clearance of a ball in flight while the run is paused sees it at once, though the run has it only from its next
-    /// step on.
+    /// Shows balls in flight with a clearance changed during a pause, although the run uses it only from its next step on.
     fn show_changed_clearances(&mut self, frame: &mut Frame) {
         let mut next = Frame::default();
         let time = self.simulation.time();
@@ -1047,7 +1045,7 @@ impl Player {
     }
 }
 
-/// An empty record of `channels`, of the clearances, and of the picked channels.
+/// An empty record of `channels`, the clearances and the picked channels.
 fn record_of(scene: &Scene, channels: &Channels) -> History {
     let joints = scene.machine.ball_joints.len().min(RECORDED_JOINTS);
     let picked = channels.picked().len();

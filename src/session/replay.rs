@@ -1,4 +1,4 @@
-//! Brings a run to the instant of a link, within a time budget per frame, and checks that the state is the same.
+//! Replays a run to the instant of a link, within a time budget per frame, and verifies the state.
 
 use super::link::Link;
 use super::log::{Entry, Event};
@@ -20,7 +20,7 @@ pub enum Verdict {
     },
     /// The instant is reached; the link has no hash to compare with.
     Reached,
-    /// It could not be reached, and why.
+    /// The instant could not be reached, and why.
     Failed(String),
 }
 
@@ -151,7 +151,7 @@ mod tests {
         Player::new(&Scene::load(scene, &[]).expect("built in")).expect("starts")
     }
 
-    /// A link to where `player` is, through its text.
+    /// A link to the state of `player`, encoded and parsed again.
     fn link_to(player: &Player) -> Link {
         let link = Link {
             scene: SceneText::of(player.running()),
@@ -164,7 +164,7 @@ mod tests {
         Link::parse(&link.format()).expect("a link")
     }
 
-    /// Follows `link` in pieces of `piece` steps.
+    /// Replays `link` in chunks of `piece` steps.
     fn follow(link: Link, piece: u32) -> (Player, Verdict, u32) {
         let mut player = Player::new(&link.load().expect("loads")).expect("starts");
         let mut replay = Replay::new(link).expect("an instant");
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(verdict, Verdict::Agrees(original.simulation().state_hash()));
         assert_eq!(copy.stopped(), original.stopped());
 
-        // Taken back, the refused step leaves no trace.
+        // After stepping back, the refused step leaves no trace.
         let mut original = player("spcmm");
         original.set("solver.method", "rk4").expect("a method");
         original.set("solver.step", "1 ms").expect("in range");

@@ -19,11 +19,11 @@ use crate::simulate::{ContactState, Frame, JointReport};
 const PART: f64 = 1.0 / 8.0;
 /// How long a scene without drives is watched, s.
 const REST: f64 = 0.5;
-/// Largest displacement of a ball, or of a point of a body, meanwhile, in clearances.
+/// Largest displacement of a ball, or of a point of a body, over that time, in clearances.
 const STILL: f64 = 0.15;
-/// Largest relative change of a contact force meanwhile.
+/// Largest relative change of a contact force over that time.
 const LOAD: f64 = 0.25;
-/// Instants kept per stretch.
+/// Instants stored per stretch.
 const KEPT: f64 = 16.0;
 
 /// One instant to compare with.
@@ -35,20 +35,20 @@ struct Instant {
     loads: Vec<f64>,
 }
 
-/// Judges from the frames of a run whether it has settled.
+/// Detects from the frames of a run whether it has settled.
 #[derive(Clone, Debug)]
 pub struct Settling {
     /// Longest period of the drives, s.
     period: Option<f64>,
     /// Body of each socket, and clearance of each joint with play, m.
     joints: Vec<Option<(Option<usize>, f64)>>,
-    /// Instants since which nothing has changed, oldest first.
+    /// Earlier instants that equal the latest within the tolerances, oldest first.
     past: Vec<Instant>,
-    /// The latest.
+    /// The latest instant.
     here: Instant,
-    /// Since when it has been quiet.
+    /// Start of the quiet time, s.
     quiet: Option<f64>,
-    /// It was quiet before, and motion resumed.
+    /// Whether motion resumed after a quiet time.
     has_resumed: bool,
 }
 
@@ -120,7 +120,7 @@ impl Settling {
         }
     }
 
-    /// Takes the positions: in a driven scene, of the balls in the axes of their sockets; otherwise, of points of the bodies.
+    /// Samples positions: in a driven scene the balls in the axes of their sockets, otherwise points of the bodies.
     fn take(&mut self, frame: &Frame) {
         let Instant { time, points, loads } = &mut self.here;
         *time = frame.time;
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use crate::simulate::Simulation;
 
-    /// Runs `scene` to `to`, s: the times at which it became settled or ceased to be.
+    /// Runs `scene` to `to`, s. Returns the times at which it settled or resumed.
     fn turns(scene: &Scene, to: f64) -> Vec<f64> {
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut settling = Settling::new(scene);

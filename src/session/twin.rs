@@ -1,5 +1,5 @@
-//! A second run beside the first, minimally displaced, whose distance is never renormalised; and a third, which is, and so tells the
-//! largest Lyapunov exponent as a sweep does. Neither affects the run.
+//! A twin run, minimally displaced and never renormalised, and a renormalised one that yields the largest Lyapunov exponent as
+//! in a sweep. Neither affects the run.
 
 use crate::analysis::drive::common_period;
 use crate::analysis::exponent::{ALIGNMENT, Benettin, Exponent, offset, scaled_distance};
@@ -9,31 +9,31 @@ use crate::simulate::{Frame, Simulation, Snapshot};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
-/// Distances kept; at this number every second one is dropped.
+/// Most distances; at this number every second one is dropped.
 const KEPT: usize = 4096;
-/// Interval at which the growth of a machine that nothing drives is taken, s.
+/// Interval between renormalisations of an undriven machine, s.
 const UNDRIVEN: f64 = 0.1;
-/// Intervals of which growth must be known for an exponent: two in each block of its error.
+/// Fewest intervals that yield an exponent: two in each block of its error.
 const FEWEST: usize = 20;
-/// A step that ends this much of an interval before its end, by rounding, ends it.
+/// Rounding tolerance of the end of an interval, in intervals.
 const NEARLY: f64 = 1e-9;
-/// Intervals for which there is room from the start.
+/// Initial capacity, intervals.
 const ROOM: usize = 1024;
 
-/// The renormalised run beside the run, and what its separation has grown by.
+/// The renormalised twin and the growth of its separation.
 struct Growth {
     twin: Simulation,
     benettin: Benettin,
-    /// Time from one interval to the next, s, when the one under way ends, and how many have ended.
+    /// Length of an interval, s, end of the current one, s, and number of completed ones.
     interval: f64,
     next: f64,
     ended: usize,
-    /// It could not go on.
+    /// Whether a step of the twin failed.
     lost: bool,
 }
 
 impl Growth {
-    /// Of neighbours of `run` from now on.
+    /// Measures the growth from the present state of `run` on.
     fn new(run: &Simulation) -> Self {
         let machine = run.machine();
         let interval = common_period(machine).ok().flatten().unwrap_or(UNDRIVEN);
@@ -43,7 +43,7 @@ impl Growth {
         Self { twin, benettin, interval, next: run.time() + interval, ended: 0, lost: false }
     }
 
-    /// To be called after a step of `run`.
+    /// Call after each step of `run`.
     fn follow(&mut self, run: &Simulation) {
         let at_end = run.time() >= self.next - NEARLY * self.interval;
         self.lost |= self.benettin.follow(run, &mut self.twin, at_end).is_err();
@@ -57,9 +57,9 @@ impl Growth {
     }
 }
 
-/// Where a twin was, to take it back there.
+/// A saved state of a twin.
 pub struct TwinMark {
-    /// When that twin began, s: no other can be taken there.
+    /// Start of that twin, s: no other can be restored from it.
     begins: f64,
     state: Snapshot,
     steps: u64,
@@ -75,25 +75,25 @@ impl TwinMark {
 /// The twin and its distances so far.
 pub struct Twin {
     simulation: Simulation,
-    /// When it began, s, and its displaced state then. While the run is taken again from before that, the twin waits.
+    /// Start, s, and the displaced state there. While the run retraces earlier time, the twin waits.
     begins: f64,
     origin: Snapshot,
     frame: Frame,
     /// Time in s, distance in units of the scales.
     distances: Vec<[f64; 2]>,
-    /// Every `stride`-th step is kept.
+    /// Only every `stride`-th step is stored.
     stride: u64,
     steps: u64,
-    /// Time that the run has reached, s, and its state there: the twin catches up when that is displayed.
+    /// Time that the run has reached, s, and its state there: the twin catches up when it is displayed.
     goal: f64,
     goal_state: Vec<f64>,
-    /// `None` until the run comes to where the twin began.
+    /// `None` until the run reaches the start of the twin.
     growth: Option<Growth>,
     ended: Option<String>,
 }
 
 impl Twin {
-    /// Displaces a copy of `run` as it is now.
+    /// A displaced copy of `run` in its present state.
     pub fn new(run: &Simulation) -> Self {
         let mut simulation = Simulation::of(&run.snapshot());
         let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
@@ -116,7 +116,7 @@ impl Twin {
         twin
     }
 
-    /// Begins anew from the present state of `run`. What a twin that began at the same instant knew of its distances stays.
+    /// Restarts from the present state of `run`. Keeps the known distances if the start is the same.
     pub fn restart(&mut self, run: &Simulation) {
         let before = std::mem::replace(self, Self::new(run));
         if before.begins == self.begins {
@@ -124,18 +124,18 @@ impl Twin {
         }
     }
 
-    /// When it began, s.
+    /// Start, s.
     pub fn begins(&self) -> f64 {
         self.begins
     }
 
-    /// Where it is now.
+    /// Saves the present state.
     pub fn mark(&self) -> TwinMark {
         TwinMark { begins: self.begins, state: self.simulation.snapshot(), steps: self.steps }
     }
 
-    /// Goes back with `run`, which has just been taken to where it was when `mark` was set. Without a mark of this twin it
-    /// waits for its beginning, or begins anew where that has passed.
+    /// Goes back with `run`, which was just restored to the instant of `mark`. Without a mark of this twin it waits for its
+    /// start, or restarts if that has passed.
     pub fn go_back(&mut self, mark: Option<&TwinMark>, run: &Simulation) {
         let mark = mark.filter(|mark| mark.begins == self.begins);
         if mark.is_none() && self.begins < run.time() {
@@ -149,18 +149,18 @@ impl Twin {
         self.growth = None;
     }
 
-    /// Forgets the distances after `time`, s: another future begins.
+    /// Drops the distances after `time`, s, for a new branch.
     pub fn cut(&mut self, time: f64) {
         let time = time.max(self.begins);
         self.distances.retain(|[at, _]| *at <= time);
     }
 
-    /// Whether [`Self::place`] can show it at `time`, s, without being taken back.
+    /// Whether [`Self::place`] can sample `time`, s, without going back.
     pub fn reaches(&self, time: f64) -> bool {
         time <= self.begins || self.simulation.step_start() < time
     }
 
-    /// To be called after a step of `run`: the twin advances to where the run was before that step.
+    /// Call after each step of `run`: the twin advances to the start of that step.
     pub fn follow(&mut self, run: &Simulation) {
         if run.time() <= self.begins {
             return;
@@ -190,7 +190,7 @@ impl Twin {
         }
     }
 
-    /// Records its distance from the run, where that is not known from before.
+    /// Records the distance from the run, unless it is already known.
     fn measure(&mut self) {
         if self.distances.last().is_some_and(|[at, _]| *at >= self.goal) {
             return;
@@ -205,13 +205,13 @@ impl Twin {
             });
             self.stride *= 2;
         }
-        // Motions identical to the last bit have no logarithm of their distance.
+        // Identical states have no logarithm of their distance.
         if distance > 0.0 && distance.is_finite() {
             self.distances.push([self.goal, distance]);
         }
     }
 
-    /// Samples the state at `time`, s, into [`Self::frame`], limited to the twin's start and to where it ended.
+    /// Samples the state at `time`, s, into [`Self::frame`], clamped to the twin's start and end.
     pub fn place(&mut self, time: f64) {
         self.come_to(time);
         self.simulation.sample(time, &mut self.frame);
@@ -232,11 +232,10 @@ impl Twin {
         self.ended.as_deref()
     }
 
-    /// Largest Lyapunov exponent of the run since this twin began, or since the run was last taken back, once enough of it is known;
-    /// before, how many more intervals that takes, and their length, s.
+    /// Largest Lyapunov exponent of the run since this twin began, or since the run last went back.
     ///
     /// # Errors
-    /// Not yet.
+    /// Too few intervals so far: how many more are needed, and their length, s.
     pub fn exponent(&self) -> Result<Exponent, (usize, f64)> {
         let growth = self.growth.as_ref().filter(|growth| !growth.lost);
         let Some(growth) = growth else {

@@ -4,7 +4,7 @@ use crate::scene::{Kind, Scene, Value};
 use crate::simulate::ContactState;
 use crate::units::{format_quantity, format_quantity_digits};
 
-/// What a contact does.
+/// Description of a contact state.
 pub fn contact(state: ContactState) -> &'static str {
     match state {
         ContactState::Free => "The ball touches nothing",
@@ -14,7 +14,7 @@ pub fn contact(state: ContactState) -> &'static str {
     }
 }
 
-/// Units in `text` as they are printed, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.
+/// `text` with typeset units, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.
 pub fn typeset(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut word = String::new();
@@ -98,14 +98,13 @@ pub fn solver(scene: &Scene) -> String {
     }
 }
 
-/// What was changed in a scene, one phrase each.
+/// Changes of a scene, one phrase each.
 pub fn changes(scene: &Scene) -> Vec<String> {
     let changed = scene.changes.iter().filter_map(|(key, _)| named(scene, key));
     changed.map(|(name, value)| format!("{name} {value}")).collect()
 }
 
-/// What would change with `there` in place of `here`, one phrase each, except for the keys `except`; empty if the motion is the
-/// same.
+/// Differences of `there` from `here`, one phrase each, without the keys `except`; empty if the motion is the same.
 pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {
     if there.source.text != here.source.text || there.source.beside != here.source.beside {
         let (new, old) = (&there.name, &here.name);
@@ -138,7 +137,7 @@ pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String
     all
 }
 
-/// What a user typed, with the display unit added to a bare number.
+/// Text typed by the user, with the display unit added to a bare number.
 pub fn completed(typed: &str, kind: &Kind) -> String {
     let typed = typed.trim();
     match kind {
@@ -160,10 +159,10 @@ pub fn digits_within(span: f64, most: f64) -> usize {
     if more.is_finite() { 4 + (more.max(0.0) as usize).min(11) } else { 4 }
 }
 
-/// Decimals of the values that a slider over `span` steps to: a hundred to a thousand of them.
+/// Decimals of the values of a slider over `span`: a hundred to a thousand steps.
 pub fn decimals(span: f64) -> usize {
     let decimals = 2.0 - libm::log10(span);
-    // Of a power of ten a hundred, whatever the last bit of its logarithm.
+    // A power of ten has a hundred steps, regardless of rounding in its logarithm.
     if decimals.is_finite() { (decimals - 1e-9).ceil().clamp(0.0, 15.0) as usize } else { 15 }
 }
 
@@ -181,7 +180,7 @@ pub fn percent(share: f64) -> String {
 /// Most characters of [`time`] up to 10^9 s: the width reserved for a clock.
 pub const LONGEST_TIME: usize = 11;
 
-/// A time with the unit that suits its size; a long one has fewer decimals, so that it takes no more room.
+/// A time in a suitable unit; a long one has fewer decimals, so that the width stays bounded.
 pub fn time(seconds: f64) -> String {
     let size = seconds.abs();
     for (unit, name, decimals) in [(1e-6, "µs", 3), (1e-3, "ms", 4)] {
@@ -196,7 +195,7 @@ pub fn time(seconds: f64) -> String {
     format!("{seconds:.decimals$} s")
 }
 
-/// A time scale as people say it: `1:50`.
+/// A time scale as a ratio: `1:50`.
 pub fn time_scale(scale: f64) -> String {
     if scale <= 0.0 || !scale.is_finite() {
         return "1:∞".to_owned();

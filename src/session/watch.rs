@@ -1,5 +1,4 @@
-//! What the chaos bench keeps of the running scene: the orbit of the last periods, and its Poincaré section at the drive
-//! phase.
+//! Data of the running scene for the chaos bench: the orbit of the last periods, and its Poincaré section at the drive phase.
 
 use std::collections::VecDeque;
 
@@ -7,11 +6,11 @@ use crate::analysis::drive::{OBSERVABLES, drive_period, observed};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation};
 
-/// Most instants kept per drive period.
+/// Most instants stored per drive period.
 const PER_PERIOD: f64 = 1000.0;
-/// Periods whose orbit is kept.
+/// Length of the stored orbit, periods.
 pub const PERIODS: usize = 6;
-/// Most sections kept; the oldest are dropped.
+/// Most sections stored; the oldest are dropped.
 const SECTIONS: usize = 20_000;
 /// Used in place of the period if there is none, s.
 const NO_PERIOD: f64 = 1.0;
@@ -26,7 +25,7 @@ pub struct RunWatch {
     phase: f64,
     /// Number of the next section, which is at (next + phase) T.
     next: u64,
-    /// The displayed instant, s: later ones that are already known stay hidden until their time.
+    /// The displayed instant, s: later samples stay hidden until their time.
     shown: f64,
     orbit: VecDeque<(f64, Observed)>,
     sections: VecDeque<(f64, Observed)>,
@@ -83,7 +82,7 @@ impl RunWatch {
         self.shown = shown;
     }
 
-    /// Starts again after a change at `now`, s: what was recorded belongs to another motion.
+    /// Restarts after a change at `now`, s: earlier data belong to another motion.
     pub fn begin(&mut self, scene: &Scene, now: f64) {
         self.period = drive_period(scene).map_err(|why| why.to_string());
         self.orbit.clear();
@@ -91,7 +90,7 @@ impl RunWatch {
         self.seek(now);
     }
 
-    /// Drops what follows `now`, s: another future begins.
+    /// Drops data after `now`, s, for a new branch.
     pub fn cut(&mut self, now: f64) {
         for list in [&mut self.orbit, &mut self.sections] {
             list.truncate(known(list, now));
@@ -99,7 +98,7 @@ impl RunWatch {
         self.seek(now);
     }
 
-    /// The run continues from `now`, s, where it was before. What is known stays, except an orbit that would have a gap.
+    /// The run continues from `now`, s, after going back. Known data stay, except an orbit that would have a gap.
     pub fn go_to(&mut self, now: f64) {
         let ends = self.orbit.front().zip(self.orbit.back());
         if ends.is_some_and(|((first, _), (last, _))| !(*first..=*last).contains(&now)) {
@@ -121,11 +120,11 @@ impl RunWatch {
         Some((self.next as f64 + self.phase) * period)
     }
 
-    /// Keeps a recorded instant, unless it is too close to the one before.
+    /// Records an instant, unless it is too close to the one before.
     pub fn record(&mut self, frame: &Frame) {
         let period = self.period.as_ref().copied().unwrap_or(NO_PERIOD);
         let before = self.orbit.back().map(|(time, _)| *time);
-        // Including one recorded before the run was taken back.
+        // This also skips instants recorded before the run went back.
         if before.is_some_and(|before| frame.time - before < period / PER_PERIOD) {
             return;
         }
@@ -136,7 +135,7 @@ impl RunWatch {
         self.orbit.push_back((frame.time, observed(&frame.pose)));
     }
 
-    /// The latest step is displayed up to `until`, s: sections within it are interpolated. Sampling never changes a run.
+    /// Adds the sections of the latest step up to `until`, s, by interpolation. Sampling never changes a run.
     pub fn step(&mut self, simulation: &mut Simulation, until: f64) {
         while let Some(time) = self.next_time().filter(|time| *time <= until) {
             self.next += 1;
@@ -152,7 +151,7 @@ impl RunWatch {
     }
 }
 
-/// How many of `list` lie no later than `now`, s.
+/// Number of entries of `list` up to `now`, s.
 fn known(list: &VecDeque<(f64, Observed)>, now: f64) -> usize {
     list.partition_point(|(time, _)| *time <= now)
 }
@@ -179,7 +178,7 @@ mod tests {
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut watch = RunWatch::new(&scene);
         assert_eq!(watch.period(), Ok(0.2));
-        // Not the start itself.
+        // The start itself is not a section.
         run(&mut watch, &mut simulation, 0.21);
         assert_eq!(watch.sections().len(), 1);
         simulation = Simulation::new(&scene.machine).expect("starts");
@@ -191,7 +190,7 @@ mod tests {
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45, 0.65]));
         watch.show(0.5);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
-        // Retraced, they are what they were; with another future they are cut.
+        // Retraced sections are unchanged; a new branch cuts them.
         watch.show(0.7);
         assert_eq!(watch.sections().len(), 4);
         watch.cut(0.5);

@@ -31,14 +31,14 @@ const OUTLINE: f32 = 1.8;
 pub(super) struct Arrow {
     pub tail: Vec3,
     pub along: Vec3,
-    /// Of the shaft, m.
+    /// Radius of the shaft, m.
     pub radius: f32,
-    /// Longer than drawn.
+    /// Whether it is too long to be drawn in full.
     pub broken: bool,
 }
 
 impl Arrow {
-    /// With a radius of at most `radius`.
+    /// An arrow with a shaft radius of at most `radius`.
     pub fn new(tail: Vec3, along: Vec3, radius: f32) -> Self {
         Self { tail, along, radius: radius.min(along.length() / STOUTEST), broken: false }
     }
@@ -101,14 +101,14 @@ impl Ruler {
         }
     }
 
-    /// Length, m, of a line from `tail` along the unit vector `along` that would be `pixels` long on the screen if it lay
-    /// across the line of sight (whether parallel to the picture or perpendicular to the ray from the eye), and is never
-    /// longer; and the size of a pixel there, m. `None` behind the eye.
+    /// Length, m, of a line from `tail` along the unit vector `along` that is `pixels` long on the screen if it lies across the
+    /// line of sight (parallel to the picture or perpendicular to the ray from the eye), and never longer; and the size of a
+    /// pixel there, m. `None` behind the eye.
     ///
-    /// In slopes (x, y) of the picture and depth z, the end of a line of length s lies at (p + s q) / (z + s w), with q and
-    /// w the components of `along` in the picture and away from the eye. Its start is p / z, so its length in slopes is
-    /// s |q - p w / z| / (z + s w), solved for s. |q - p w / z| is 1 in the picture plane, 0 along the ray, and more
-    /// than 1 where a wide picture stretches what is perpendicular to the ray.
+    /// In slopes (x, y) of the picture and depth z, the end of a line of length s lies at (p + s q) / (z + s w), with q and w
+    /// the components of `along` in the picture and away from the eye. Its start is p / z. This gives a length in slopes of s
+    /// |q - p w / z| / (z + s w), solved for s. |q - p w / z| is 1 in the picture plane, 0 along the ray, and more than 1 where
+    /// a wide picture stretches lengths across the ray.
     fn measure(&self, tail: Vec3, along: Vec3, pixels: f32) -> Option<(f32, f32)> {
         let (right, up, back) = self.axes;
         let from_eye = tail - self.eye;

@@ -1,4 +1,4 @@
-//! What bushings, stops and motors look like: simple bodies at their points and joints.
+//! Symbols of bushings, stops and motors: simple solids at their points and joints.
 
 use std::f32::consts::TAU;
 
@@ -12,34 +12,34 @@ use crate::machine::{self, Attachment, Bushing, Freedom, Joint, JointCoordinate,
 use crate::scene::Scene;
 use crate::simulate::{ElementReport, Frame};
 
-/// Half the length and radius of a bushing's sleeve, and the same of the pin in it, in radii of the scene.
+/// Half length and radius of a bushing's sleeve, and of the pin in it, in radii of the scene.
 const SLEEVE: [f32; 2] = [0.03, 0.055];
 const PIN: [f32; 2] = [0.06, 0.02];
 /// Thickness and radius of the disc at the end of a slide.
 const BUFFER: [f32; 2] = [0.016, 0.055];
-/// Where the bar at the end of a turn begins and ends, from the joint, and its radius.
+/// Start and end, from the joint, and radius of the bar at the limit of a hinge.
 const PEG: [f32; 3] = [0.05, 0.16, 0.013];
-/// Where a motor's case begins and ends along the axis of a turn, on both sides of what turns, or behind a slide; and its radius.
+/// Start and end of a motor's case along the axis of a hinge, on both sides of it, or behind a slide; and its radius.
 const ABOUT: [f32; 2] = [-0.09, 0.09];
 const BEHIND: [f32; 2] = [-0.36, -0.24];
 const CASE: f32 = 0.035;
 /// Radius of the arc about a motor's axis, and the length of a straight arrow beside it.
 const ARC: f32 = 0.075;
 const ARROW: f32 = 0.12;
-/// Pieces of an arc, its extent in turns, and the length of the strokes at its tip in its radii.
+/// Segments of an arc, its extent in turns, and the length of the strokes at its tip in radii of the arc.
 const SEGMENTS: u16 = 36;
 const TURNS: f32 = 0.75;
 const TIP: f32 = 0.45;
 
-/// How something is drawn.
+/// Drawing style.
 pub(super) struct Style {
     /// Radius of the scene, m.
     pub radius: f32,
     /// Width of lines, pixels.
     pub width: f32,
-    /// What it is made of.
+    /// Material.
     pub material: Material,
-    /// What holds another: the sleeve of a bushing, the case of a motor.
+    /// Material of an enclosing part: the sleeve of a bushing, the case of a motor.
     pub outer: Material,
     /// Colour of lines.
     pub colour: Colour,
@@ -53,7 +53,7 @@ fn rotation(quat: &machine::Quat) -> Mat3 {
     Mat3::from_quat(Quat::from_xyzw(quat.i as f32, quat.j as f32, quat.k as f32, quat.w as f32))
 }
 
-/// A sleeve at the point of one body and a pin at that of the other, along the axis of the bushing that is turned about most softly.
+/// A sleeve at the point of one body and a pin at that of the other, along the bushing axis of lowest rotational stiffness.
 pub(super) fn push_bushing(
     bushing: &Bushing,
     from: &Attachment,
@@ -64,7 +64,7 @@ pub(super) fn push_bushing(
 ) {
     let axes = Pose::in_frame(frame, from.body).rotation * rotation(&bushing.axes);
     let turning = &bushing.turning_stiffness;
-    // Of equal ones the last: the axis of a turned part is z.
+    // Ties go to the last axis: the axis of a turned part is z.
     let softest = (0..3).rev().min_by(|&a, &b| turning[a].total_cmp(&turning[b])).unwrap_or(2);
     let along = axes.col(softest) * style.radius;
     let [outer, inner] = report.points.map(|point| to_f32(&point));
@@ -81,7 +81,7 @@ struct Axis<'a> {
     joint: &'a Joint,
     freedom: Freedom,
     parent: Pose,
-    /// Where it begins, m, and its unit vector.
+    /// Origin, m, and unit vector.
     origin: Vec3,
     along: Vec3,
 }
@@ -99,7 +99,8 @@ impl<'a> Axis<'a> {
         Some(Self { joint, freedom, parent, origin: to_f32(&report.points[0]), along })
     }
 
-    /// Where the middle of the child points where its angle is `angle`, unit vector; `None` if that lies on the axis.
+    /// Unit vector across the axis towards the child's centre at joint angle `angle`, rad; `None` if the centre lies on the
+    /// axis.
     fn direction(&self, scene: &Scene, angle: f32) -> Option<Vec3> {
         let arm = scene.machine.bodies[self.joint.child].centre - self.joint.child_point;
         let at_zero = self.parent.rotation * rotation(&self.joint.rotation) * to_f32(&arm);
@@ -108,7 +109,7 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// A disc where a slide ends; at a hinge a bar where the middle of the turning body then points.
+/// A disc at each limit of a slide; at a hinge a bar towards the centre of the turning body at the limit.
 pub(super) fn push_stop(
     stop: &Stop,
     report: &ElementReport,

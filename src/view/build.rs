@@ -25,7 +25,7 @@ use crate::machine::{Element, ElementKind, Role};
 use crate::scene::{Scene, SignedAxis};
 use crate::simulate::{ContactState, ElementReport, Frame, JointReport};
 
-/// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
+/// Precomputed view data of a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
     pub(super) parts: Vec<DrawnShape>,
     symbols: Vec<Symbol>,
@@ -37,9 +37,9 @@ pub struct SceneView {
     isometric: Option<(f64, f64)>,
     /// Coordinate of the floor along `down`, m.
     floor: f32,
-    /// Largest outer radius of each drawn socket, m: where the part carrying it begins.
+    /// Largest outer radius of each drawn socket, m, limited by the part that carries it.
     pub(super) room: Vec<f32>,
-    /// Points of the moving parts at the start, m: used to test what a fixed part hides.
+    /// Points of the moving parts at the start, m, for the occlusion test of fixed parts.
     watched: Vec<Vec3>,
     /// Ball joints at the start.
     at_start: Vec<DrawnJoint>,
@@ -47,20 +47,20 @@ pub struct SceneView {
 
 /// Smallest picture edge that leaves room for the triad, points.
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
-/// Smallest width that leaves room for gravity between axes and legend, points.
+/// Smallest width that leaves room for the gravity arrow between axes and legend, points.
 const SMALLEST_WITH_GRAVITY: f32 = 300.0;
-/// Radius of the halo of a joint that was hit, in radii of its socket; and most points that it is wider than that.
+/// Radius of the halo of a joint that was hit, in radii of its socket; and largest width of its ring, points.
 const HALO: f32 = 1.7;
 const WIDEST_HALO: f32 = 22.0;
 /// Opacity of a ball in front of a wear map.
 const CLEAR_BALL: f32 = 0.25;
-/// Points of moving parts that a fixed part may hide: rays are cast to all of them in every frame.
+/// Most points of moving parts tested for occlusion: every frame casts a ray to each.
 const MOST_WATCHED: usize = 600;
 /// Width of an arrow's outline, points.
 const OUTLINE: f32 = 1.1;
 /// Radius of a drawn spring, in radii of the scene.
 const COIL: f32 = 0.025;
-/// Radius of the ring that marks the ground under a tyre, in the same.
+/// Radius of the ring that marks the ground under a tyre, in radii of the scene.
 const GROUND: f32 = 0.12;
 
 impl SceneView {
@@ -129,8 +129,8 @@ impl SceneView {
         self.fit_around(camera, scene, frame, options, size, &[]);
     }
 
-    /// The same with the machine clear of `plates` (least and greatest corner, pixels), which stand over the picture: where it is
-    /// drawn largest. Where none is clear of them all, the one of which the plates cover least.
+    /// The same with the machine clear of `plates` (least and greatest corner, pixels), which overlay the picture. Selects the
+    /// largest such view, or the one with the least area under plates.
     pub fn fit_around(
         &self,
         camera: &mut Camera,
@@ -140,12 +140,12 @@ impl SceneView {
         size: [u32; 2],
         plates: &[[Vec2; 2]],
     ) {
-        // Of the room that the plates at a side take, from none to all.
+        // Fractions of the room taken by the plates at a side, from none to all.
         const SHARES: [f32; 4] = [0.0, 0.35, 0.7, 1.0];
         // Cells along the shorter edge, and gap between machine and plates in them.
         const CELLS: f32 = 80.0;
         const GAP: f32 = 1.5;
-        // Solids beyond which some are left out of the comparison with the plates.
+        // Most solids compared with the plates; beyond that some are skipped.
         const MOST: usize = 300;
         let solids = self.solids(scene, frame, options);
         let mut balls: Vec<(Vec3, f32)> = solids.iter().flatten().copied().collect();
@@ -201,7 +201,7 @@ impl SceneView {
         *camera = best;
     }
 
-    /// Magnification actually drawn for the one in `options`.
+    /// Magnification actually drawn for the requested one in `options`.
     pub(super) fn magnification(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> f32 {
         drawn::magnification(scene, frame, &self.room, options.magnification)
     }
@@ -225,7 +225,7 @@ impl SceneView {
         1.0 - (1.0 - LEAST) * t * t * (3.0 - 2.0 * t)
     }
 
-    /// Spheres (centre, radius) for each thing that is drawn, whose convex hull contains it.
+    /// For each drawn thing, spheres (centre, radius) whose convex hull contains it.
     fn solids(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<Vec<(Vec3, f32)>> {
         let joints = drawn::joints(scene, frame, self.magnification(scene, frame, options));
         let palette = Palette::of(options.theme);
@@ -294,7 +294,7 @@ impl SceneView {
             let flash = shot.marks.flash(i);
             if options.flash && flash > 0.02 {
                 let light = Material { colour: palette.flash.with_opacity(flash), ..palette.ball };
-                // Wider it would hide what lies about the joint in a close-up.
+                // A wider ring would hide the surroundings of the joint in a close-up.
                 let pixel = (joint.socket_centre - eye).dot(-camera.axes().2) * camera.metres_per_pixel(shot.size)
                     / camera.distance;
                 let ring = ((HALO - 1.0) * joint.outer).min(WIDEST_HALO * shot.pixels_per_point * pixel.max(0.0));
@@ -326,7 +326,7 @@ impl SceneView {
         }
     }
 
-    /// What is drawn for a force element.
+    /// Adds the symbol of a force element.
     fn push_element(
         &self,
         (element, report): (&Element, &ElementReport),
@@ -443,7 +443,7 @@ impl SceneView {
             let [width, height] = shot.size.map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
             camera.target - right * (width - 62.0 * scale) - up * (height - 62.0 * scale)
         };
-        // Perspective would distort it there: sheared so that it looks as it would in the centre.
+        // Perspective would distort the triad there: it is sheared to look as in the centre.
         let back = camera.axes().2;
         let lean = (corner - camera.target) / camera.distance;
         let sheared = |point: Vec3| point - lean * (point - corner).dot(back);
@@ -474,7 +474,7 @@ fn extents(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[Dr
     solids(parts, symbols, frame, joints).into_iter().flatten().collect()
 }
 
-/// The same for each thing by itself.
+/// The same, separately for each thing.
 fn solids(parts: &[DrawnShape], symbols: &[Symbol], frame: &Frame, joints: &[DrawnJoint]) -> Vec<Vec<(Vec3, f32)>> {
     let pins = symbols.iter().map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)).to_vec());
     let shapes = parts.iter().map(|part| {
@@ -517,14 +517,14 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
     }
 }
 
-/// Unit vector from a joint's ball to where it touches, and 1 while it does.
+/// Unit vector from a joint's ball to the contact point, and 1 while in contact.
 fn touch(report: &JointReport) -> [f32; 4] {
     let touches = matches!(report.state, ContactState::Creep | ContactState::Slip);
     let outwards = to_f32(&report.eccentricity).normalize_or_zero();
     outwards.extend(f32::from(u8::from(touches))).to_array()
 }
 
-/// The halves of all sockets, from far to near as `eye` sees them.
+/// The halves of all sockets, sorted from far to near as seen from `eye`.
 fn push_sockets(frame: &Frame, joints: &[DrawnJoint], eye: Vec3, glass: Material, out: &mut Vec<Instance>) {
     // The half that is cut away stays faintly visible: a ball in contact there is still in its socket.
     let cut_away = glass.with_opacity(0.15 * glass.colour.0[3]);
@@ -544,7 +544,7 @@ fn push_sockets(frame: &Frame, joints: &[DrawnJoint], eye: Vec3, glass: Material
             }
         };
         let mut halves = [half(joint.opening, glass), half(-joint.opening, cut_away)];
-        // The half on the eye's side of the cut is seen last.
+        // The half on the eye's side of the cut comes last.
         if (eye - joint.socket_centre).dot(joint.opening) < 0.0 {
             halves.reverse();
         }
@@ -552,7 +552,7 @@ fn push_sockets(frame: &Frame, joints: &[DrawnJoint], eye: Vec3, glass: Material
     }
 }
 
-/// The older, the fainter.
+/// Adds the trail; older parts are fainter.
 fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
     let last = shot.trail.len().saturating_sub(1) as f32;
     let colour = |i: usize| palette.trail.with_opacity(0.9 * (i as f32 / last).sqrt());

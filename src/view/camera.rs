@@ -103,8 +103,8 @@ impl Camera {
         self.distance = (bounds.radius.max(1e-6) / half_angle.sin()) * 1.02;
     }
 
-    /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction is
-    /// kept. So many pixels at the left, the right, the top and the bottom are kept free.
+    /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction is kept.
+    /// The given numbers of pixels at the left, right, top and bottom stay free.
     pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2], [left, right, top, bottom]: [f32; 4]) {
         const MARGIN: f32 = 1.16;
         let axes = self.axes();
@@ -146,7 +146,7 @@ impl Camera {
     pub fn close_up(&mut self, centre: Vec3, opening: Vec3, radius: f32) {
         let out = opening.normalize_or(self.back_at(0.0));
         let level = Vec2::new(out.dot(self.right), out.dot(self.back_at(0.0)));
-        // An opening straight up or down does not determine the yaw: that is kept.
+        // An opening straight up or down does not determine the yaw, which is then kept.
         if level.length() > 1e-3 {
             self.yaw = level.x.atan2(level.y) + 0.25;
         }
@@ -161,14 +161,14 @@ impl Camera {
         self.pitch = (self.pitch + drag.y * RADIANS_PER_PIXEL).clamp(-STEEPEST, STEEPEST);
     }
 
-    /// Pans by a drag of `drag` pixels: what lies at the target's distance stays under the cursor.
+    /// Pans by a drag of `drag` pixels: points at the target's distance stay under the cursor.
     pub fn pan(&mut self, drag: Vec2, size: [u32; 2]) {
         let metres = self.metres_per_pixel(size);
         let (right, up, _) = self.axes();
         self.target += (up * drag.y - right * drag.x) * metres;
     }
 
-    /// Zooms by `factor` (above 1 is nearer); what is under `cursor` at the target's distance stays there.
+    /// Zooms by `factor` (above 1 is nearer); the point under `cursor` at the target's distance stays there.
     pub fn zoom(&mut self, factor: f32, cursor: Vec2, size: [u32; 2]) {
         if !(factor.is_finite() && factor > 0.0) {
             return;

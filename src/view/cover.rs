@@ -1,14 +1,14 @@
-//! Which parts of a picture are covered by drawn bodies, in coarse cells: what text keeps clear of.
+//! Coarse cells of a picture that drawn bodies cover: text is placed clear of them.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use super::{DrawList, Eye, Instance, Mesh, MeshData};
 
-/// Corners of the polygons that stand for circles.
+/// Corners of the polygons that approximate circles.
 const CORNERS: u16 = 12;
-/// Vertices up to which a mesh is drawn into the cells by their hull; of others the box about them.
+/// Most vertices of a mesh covered by its convex hull; larger meshes use their bounding box.
 const VERTICES: usize = 64;
-/// Instances of a picture beyond which some are left out.
+/// Most instances considered in a picture; beyond that some are skipped.
 const MOST: usize = 800;
 
 /// What covers a cell.
@@ -34,21 +34,21 @@ pub struct Cover {
 }
 
 impl Cover {
-    /// Nothing yet of a picture of `size` pixels, in cells of so many pixels.
+    /// An empty cover of a picture of `size` pixels, with cells of `cell` pixels.
     pub(super) fn new(size: [u32; 2], cell: f32) -> Self {
         let cell = cell.max(1.0);
         let [columns, rows] = size.map(|edge| (edge as f32 / cell).ceil() as usize);
         Self { cell, columns, cells: vec![Covered::Nothing; columns * rows], hull: Vec::new() }
     }
 
-    /// What the machine in `list` covers, in cells of so many pixels. Arrows, ghosts, lines and shadows do not count.
+    /// Cover of the machine in `list`, with cells of `cell` pixels. Arrows, ghosts, lines and shadows do not count.
     pub fn of(list: &DrawList, cell: f32) -> Self {
         let mut cover = Self::new(list.size, cell);
         let step = (list.solid.len() + list.faded.len() + list.sockets.len()).div_ceil(MOST).max(1);
         let sphere = Mesh::Sphere.index();
         for layer in [&list.faded, &list.solid] {
             for (mesh, instances) in layer.by_mesh.iter().enumerate() {
-                // Balls of joints face their sockets.
+                // Only balls of joints have a facing sphere.
                 let what = |one: &Instance| {
                     if mesh == sphere && one.other != [0.0; 4] { Covered::Ball } else { Covered::Body }
                 };
@@ -91,7 +91,7 @@ impl Cover {
         self.add(&list.eye, list.size, points.into_iter().map(|point| (place(point), 0.0)), what);
     }
 
-    /// Adds the convex hull of spheres (centre, radius), m, as `eye` sees it in a picture of `size`. What lies behind the eye is
+    /// Adds the convex hull of spheres (centre, radius), m, as `eye` sees it in a picture of `size`. Parts behind the eye are
     /// left out.
     pub(super) fn add(
         &mut self,
@@ -105,7 +105,7 @@ impl Cover {
         points.clear();
         for (centre, radius) in spheres {
             let corners = if radius > 0.0 { CORNERS } else { 1 };
-            // Around the circle, so that none of it is left out.
+            // The polygon circumscribes the circle, so that none of it is left out.
             let out = radius / (std::f32::consts::PI / f32::from(CORNERS)).cos();
             let around = (0..corners).map(|k| {
                 let (sin, cos) = (std::f32::consts::TAU * f32::from(k) / f32::from(CORNERS)).sin_cos();
@@ -153,7 +153,7 @@ impl Cover {
         }
     }
 
-    /// Shares of the rectangle from `min` to `max`, pixels, that bodies and that balls cover.
+    /// Fractions of the rectangle from `min` to `max`, pixels, covered by bodies and by balls.
     pub fn under(&self, min: Vec2, max: Vec2) -> [f32; 2] {
         let rows = self.cells.len() / self.columns.max(1);
         let (Some(rows), Some(columns)) = (
@@ -174,9 +174,9 @@ impl Cover {
     }
 }
 
-/// The cells between two places, counted in cells, of `count` there are.
+/// Range of cells between two positions, in cells, out of `count`.
 fn span(from: f32, to: f32, count: usize) -> Option<std::ops::Range<usize>> {
-    // Of numbers that are not finite, too.
+    // Negated, so that NaN is rejected, too.
     if !(to >= 0.0 && from < count as f32) {
         return None;
     }
@@ -188,7 +188,7 @@ fn across(clip_from_world: &Mat4) -> [Vec3; 2] {
     [0, 1].map(|row| clip_from_world.row(row).truncate().normalize_or_zero())
 }
 
-/// Points whose hull contains a mesh of the scene's own.
+/// Points whose convex hull contains a mesh of the scene.
 fn outline(mesh: &MeshData, corner: impl Fn(u8) -> Vec3) -> Vec<Vec3> {
     if mesh.vertices.len() <= VERTICES {
         return mesh.vertices.iter().map(|(p, _)| Vec3::new(p[0], p[1], p[2])).collect();
@@ -197,7 +197,7 @@ fn outline(mesh: &MeshData, corner: impl Fn(u8) -> Vec3) -> Vec<Vec3> {
     (0..8).map(|i| middle + 2.0 * corner(i) * half).collect()
 }
 
-/// Leaves the corners of the convex hull, in order.
+/// Reduces `points` to the corners of their convex hull, in order.
 fn hull(points: &mut Vec<Vec2>) {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let turns = |a: Vec2, b: Vec2, c: Vec2| (b - a).perp_dot(c - a);
@@ -210,7 +210,7 @@ fn hull(points: &mut Vec<Vec2>) {
             }
             chain.push(point);
         }
-        // The last is the first of the other side.
+        // The last point starts the other side.
         if points.len() > 1 {
             chain.pop();
         }
@@ -243,7 +243,7 @@ mod tests {
         let slanted = filled(&[Vec2::new(12.0, 12.0), Vec2::new(38.0, 39.0)]);
         assert!(slanted.contains(&(1, 1)) && slanted.contains(&(2, 2)) && slanted.contains(&(3, 3)));
         assert!(slanted.len() <= 5, "{slanted:?}");
-        // A square with a point in its middle; what is outside the picture is cut off.
+        // A square with a point in its middle; parts outside the picture are cut off.
         let square = [(-50.0, 35.0), (25.0, 35.0), (25.0, 300.0), (-50.0, 300.0), (0.0, 50.0)];
         let square = filled(&square.map(|(x, y)| Vec2::new(x, y)));
         assert_eq!(square.len(), 3 * 5);

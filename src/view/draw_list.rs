@@ -49,15 +49,15 @@ impl Mesh {
 /// Triangles of one mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
-    /// Position (x, y, z) and a mark: 0, except on sockets 1 for the inner face, 2 and 3 for the cut face's outer and inner
-    /// edge; then the normal.
+    /// Position (x, y, z) with a mark, then the normal. The mark is 0, except on sockets: 1 on the inner face, 2 and 3 at the
+    /// outer and inner edge of the cut face.
     pub vertices: Vec<([f32; 4], [f32; 3])>,
     /// Three per triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
 }
 
 impl MeshData {
-    /// Middle and half size of the smallest box about it.
+    /// Centre and half size of its bounding box.
     pub fn bounds(&self) -> [Vec3; 2] {
         let points = || self.vertices.iter().map(|(p, _)| Vec3::new(p[0], p[1], p[2]));
         let low = points().reduce(Vec3::min).unwrap_or_default();
@@ -77,16 +77,16 @@ pub struct Instance {
     /// From 0 (mirror) to 1 (chalk); for a ghost's outline its width, pixels.
     pub roughness: f32,
     /// From 0 (plastic) to 1 (metal); for a ghost its depth slice ([`super::GhostLook::slice`]), for a halo the radius of the
-    /// socket that it surrounds, in its own.
+    /// socket that it surrounds, in radii of the halo.
     pub metal: f32,
     /// Inner radius of a socket, in units of its outer radius; unused elsewhere.
     pub inner_radius: f32,
     /// Unused.
     pub pad: f32,
-    /// The sphere that this one faces, of a ball its socket's inner face, of a socket its ball: from centre to centre, m, and
-    /// its radius, m; 0 without one.
+    /// Facing sphere, which is the socket's inner face for a ball and the ball for a socket: vector to its centre, m, and
+    /// radius, m; 0 without one.
     pub other: [f32; 4],
-    /// Unit vector from the ball's centre to where it touches its socket, and 1 while it does.
+    /// Unit vector from the ball's centre to the contact point, and 1 while in contact.
     pub touch: [f32; 4],
 }
 
@@ -156,13 +156,13 @@ pub struct Eye {
 pub struct Light {
     /// Unit vector from the scene towards the light.
     pub direction: Vec3,
-    /// Unit vector towards the strip of the studio that things reflect.
+    /// Unit vector towards the reflected strip of the studio.
     pub strip: Vec3,
     /// Unit vector up: the direction of sky light.
     pub up: Vec3,
     /// Radius of the scene, m.
     pub radius: f32,
-    /// Brightness of the key light, and of the ground, the sky and the window that things reflect.
+    /// Brightness of the key light, and of the reflected ground, sky and window.
     pub studio: [f32; 4],
 }
 
@@ -216,7 +216,7 @@ pub struct Label {
     pub text: Arc<str>,
     /// What it names.
     pub kind: LabelKind,
-    /// Point, m, as [`DrawList::eye`] sees it.
+    /// Anchor point, m, in the coordinates of [`DrawList::eye`].
     pub anchor: Vec3,
     /// Pixel of the anchor, from the top left; labels outside the picture are left out.
     pub pixel: Vec2,
@@ -272,7 +272,7 @@ pub struct DrawList {
     pub eye: Eye,
     /// Light.
     pub light: Light,
-    /// Behind everything.
+    /// Background.
     pub background: Background,
     /// Factor on all light.
     pub exposure: f32,
@@ -280,9 +280,9 @@ pub struct DrawList {
     pub outline: Colour,
     /// Its width, pixels.
     pub outline_width: f32,
-    /// Rim about a touching point.
+    /// Rim around a contact point.
     pub rim: Colour,
-    /// What the picture may cost.
+    /// Rendering quality.
     pub quality: Quality,
     /// Floor, if any.
     pub floor: Option<Floor>,
@@ -292,18 +292,17 @@ pub struct DrawList {
     pub solid: Layer,
     /// Fixed things in front of moving ones, drawn translucent.
     pub faded: Layer,
-    /// Solid things that show through whatever is in front of them: force arrows.
+    /// Force arrows: solid, and visible through whatever is in front of them.
     pub arrows: Layer,
     /// Other states of the machine, translucent in front of everything but arrows.
     pub ghost: Layer,
-    /// The same in their outline colour.
+    /// The ghosts in their outline colour.
     pub ghost_edges: Layer,
     /// Halos of joints that were hit.
     pub halos: Vec<Instance>,
-    /// Sockets in the order in which they are seen, farthest first: of each the half that is kept and, fainter, the half that is cut away.
+    /// Sockets, farthest first: for each the remaining half and, fainter, the half cut away.
     pub sockets: Vec<Instance>,
-    /// Cells of wear maps, in their own colours whatever the light; fainter where something, or the wall, is in front of
-    /// them.
+    /// Cells of wear maps, in their own colours regardless of light; fainter behind other things and behind the wall.
     pub wear: Layer,
     /// Translucent balls in front of wear maps.
     pub clear_balls: Vec<Instance>,
@@ -321,12 +320,12 @@ pub struct DrawList {
     pub wear_scale: Option<WearScale>,
     /// Magnification of the play as drawn.
     pub magnification: f32,
-    /// Its label: "clearance drawn ×50"; says so if less was drawn than requested.
+    /// Its label: "clearance drawn ×50"; notes a reduced magnification.
     pub magnification_text: String,
 }
 
 impl Default for DrawList {
-    /// No picture yet: of no size. Its buffers are reused from build to build.
+    /// An empty list of size 0. Its buffers are reused from build to build.
     fn default() -> Self {
         let ground = Colour::hex(0xFFFFFF);
         Self {

@@ -1,4 +1,4 @@
-//! Where each thing is drawn at one instant: the single source for drawing, picking and bounds.
+//! Positions of everything drawn at one instant: the single source for drawing, picking and bounds.
 //!
 //! With a magnification m of the play, the ball of a joint is drawn at Z_i + m e in a socket of inner radius r + m c, so
 //! that it touches the drawn wall exactly when it touches the real one. Bodies are drawn in place; only the end of a bar
@@ -25,14 +25,14 @@ const WALL: f32 = 0.26;
 /// Gap drawn in an ideal joint, in ball radii: ball and socket must not coincide.
 const IDEAL_GAP: f32 = 0.02;
 
-/// A shape as the scene gives it, in its body's frame.
+/// A shape of the scene, in its body's frame.
 pub(super) struct DrawnShape {
     /// Body; `None` is the world.
     pub body: Option<usize>,
     /// Index among `fixed_shapes`, or among the body's shapes.
     pub index: usize,
     pub role: Role,
-    /// Its own colour.
+    /// Colour set in the scene.
     colour: Option<Colour>,
     form: Form,
 }
@@ -44,13 +44,13 @@ enum Form {
     Own { triangles: OwnMesh, place: Pose },
 }
 
-/// A mesh of the scene's own.
+/// A mesh specific to the scene.
 #[derive(Clone)]
 struct OwnMesh {
     mesh: Mesh,
-    /// What a ray meets.
+    /// Shape for ray casts.
     shape: Option<SharedShape>,
-    /// Their convex hull contains it.
+    /// Points whose convex hull contains the mesh.
     points: Arc<[Vec3]>,
 }
 
@@ -142,7 +142,7 @@ impl Pose {
         Self::new(&motion.position, &motion.rotation)
     }
 
-    /// The pose in the world of what has the pose `inner` in this frame.
+    /// World pose of `inner`, which is given in this frame.
     fn of(&self, inner: &Self) -> Self {
         Self { position: self.apply(inner.position), rotation: self.rotation * inner.rotation }
     }
@@ -238,14 +238,13 @@ fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) 
     }
 }
 
-/// Whether a pointer finds the faces of meshes. The page reads no files: without this it holds none of that code, and finds a
-/// plate by its convex hull.
+/// Whether picking tests the faces of meshes. The page reads no files: it omits that code and picks a plate by its convex hull.
 const HAS_MESHES: bool = cfg!(not(target_arch = "wasm32"));
 
 /// Meshes that are not shared by all scenes.
 struct Meshes {
     data: Vec<MeshData>,
-    /// Those of files, with the lengths of their units, m.
+    /// Meshes of files, with the length of the file's unit, m.
     of_files: Vec<(Arc<mesh::Mesh>, f64, OwnMesh)>,
 }
 
@@ -287,7 +286,7 @@ fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
     None
 }
 
-/// Whether a polygon filled by `triangles` nowhere turns inwards.
+/// Whether a polygon filled by `triangles` is convex.
 fn is_convex(corners: &[Vec3], triangles: &[[usize; 3]]) -> bool {
     let area = |&[i, j, k]: &[usize; 3]| (corners[j] - corners[i]).cross(corners[k] - corners[i]);
     let (normal, n) = (triangles.iter().map(area).sum::<Vec3>(), corners.len());
@@ -359,7 +358,7 @@ impl DrawnShape {
         Material { colour: self.colour.unwrap_or(of_role.colour), ..of_role }
     }
 
-    /// Whether it is long and thin.
+    /// Whether it is a bar.
     pub fn is_bar(&self) -> bool {
         matches!(self.form, Form::Bar { .. })
     }

@@ -34,8 +34,8 @@ pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::machine::Ve
 }
 
 impl SceneView {
-    /// Adds the moving parts in the state `ghost` of the scene of `shot` to the list built from that shot, each the more
-    /// visible the farther it is from its place there; returns whether any differs by a pixel or more.
+    /// Adds the moving parts of the scene in the state `ghost` to the list built from `shot`. A part is the more visible the
+    /// farther it is from its place in `shot`. Returns whether any differs by a pixel or more.
     pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, which: Ghost, out: &mut DrawList) -> bool {
         let near = Near::of(shot);
         let moved = near.as_ref().map(|near| near.frame(ghost));
@@ -82,8 +82,8 @@ impl SceneView {
         differs
     }
 
-    /// Adds the arrow of the output point's error, starting where `ideal` has the point: magnified as much as the play is
-    /// drawn, unless that does not fit. Its label gives the length and, if magnified, the factor.
+    /// Adds the error arrow of the output point, starting at its position in `ideal`. It is magnified like the play, or less if
+    /// that does not fit. Its label gives the length and, if magnified, the factor.
     pub fn add_output_error(&self, shot: &Shot<'_>, ideal: &Frame, out: &mut DrawList) {
         let near = Near::of(shot);
         let moved = near.as_ref().map(|near| near.frame(ideal));

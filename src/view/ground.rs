@@ -1,4 +1,4 @@
-//! The ground under a tyre: a ring and a cross where it is.
+//! The ground under a tyre, drawn as a ring with a cross.
 
 use std::f32::consts::TAU;
 

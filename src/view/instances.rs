@@ -22,7 +22,7 @@ pub(super) fn placed(linear: Mat3, at: Vec3, material: Material) -> Instance {
     }
 }
 
-/// A unit sphere of another `radius`, at `at`.
+/// A sphere of `radius` at `at`.
 pub(super) fn ball(at: Vec3, radius: f32, material: Material) -> Instance {
     placed(Mat3::from_diagonal(Vec3::splat(radius)), at, material)
 }
@@ -33,7 +33,7 @@ pub(super) fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> I
     placed(turn * Mat3::from_diagonal(Vec3::new(radius, radius, along.length())), from, material)
 }
 
-/// A label at `anchor` if that is inside the picture.
+/// Adds a label at `anchor` if that is inside the picture.
 pub(super) fn push_label(out: &mut DrawList, text: &Arc<str>, kind: LabelKind, anchor: Vec3, colour: Colour) {
     let Some(pixel) = out.eye.project(anchor, out.size) else {
         return;

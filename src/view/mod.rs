@@ -1,4 +1,4 @@
-//! From a scene and one instant of it to a plain list of things to draw; camera and picking. No GPU here.
+//! Turns a scene at one instant into a plain list of things to draw; camera and picking. No GPU here.
 //!
 //! Lengths are metres in world axes, f32. The view recomputes no physics: forces, gaps and contact points are
 //! those that the step reported. Usage, once per frame:

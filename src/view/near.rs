@@ -1,4 +1,4 @@
-//! Far from the world's origin, f32 has no digits left for a machine: everything is then measured from the camera's target.
+//! Far from the world's origin f32 is too coarse for a machine: positions are then measured from the camera's target.
 
 use glam::Vec3;
 
@@ -16,7 +16,7 @@ pub(super) struct Near {
 }
 
 impl Near {
-    /// `None` where the world's origin will do.
+    /// `None` if the world's origin is near enough.
     pub fn of(shot: &Shot<'_>) -> Option<Self> {
         let target = shot.camera.target;
         if !(target.length() > FAR * shot.camera.distance) {
@@ -31,12 +31,12 @@ impl Near {
         })
     }
 
-    /// `shot` measured from there.
+    /// `shot` measured from the camera's target.
     pub fn shot<'a>(&'a self, shot: &Shot<'a>) -> Shot<'a> {
         Shot { frame: &self.frame, camera: &self.camera, trail: &self.trail, ..*shot }
     }
 
-    /// Another frame of the same scene, measured from there.
+    /// Another frame of the same scene, measured from the camera's target.
     pub fn frame(&self, frame: &Frame) -> Frame {
         frame_from(frame, to_f32(&self.frame.origin))
     }

@@ -24,7 +24,7 @@ pub struct ViewOptions {
     pub hinges: bool,
     /// Draw sockets; without them only the balls are shown.
     pub sockets: bool,
-    /// What the picture may cost.
+    /// Rendering quality.
     pub quality: Quality,
     /// Draw the caller's trail.
     pub trail: bool,
@@ -51,16 +51,16 @@ impl Default for ViewOptions {
     }
 }
 
-/// What a picture may cost.
+/// Rendering quality of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// Shade between balls and sockets.
+    /// Ambient occlusion between balls and sockets.
     pub occlusion: bool,
     /// Samples per pixel, 4 or 1.
     pub samples: u32,
-    /// The whole shadow map, with soft edges; otherwise half of its side, with hard ones.
+    /// Shadow map of full size with soft edges; otherwise of half the side, with hard edges.
     pub fine_shadows: bool,
-    /// Pixels drawn along each edge of the picture, as a share of those that it has.
+    /// Resolution along each edge of the picture, as a fraction of its pixels.
     pub sharpness: f32,
 }
 
@@ -68,7 +68,7 @@ impl Quality {
     /// Everything.
     pub const FULL: Self = Self::LADDER[0];
 
-    /// What a slow window leaves out, one thing more in each row.
+    /// Quality levels for a slow window: each row drops one more feature.
     pub const LADDER: [Self; 6] = [
         Self::row(true, 4, true, 1.0),
         Self::row(false, 4, true, 1.0),
@@ -108,7 +108,7 @@ pub struct ArrowOptions {
     pub reference: Option<f32>,
     /// Mark past peaks of the normal force.
     pub peaks: bool,
-    /// How thick, 1 being usual; a projector wants more.
+    /// Factor on the thickness, usually 1; larger for a projector.
     pub thickness: f32,
 }
 

@@ -1,7 +1,7 @@
-//! Remembers the hardest blow to each ball joint: an impact lasts a hundredth of a picture, an eye needs longer.
+//! Displays the hardest blow to each ball joint for some time: an impact lasts a hundredth of a frame, too short to be seen.
 //!
-//! A remembered blow gets a mark of its own, never an arrow: arrows are the current forces. It fades with simulated time
-//! alone; the rate follows from the time scale, so that it stays visible equally long at any scale.
+//! A past blow has a mark of its own, never an arrow: arrows are the current forces. It fades with simulated time alone; the
+//! rate follows from the time scale, so that it stays visible equally long at any scale.
 
 use glam::Vec3;
 
@@ -27,18 +27,18 @@ pub struct PeakMarks {
     joints: Vec<Joint>,
     /// Displayed instant, s.
     now: f64,
-    /// Peaks have been taken up to here, s.
+    /// Time up to which peaks were processed, s.
     seen: f64,
-    /// Simulated time in which a mark fades, s.
+    /// Fade time of a mark, s of simulated time.
     fade: f64,
-    /// Largest recent force, N: what the automatic scale follows.
+    /// Largest recent force, N: the input of the automatic scale.
     largest: f32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Joint {
     blow: Option<Blow>,
-    /// In the latest step, but after the displayed instant.
+    /// Blow of the latest step after the displayed instant.
     coming: Option<Blow>,
     /// Largest force of a recently begun contact, N, while it still rises.
     rising: Option<f32>,
@@ -52,7 +52,7 @@ struct Blow {
     flash: f32,
 }
 
-/// How long a mark stays visible, s of viewing time; a flash half as long.
+/// Viewing time for which a mark stays visible, s; a flash lasts half as long.
 pub const SEEN: f64 = 0.8;
 /// Half-life of the automatic scale, in multiples of the fade time: slow, so that lengths can be compared.
 const SCALE_HALF_LIFE: f64 = 0.75;
@@ -68,18 +68,18 @@ impl Default for PeakMarks {
 }
 
 impl PeakMarks {
-    /// Nothing remembered.
+    /// No marks.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Forgets everything up to `time`, s, as after a reset.
+    /// Drops everything up to `time`, s, as after a reset.
     pub fn clear(&mut self, time: f64) {
         *self = Self { now: time, seen: time, ..Self::default() };
     }
 
-    /// Takes blows before the displayed instant `frame`, each with its joint, force and time, as if they had been seen: after
-    /// [`Self::clear`], when a past instant is shown again.
+    /// Restores blows (joint, force, time) before the displayed instant `frame` as if they had been seen: after
+    /// [`Self::clear`], when a past instant is displayed again.
     pub fn recall(&mut self, frame: &Frame, blows: impl Iterator<Item = (usize, Vec3, f64)>, fade: f64) {
         self.fade = fade.max(f64::MIN_POSITIVE);
         self.joints.resize(frame.joints.len(), Joint::default());
@@ -93,8 +93,8 @@ impl PeakMarks {
         }
     }
 
-    /// Takes the displayed instant and the peaks since the previous one, `peaks` (one per ball joint, or empty). A blow is
-    /// forgotten `fade` seconds of simulated time after its peak. If time has run back, everything is forgotten.
+    /// Processes the displayed instant and the `peaks` since the previous one (one per ball joint, or empty). A blow expires
+    /// `fade` seconds of simulated time after its peak. If time has gone back, all blows are dropped.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
         if frame.time < self.now {
             // The scale is kept: it is the same run.
@@ -114,7 +114,7 @@ impl PeakMarks {
             .fold(self.largest, f32::max);
         let Self { now, seen, .. } = *self;
         for ((joint, peak), report) in self.joints.iter_mut().zip(peaks).zip(&frame.joints) {
-            // A peak after the displayed instant is due by the next one.
+            // A peak after the previous instant may be due now.
             if let Some(blow) = joint.coming.take_if(|blow| blow.time <= now) {
                 joint.take(blow, self.fade);
             }
@@ -123,7 +123,7 @@ impl PeakMarks {
             let rises = joint.rising.is_some_and(|before| size > before);
             if !(peak.time > seen && size.is_finite() && (peak.impacts > 0 || rises)) {
                 if peak.impacts > 0 && size == 0.0 {
-                    // It begins at the end of the latest step.
+                    // The contact begins at the end of the latest step.
                     joint.rising = Some(0.0);
                 } else if peak.time > seen {
                     joint.rising = None;
@@ -143,7 +143,7 @@ impl PeakMarks {
             joint.coming = Some(blow(force, peak.time));
             let present = to_f32(&report.normal_force);
             if present.is_finite() && present != Vec3::ZERO {
-                // It has begun: show it with its current force.
+                // The contact has begun: show it with its current force.
                 joint.take(blow(present, now), self.fade);
             }
         }
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn a_blow_that_is_watched_as_it_rises_and_falls_is_marked_once_it_falls() {
-        // It begins at the end of a step, in a frame of its own: still without force.
+        // The contact begins at the end of a step, in a frame of its own: still without force.
         let mut marks = PeakMarks::new();
         marks.update(&frame(1e-6, 0.0), &peak(0.0, 0.0, 1), 80e-6);
         for k in 2..=60 {

@@ -1,4 +1,4 @@
-//! Hit test: what lies under the cursor, by a ray against the drawn shapes.
+//! Picking: a ray from the cursor against the drawn shapes.
 
 use glam::{Vec2, Vec3};
 use parry3d::query::Ray;
@@ -38,13 +38,13 @@ impl SceneView {
         let parts = self.parts.iter().enumerate().filter_map(|(i, part)| {
             let what = part.body.map_or(Picked::Fixed(part.index), Picked::Body);
             let distance = cast(&part.place(shot.frame, &joints), &ray)?;
-            // What is translucent does not block picking.
+            // Translucent parts do not block picking.
             (self.opacity(i, origin) > 0.6).then_some((distance, what))
         });
         let balls = joints.iter().enumerate().filter_map(|(i, joint)| {
             let ball = cast_ball(joint.ball_centre, joint.ball_radius, &ray);
             let socket = shot.options.sockets.then(|| cast_ball(joint.socket_centre, joint.outer, &ray)).flatten();
-            // A ray through the cut-away half of the socket continues to what is inside.
+            // A ray through the cut-away half of the socket continues inside.
             let socket = socket.filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
             let distance = [ball, socket].into_iter().flatten().min_by(f32::total_cmp)?;
             Some((distance, Picked::Joint(i)))

@@ -1,4 +1,4 @@
-//! What a body without shapes looks like: bars from its centroid to its joints.
+//! Default shapes of a body without shapes: bars from its centroid to its joints.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::scene::Scene;
 const BAR: f64 = 0.03;
 const BALL: f64 = 0.08;
 
-/// Shapes of the bodies that have none, by body.
+/// Default shapes of the bodies without shapes, by body.
 pub(super) fn sticks(scene: &Scene) -> BTreeMap<usize, Vec<Shape>> {
     let bare = scene.machine.bodies.iter().enumerate();
     let bare = bare.filter(|(_, body)| body.shapes.is_empty());

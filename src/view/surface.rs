@@ -1,13 +1,13 @@
-//! The surface of a mesh as it is drawn: smooth, with creases where it is meant to have edges.
+//! The drawn surface of a mesh: smooth, with creases at sharp edges.
 
 use glam::Vec3;
 
 use super::MeshData;
 use crate::mesh::Mesh;
 
-/// Cosine of the angle between two triangles from which their common edge is a crease: 35 deg.
+/// Cosine of the smallest angle between two triangles whose common edge is a crease: 35 deg.
 const CREASE: f32 = 0.819;
-/// Triangles about a corner beyond which it is not smoothed, as that takes the square of their number.
+/// Most triangles around a vertex for it to be smoothed: the cost grows with their square.
 const MOST_ABOUT: usize = 64;
 
 /// Triangles of `mesh` with normals, m; `unit` is the length of the file's unit. Both sides are drawn where it is not closed.
@@ -15,7 +15,7 @@ pub(super) fn surface(mesh: &Mesh, unit: f64) -> MeshData {
     let place = |p: &[f32; 3]| Vec3::from(p.map(|x| (f64::from(x) * unit) as f32));
     let places: Vec<Vec3> = mesh.vertices().iter().map(place).collect();
     let corners = |triangle: &[u32; 3]| triangle.map(|i| places[i as usize]);
-    // Relative to the first corner's size, areas of small triangles would vanish in f32.
+    // In units of the file: in metres, areas of small triangles would vanish in f32.
     let area = |triangle: &[u32; 3]| {
         let [a, b, c] = corners(triangle).map(|place| place / unit as f32);
         (b - a).cross(c - a)
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::mesh::Format;
 
-    /// A prism with so many sides about z, radius 10, open at its ends unless `closed`.
+    /// A prism with `sides` sides about z, radius 10, open at its ends unless `closed`.
     fn prism(sides: usize, closed: bool) -> Mesh {
         let mut text = String::new();
         for k in 0..sides {
@@ -120,7 +120,7 @@ mod tests {
             let wanted = if normal.z.abs() > 0.5 { Vec3::Z * normal.z.signum() } else { across };
             assert!(normal.distance(wanted) < 0.07, "{place:?} {normal}");
         }
-        // Of a hexagon, every corner belongs to two sides and an end.
+        // Every corner of a hexagonal prism belongs to two sides and an end.
         assert_eq!(surface(&prism(6, true), 1.0).vertices.len(), 36);
     }
 

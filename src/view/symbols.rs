@@ -1,4 +1,4 @@
-//! Pins, rails and crosses of joints that a scene does not draw itself, whether a body hangs on them or they close a loop.
+//! Pins, rails and crosses for joints that the scene does not draw itself, tree joints and loop-closing joints alike.
 
 use glam::Vec3;
 use parry3d::query::Ray;
@@ -10,21 +10,21 @@ use crate::machine::{Joint, JointKind, Role};
 use crate::scene::Scene;
 use crate::simulate::Frame;
 
-/// Radii of a pin in parts of the hub's width, and, at most, of the scene's radius; without a hub.
+/// Radius of a pin as a fraction of the hub's width; its maximum, and its value without a hub, in radii of the scene.
 const IN_HUB: f32 = 0.2;
 const THICKEST: f32 = 0.04;
 const ALONE: f32 = 0.02;
-/// How far a rail reaches beyond what slides on it, in radii of the scene.
+/// Overhang of a rail beyond the child's shapes, in radii of the scene.
 const REACH: f32 = 0.25;
 /// Radii of a rail and its sleeve, in radii of the scene.
 const RAIL: [f32; 2] = [0.012, 0.022];
-/// Half the length and radius of a bearing, and radius, half the length and distance from it of the pin across its shaft, which
-/// shows that it turns; in radii of the shaft.
+/// Half length and radius of a bearing; radius, half length and distance from the bearing of the pin across its shaft, which
+/// shows that it turns. All in radii of the shaft.
 const BEARING: [f32; 2] = [1.5, 1.35];
 const ACROSS: [f32; 3] = [0.3, 1.6, 0.6];
-/// Shapes of a body that are looked at for each of its joints: setting up takes time proportional to the scene.
+/// Most shapes of a body examined for each of its joints: set-up time stays proportional to the scene.
 const MOST_SHAPES: usize = 500;
-/// Sine of the angle at which a bar still lies along an axis.
+/// Largest sine of the angle between an axis and a bar that lies along it.
 const ALONG: f32 = 0.02;
 
 /// A round bar, in the frame of its body.
@@ -67,7 +67,7 @@ pub(super) fn symbols(
 ) -> Vec<Symbol> {
     let mut shapes: Vec<Vec<(Role, Solid<'_>)>> = Vec::new();
     shapes.resize_with(scene.machine.bodies.len() + 1, Vec::new);
-    // The world last.
+    // Shapes of the world come last.
     let of = |body: Option<usize>| body.unwrap_or(scene.machine.bodies.len());
     for part in parts {
         let shapes = &mut shapes[of(part.body)];
@@ -200,18 +200,18 @@ impl Place<'_> {
         self.shapes[usize::from(self.joint.parent.is_some())]
     }
 
-    /// Whether the scene draws what the child slides on.
+    /// Whether the scene draws a rail for the child.
     fn has_rail(&self) -> bool {
         self.parent_has_rail() || self.has_pin()
     }
 
-    /// The same where it slides with a bar of its own.
+    /// The same, counting only shapes of the parent.
     fn parent_has_rail(&self) -> bool {
         let parent = self.of_parent();
         parent.iter().any(|(role, _)| *role == Role::Rail) || self.bar_on_axis(parent).is_some()
     }
 
-    /// From where to where on the axis the shapes of the two bodies lie, from the joint, m; seen from as far as `most`.
+    /// Extent of the shapes of both bodies along the axis, from the joint, m; seen from a distance of `most`, m.
     fn hub(&self, most: f32) -> Option<[f32; 2]> {
         let mut ends: Option<[f32; 2]> = None;
         for (_, solid) in self.shapes[1].iter().chain(self.shapes[2]) {
@@ -222,7 +222,7 @@ impl Place<'_> {
             for point in [self.point, self.point + inwards * 0.05] {
                 let reach = |out: Vec3| {
                     let ray = Ray::new(point + out * most, -out);
-                    // What begins beyond is no hub.
+                    // A shape that begins farther out is no hub.
                     let met = cast(solid, &ray).filter(|distance| *distance > 0.0)?;
                     Some(most - met)
                 };
@@ -235,7 +235,7 @@ impl Place<'_> {
         ends
     }
 
-    /// How far the child's shapes reach along the axis, from its joint, m.
+    /// Extent of the child's shapes along the axis, from its joint, m.
     fn span(&self) -> [f32; 2] {
         let (mut low, mut high) = (0.0_f32, 0.0_f32);
         for (_, solid) in self.shapes[2] {

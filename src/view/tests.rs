@@ -1,4 +1,4 @@
-//! What the draw list guarantees.
+//! Guarantees of the draw list.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ fn shot<'a>(
     Shot { scene, frame, marks, options, camera, trail: &[], size: SIZE, pixels_per_point: 1.0 }
 }
 
-/// Draw list of a scene with the current forces held.
+/// Draw list of a scene; past peaks do not fade.
 fn list(scene: &Scene, frame: &Frame, options: &ViewOptions) -> DrawList {
     let view = SceneView::new(scene, frame);
     let mut marks = PeakMarks::new();
@@ -116,7 +116,7 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
         simulation.sample(0.0, &mut frame);
         let view = SceneView::new(&scene, &frame);
         let plain = drawn::joints(&scene, &frame, 1.0);
-        // Twelve loose joints take their time.
+        // Twelve loose joints take long to simulate.
         let later: &[f64] = match scene.machine.ball_joints.len() {
             0..=8 => &[0.1, 0.4],
             _ => &[],
@@ -134,7 +134,7 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
                     let Some(distance) = super::cast::distance(&solid, joint.socket_centre) else {
                         continue;
                     };
-                    // What carries a socket at its original size touches it, and a bar ends at its outer face.
+                    // A part that carries a socket at its original size touches it, and a bar ends at its outer face.
                     let touches = distance < plain[i].outer || part.reaches_socket(i);
                     assert!(
                         touches || distance >= joint.outer * 0.999,
@@ -308,7 +308,7 @@ fn a_flash_is_a_narrow_ring_in_a_close_up_and_a_wide_one_from_afar() {
 
 #[test]
 fn a_fit_takes_account_of_what_sticks_out_and_keeps_clear_of_plates() {
-    // Its discs are far beyond the rail.
+    // The discs of the stop are far beyond the rail.
     let stop = "[[stop]]\nname = \"ends\"\njoint = \"slide\"\nlower = \"-900 mm\"\nupper = \"800 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
     let motor = "[[motor]]\nname = \"m\"\njoint = \"slide\"\nforce = \"1 N\"\n";
     for element in [stop, motor] {
@@ -418,7 +418,7 @@ fn a_hinge_has_a_pin_unless_the_scene_draws_it() {
     let [pin] = drawn.solid.by_mesh[Mesh::Cylinder.index()][..] else {
         panic!("one pin");
     };
-    // Through the whole arm, and out on both sides.
+    // The pin runs through the whole arm and sticks out on both sides.
     let row = pin.world_from_mesh[1];
     let (from, to) = (row[3], row[3] + row[2]);
     assert!((from + to).abs() < 1e-6 && (0.0101..0.02).contains(&to.abs()), "{from} {to}");
@@ -454,7 +454,7 @@ fn a_slide_has_a_rail_beyond_what_slides_on_it() {
     assert_eq!(count(&drawn, Mesh::Cylinder), 0);
 }
 
-/// Ends of the bars that are drawn, world axes, m: first those along `axis`, then the others.
+/// Ends of the drawn bars, world axes, m: first those along `axis`, then the others.
 fn bars(list: &DrawList, axis: Vec3) -> [Vec<[Vec3; 2]>; 2] {
     let bars = &list.solid.by_mesh[Mesh::Cylinder.index()];
     let ends = bars.iter().map(|bar| {
@@ -476,11 +476,11 @@ fn a_universal_joint_is_a_cross_of_two_pins() {
     let ([[from, to]], [[low, high]]) = (&first[..], &second[..]) else {
         panic!("a pin along each axis: {first:?} {second:?}");
     };
-    // Both go as far through the arm, which is 20 mm wide, and cross in the joint at a right angle.
+    // Both pins pass through the arm, which is 20 mm wide, are equally long and cross at a right angle in the joint.
     assert!((0.0101..0.02).contains(&to.y.abs()), "{to}");
     assert!((from.distance(*to) - low.distance(*high)).abs() < 1e-6);
     assert!((*from + *to).length() < 1e-6 && (*low + *high).length() < 1e-6);
-    // The second turns with the child: about y by the first angle, as the other angle is about itself.
+    // The second pin turns with the child: about y by the first angle, since the other angle is about itself.
     let axis = Vec3::new(0.5, 0.0, 0.75_f32.sqrt());
     assert!((*high - *low).normalize().cross(axis).length() < 1e-5);
     let (scene, frame) = started(&format!("{text}drawn = false\n"), &[]);
@@ -495,7 +495,7 @@ fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_o
     let options = ViewOptions::default();
     let [along, across] = bars(&list(&scene, &frame, &options), Vec3::X);
     assert_eq!((along.len(), across.len()), (2, 1));
-    // It turns with the child, from where it is first seen.
+    // The pin turns with the child from its first position.
     let turned = text + "start = { angular_velocity = \"1000 rad/s\" }\n";
     let (scene, first) = started(&turned, &[]);
     let view = SceneView::new(&scene, &first);
@@ -514,7 +514,7 @@ fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_o
     let turned = turned.replace(shapes, &format!("shapes = [{shaft}]"));
     let (scene, frame) = started(&turned, &[]);
     let [along, across] = bars(&list(&scene, &frame, &options), Vec3::X);
-    // The shaft, and its bearing around the joint, shorter than it.
+    // The shaft, and its shorter bearing around the joint.
     assert_eq!((along.len(), across.len()), (2, 1));
     let lengths = along.iter().map(|[from, to]| from.distance(*to));
     let shortest = lengths.fold(f32::INFINITY, f32::min);

@@ -22,7 +22,7 @@ impl Colour {
         Self([((rgb >> 16) & 255) as f32 / 255.0, ((rgb >> 8) & 255) as f32 / 255.0, (rgb & 255) as f32 / 255.0, 1.0])
     }
 
-    /// Red, green and blue as light.
+    /// Linear red, green and blue.
     pub fn linear(self) -> [f32; 3] {
         let [r, g, b, _] = self.0;
         [r, g, b].map(|c| if c > 0.04045 { ((c + 0.055) / 1.055).powf(2.4) } else { c / 12.92 })
@@ -146,11 +146,11 @@ pub struct Palette {
     ghosts: [GhostLook; 2],
     /// Factor on all light.
     pub exposure: f32,
-    /// Brightness of the key light, and of the ground, the sky and the window of the studio that things reflect.
+    /// Brightness of the key light, and of the reflected ground, sky and window of the studio.
     pub studio: [f32; 4],
     /// Outline of arrows.
     pub outline: Colour,
-    /// Rim about a touching point.
+    /// Rim around a contact point.
     pub rim: Colour,
 }
 
@@ -227,8 +227,8 @@ impl Palette {
 mod tests {
     use super::*;
 
-    /// What a dichromat sees, of light: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A Physiologically-based Model for
-    /// Simulation of Color Vision Deficiency, IEEE TVCG 15 (2009), severity 1.0.
+    /// Linear colours as a dichromat sees them: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A Physiologically-based
+    /// Model for Simulation of Color Vision Deficiency, IEEE TVCG 15 (2009), severity 1.0.
     const SIGHTS: [(&str, [[f32; 3]; 3]); 3] = [
         ("full", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
         (

@@ -82,7 +82,7 @@ impl SceneView {
         for j in joints {
             let body = Pose::in_frame(shot.frame, shot.scene.machine.ball_joints[j].socket.body).rotation;
             let grid = wear.grid_from_body(j);
-            // Rows of one are columns of the other.
+            // Rows of a rotation are columns of its inverse.
             let axis = |i: usize| super::to_f32(&grid.row(i).transpose());
             let socket = body * Mat3::from_cols(axis(0), axis(1), axis(2));
             let size = Mat3::from_diagonal(Vec3::splat(BEFORE_WALL * drawn[j].inner));

@@ -3,7 +3,7 @@
 use super::MeshData;
 use crate::simulate::{Edges, Grid};
 
-/// Largest part of a cell that is drawn flat, rad.
+/// Largest flat facet of a cell, rad.
 const FLAT: f64 = 0.07;
 
 /// A mesh for each zone of the grid: its cell that begins at azimuth 0, on the unit sphere, seen from inside.

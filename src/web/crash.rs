@@ -1,4 +1,4 @@
-//! What a panic leaves on the page: a text to report.
+//! Crash reports, shown on the page after a panic.
 
 use std::cell::RefCell;
 
@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::*;
 use crate::scene::{Scene, visible_line};
 
 thread_local! {
-    /// What was running, as the report says it, and the link to it.
+    /// Description of the running session for the report, and a link to it.
     static RUNNING: RefCell<(String, String)> = const { RefCell::new((String::new(), String::new())) };
 }
 
@@ -18,7 +18,7 @@ extern "C" {
     fn crashed(report: &str, link: &str) -> Result<(), JsValue>;
 }
 
-/// From now on panics are shown on the page.
+/// Shows panics on the page from now on.
 pub fn explain_panics() {
     let previous = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
@@ -32,7 +32,7 @@ pub fn explain_panics() {
     }));
 }
 
-/// Notes what is running, for a report. `link`: the fragment that leads back to it ([`super::Page::session`]).
+/// Records the running session for a report. `link` is the fragment that restores it ([`super::Page::session`]).
 pub fn note(scene: &Scene, renderer: &str, link: String) {
     let mut text = format!("scene: {}\n", scene.name);
     for (key, value) in &scene.changes {

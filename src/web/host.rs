@@ -1,4 +1,4 @@
-//! The browser's services for the application; `web/host.js` is their other half.
+//! The browser's services for the application, implemented in `web/host.js`.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -27,16 +27,16 @@ extern "C" {
     fn fill_screen(on: bool);
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn announce(text: &str, event: bool);
-    /// Switches sound on or off; returns why it cannot be made, or "".
+    /// Switches sound on or off; returns the reason for a failure, or "".
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn sound(on: bool) -> String;
-    /// Samples a second; 0 while nothing can be heard.
+    /// Sample rate, Hz; 0 while sound is unavailable.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = soundRate)]
     fn sound_rate() -> f64;
-    /// Plays `samples` so many seconds from now.
+    /// Plays `samples` after a delay of `after` seconds.
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn click(samples: &[f32], after: f64);
-    /// Has [`super::page::Page::step_between`] called until the next frame.
+    /// Schedules calls of [`super::page::Page::step_between`] until the next frame.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = goOn)]
     pub fn go_on();
     /// Reports that the graphics of start number `start` are lost.
@@ -55,23 +55,23 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// The window that is woken from now on.
+    /// Sets the window to wake for new files.
     pub fn attach(&self, ctx: &egui::Context) {
         self.ctx.replace(ctx.clone());
     }
 
-    /// The window.
+    /// The egui context of the window.
     pub fn ctx(&self) -> egui::Context {
         self.ctx.borrow().clone()
     }
 
-    /// Files have come at once.
+    /// Adds files that arrived together.
     pub fn put(&self, files: Vec<OpenedFile>) {
         self.files.borrow_mut().push_back(files);
         self.ctx().request_repaint();
     }
 
-    /// Reads files of the browser's and puts them in; a large one is not even read: a page has little memory.
+    /// Reads browser files and adds them. Oversized files are not read, because a page has little memory.
     pub fn take(self: Rc<Self>, files: Vec<File>) {
         wasm_bindgen_futures::spawn_local(async move {
             let mut read = Vec::with_capacity(files.len());
@@ -133,7 +133,7 @@ impl Host for WebHost {
     }
 
     fn workers(&self) -> usize {
-        // One core draws and steps.
+        // One core is reserved for drawing and stepping.
         let cores = eframe::web_sys::window().map(|window| window.navigator().hardware_concurrency());
         (cores.unwrap_or(1.0) as usize).saturating_sub(1).max(1)
     }

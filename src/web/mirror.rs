@@ -1,5 +1,5 @@
-//! The accessibility tree of the interface, which eframe drops in a browser: for the elements that `web/mirror.js` lays over the
-//! canvas, and for tests, which find controls in it. What these elements are asked to do goes back to egui.
+//! Mirrors egui's accessibility tree, which eframe drops in a browser, for the elements that `web/mirror.js` lays over the
+//! canvas and for tests. Requests to these elements go back to egui.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 type Nodes<'a> = HashMap<accesskit::NodeId, &'a accesskit::Node>;
 
-/// Keeps what egui last reported about its controls, and what it is to be told next.
+/// Latest accessibility tree of egui, and requests for its next frame.
 #[derive(Default)]
 pub struct Mirror {
     tree: Option<accesskit::TreeUpdate>,
@@ -37,9 +37,10 @@ impl egui::Plugin for Mirror {
 }
 
 impl Mirror {
-    /// Controls, texts and parts of the window in reading order, as JSON: `[{"id", "inside", "role", "label", "text", "value", "min",
-    /// "max", "step", "on", "expanded", "disabled", "live", "focusable", "focused", "rect": [x0, y0, x1, y1]}, …]`; places are in CSS
-    /// pixels of the canvas, `zoom` of them to a point; `inside`: the part of the window. Empty before the first frame.
+    /// Controls, texts and parts of the window in reading order, as JSON: `[{"id", "inside", "role", "label", "text", "value",
+    /// "min", "max", "step", "on", "expanded", "disabled", "live", "focusable", "focused", "rect": [x0, y0, x1, y1]}, …]`.
+    /// Rectangles are in CSS pixels of the canvas, `zoom` pixels per point; `inside` is the part of the window. Empty before
+    /// the first frame.
     pub fn widgets(&self, zoom: f32) -> String {
         let Some(tree) = &self.tree else {
             return String::new();
@@ -60,8 +61,8 @@ impl Mirror {
         Value::Array(widgets).to_string()
     }
 
-    /// Asks a control for `action` in the next frame: `Click`, `Focus`, `Increment`, `Decrement`, or `SetValue` with `data`.
-    /// Anything else is ignored.
+    /// Requests `action` of a control in the next frame: `Click`, `Focus`, `Increment`, `Decrement`, or `SetValue` with `data`.
+    /// Other actions are ignored.
     pub fn ask(&mut self, id: u64, action: &str, data: Option<accesskit::ActionData>) {
         use accesskit::Action;
         let action = match action {
@@ -86,7 +87,7 @@ fn is_part(node: &accesskit::Node, nodes: &Nodes<'_>) -> bool {
     matches!(node.role(), accesskit::Role::Region | accesskit::Role::Dialog) && label(node, nodes).is_some()
 }
 
-/// A node that stands for something to read or to use.
+/// Describes a node that can be read or used; `None` for any other node.
 fn describe(
     id: accesskit::NodeId,
     node: &accesskit::Node,
@@ -94,14 +95,14 @@ fn describe(
     focus: accesskit::NodeId,
     zoom: f64,
 ) -> Option<Value> {
-    // A part of the window has no place of its own.
+    // A part of the window has no bounds of its own.
     let bounds = node.bounds().or_else(|| is_part(node, nodes).then_some(accesskit::Rect::ZERO))?;
     let rect = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];
-    // What can be used is listed without a name, too, so that a test finds it.
+    // Focusable nodes are listed even without a name, so that tests find them.
     let nameless = || node.supports_action(accesskit::Action::Focus).then_some("");
     let label = label(node, nodes).or_else(nameless)?;
     Some(json!({
-        // More digits than a number of JavaScript holds.
+        // As text: the number has more digits than a JavaScript number holds.
         "id": id.0.to_string(),
         "role": format!("{:?}", node.role()),
         "label": label,
@@ -120,7 +121,7 @@ fn describe(
     }))
 }
 
-/// A control's own name, else that of what labels it (sliders, text fields), else its text.
+/// A control's own name, else the name of its label (sliders, text fields), else its text.
 fn label<'a>(node: &'a accesskit::Node, nodes: &Nodes<'a>) -> Option<&'a str> {
     let labelling = || {
         node.labelled_by().iter().find_map(|id| {

@@ -1,4 +1,4 @@
-//! The application on a canvas, and what the page and its tests ask of it.
+//! The application on a canvas, with the interface for the page and its tests.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -18,51 +18,51 @@ use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
 use crate::simulate::SPELL;
 
-/// Time between two notes of what is running, s; a crash report and a restart go back to the latest.
+/// Interval between snapshots of the session, s; crash reports and restarts use the latest.
 const NOTE_INTERVAL: f64 = 2.0;
 
 /// The laboratory on a page.
 #[wasm_bindgen]
 pub struct Page {
     runner: eframe::WebRunner,
-    /// Outlives the canvas: losing the graphics loses nothing else.
+    /// Outlives the canvas, so that lost graphics lose nothing else.
     laboratory: Rc<RefCell<Option<Laboratory>>>,
     inbox: Rc<Inbox>,
 }
 
-/// The application with what only a page needs.
+/// The application with its page-specific state.
 struct Laboratory {
     app: App,
     ctx: egui::Context,
     renderer: String,
     frames: u32,
-    /// When what is running was last noted, s of viewing.
+    /// Time of the latest snapshot on egui's clock, s.
     noted: Option<f64>,
-    /// When the latest frame began, s of the player's clock.
+    /// Start of the latest frame on the player's clock, s.
     began: f64,
 }
 
-/// What eframe runs: the laboratory on one canvas.
+/// The eframe application: the laboratory on one canvas.
 struct OnCanvas(Rc<RefCell<Option<Laboratory>>>);
 
 #[wasm_bindgen]
 impl Page {
-    /// Prepares the page: from here on a panic is shown on it.
+    /// Prepares the page, which shows panics from then on.
     #[wasm_bindgen(constructor)]
     #[allow(clippy::new_without_default, reason = "JavaScript knows no Default")]
     pub fn new() -> Self {
         crash::explain_panics();
-        // A second page of the same code finds the logger installed.
+        // Fails if another page of the same module has installed the logger.
         let _ = eframe::WebLogger::init(log::LevelFilter::Warn);
         Self { runner: eframe::WebRunner::new(), laboratory: Rc::default(), inbox: Rc::default() }
     }
 
-    /// Draws on `canvas` with `backend` (`webgpu` or `webgl`) from now on; `start` counts the starts. The first one opens
-    /// `link`: the address from its `?` on, or what [`Self::session`] gave. What is wrong in it is shown beside the default scene.
-    /// `wishes` of the user's system: `calm` for little motion, `contrast` for much contrast, or both.
+    /// Draws on `canvas` with `backend` (`webgpu` or `webgl`); `start` numbers the calls. The first call opens `link`: the
+    /// address from its `?` on, or a result of [`Self::session`]; errors in it are shown beside the default scene. `wishes` are
+    /// preferences of the user's system: `calm` for reduced motion, `contrast` for high contrast, or both.
     ///
     /// # Errors
-    /// Text: the backend does not work here. A laboratory that was running is still there for the next attempt.
+    /// Text: the backend does not work here. A running laboratory survives for the next attempt.
     pub async fn start(
         &self,
         canvas: HtmlCanvasElement,
@@ -104,27 +104,28 @@ impl Page {
         self.with(|laboratory| laboratory.frames).unwrap_or(0)
     }
 
-    /// What the laboratory is doing, as JSON: version, scene, changed parameters, time, state hash, camera, renderer.
+    /// State of the laboratory as JSON: version, scene, changed parameters, time, state hash, camera, renderer.
     pub fn state(&self) -> Option<String> {
         self.with(|laboratory| laboratory.state())
     }
 
-    /// The present state as a link's fragment, to start again with.
+    /// The current state as the fragment of a link, for a restart.
     pub fn link(&self) -> Option<String> {
         self.with(|laboratory| laboratory.app.share_state())
     }
 
-    /// As [`Self::link`]; where no address holds it, a text of any length after `kept:`. [`Self::start`] takes either.
+    /// As [`Self::link`]; a state that no address can hold becomes `kept:` and a text of any length. [`Self::start`] accepts
+    /// both.
     pub fn session(&self) -> Option<String> {
         self.with(|laboratory| laboratory.app.session())
     }
 
-    /// Whether changes of the user's own scene are in no file; nothing where none were made since the start.
+    /// Whether the user's own scene has unsaved changes; `None` if it has not changed since the start.
     pub fn unsaved(&self) -> Option<bool> {
         self.with(|laboratory| laboratory.app.unsaved())?
     }
 
-    /// Opens the address from its `?` on, after the user has changed it; returns why not, or nothing. The reason is shown, too.
+    /// Opens the address from its `?` on after the user has edited it. Returns the reason for a failure, which is also shown.
     #[wasm_bindgen(js_name = openLink)]
     pub fn open_link(&self, link: &str) -> Option<String> {
         self.with(|laboratory| {
@@ -133,24 +134,24 @@ impl Page {
         })?
     }
 
-    /// Whether the address with which the page began could not be opened, and nothing else was done since.
+    /// Whether the initial address could not be opened and nothing else has been done since.
     pub fn refused(&self) -> bool {
         self.with(|laboratory| laboratory.app.is_refused()).unwrap_or(false)
     }
 
-    /// Whether a key by the name that the browser gives it does something here, alone or with the command key.
+    /// Whether the key with the browser's name `key` is a shortcut here, alone or with the command key.
     pub fn uses(&self, key: &str, command: bool, alt: bool) -> bool {
         !alt && self.with(|laboratory| laboratory.app.uses(&laboratory.ctx, key, command)).unwrap_or(false)
     }
 
-    /// Opens files, an array of the browser's, that were chosen at once.
+    /// Opens an array of browser files that were chosen together.
     #[wasm_bindgen(js_name = openFiles)]
     pub fn open_files(&self, files: &Array) {
         let files = files.iter().filter_map(|file| file.dyn_into::<File>().ok());
         self.inbox.clone().take(files.collect());
     }
 
-    /// Tells the user something, for a few seconds.
+    /// Shows a message for a few seconds.
     pub fn say(&self, text: String) {
         self.with(|laboratory| {
             laboratory.app.say(text);
@@ -158,7 +159,7 @@ impl Page {
         });
     }
 
-    /// Begins or ends the presentation.
+    /// Starts or ends the presentation.
     pub fn present(&self, on: bool) {
         self.with(|laboratory| {
             laboratory.app.present(&laboratory.ctx, on);
@@ -166,7 +167,7 @@ impl Page {
         });
     }
 
-    /// Gives the parameter `key` a value with its unit; returns why not, or nothing.
+    /// Sets the parameter `key` to a value with its unit; returns the reason for a refusal.
     pub fn set(&self, key: &str, value: &str) -> Option<String> {
         self.with(|laboratory| {
             laboratory.ctx.request_repaint();
@@ -183,7 +184,7 @@ impl Page {
         });
     }
 
-    /// Back to t = 0.
+    /// Resets to t = 0.
     pub fn reset(&self) {
         self.with(|laboratory| {
             laboratory.app.reset();
@@ -191,12 +192,12 @@ impl Page {
         });
     }
 
-    /// The impacts shown that have ended after `time`, s, as JSON.
+    /// The displayed impacts that ended after `time`, s, as JSON.
     pub fn impacts(&self, time: f64) -> Option<String> {
         self.with(|laboratory| laboratory.impacts(time))
     }
 
-    /// Forgets which control has the keyboard: the page has given it to something else.
+    /// Clears the keyboard focus, which the page has moved elsewhere.
     pub fn release(&self) {
         self.with(|laboratory| {
             laboratory.ctx.memory_mut(|memory| {
@@ -207,7 +208,8 @@ impl Page {
         });
     }
 
-    /// The controls shown, as JSON ([`Mirror::widgets`]). Empty the first time: the mirror starts with the next frame.
+    /// The visible controls as JSON ([`Mirror::widgets`]). The first call returns an empty string and enables the mirror from
+    /// the next frame on.
     pub fn widgets(&self) -> Option<String> {
         self.with(|laboratory| {
             let ctx = &laboratory.ctx;
@@ -219,7 +221,7 @@ impl Page {
         })
     }
 
-    /// Does to the control `id` what an assistive program asks for ([`Mirror::ask`]); `value`: a number or a text.
+    /// Passes a request of assistive software to the control `id` ([`Mirror::ask`]); `value` is a number or a text.
     pub fn ask(&self, id: &str, action: &str, value: &JsValue) {
         let number = value.as_f64().map(ActionData::NumericValue);
         let text = || Some(ActionData::Value(value.as_string()?.into()));
@@ -234,7 +236,7 @@ impl Page {
         });
     }
 
-    /// Pauses and runs on until simulated `time`, s.
+    /// Pauses playback and runs to the simulated `time`, s.
     #[wasm_bindgen(js_name = runTo)]
     pub fn run_to(&self, time: f64) {
         self.with(|laboratory| {
@@ -243,7 +245,7 @@ impl Page {
         });
     }
 
-    /// Steps on between two frames; returns after how long it wants to go on, ms, or nothing until the next frame.
+    /// Steps between two frames. Returns the delay before the next call, ms, or `None` to wait for the next frame.
     #[wasm_bindgen(js_name = stepBetween)]
     pub fn step_between(&self) -> Option<f64> {
         let behind = self.with(|laboratory| {
@@ -254,15 +256,15 @@ impl Page {
     }
 
     fn with<T>(&self, ask: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {
-        // After a panic it stays borrowed.
+        // It stays borrowed after a panic.
         self.laboratory.try_borrow_mut().ok()?.as_mut().map(ask)
     }
 }
 
-/// Tells the page when the graphics of start number `start` are lost.
+/// Notifies the page when the graphics of start number `start` are lost.
 fn watch(state: &RenderState, backend: &str, start: u32) {
     if backend == "webgl" {
-        // The canvas has an event for it, but calls may fail before that.
+        // The canvas fires an event for this, but calls may fail before it.
         state.device.on_uncaptured_error(Arc::new(|error| {
             if are_graphics_lost() {
                 log::warn!("drawing without graphics: {error}");
@@ -308,7 +310,7 @@ impl Laboratory {
         Ok(Self { app, ctx: cc.egui_ctx.clone(), renderer: describe(cc), frames: 0, noted: None, began: 0.0 })
     }
 
-    /// Continues with new graphics.
+    /// Attaches new graphics.
     fn attach(&mut self, cc: &eframe::CreationContext<'_>) {
         let theme = self.ctx.options(|options| options.theme_preference);
         self.app.attach(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), theme);
@@ -317,7 +319,7 @@ impl Laboratory {
         self.noted = None;
     }
 
-    /// Tells the crash report what is running.
+    /// Updates the snapshot for crash reports.
     fn note(&mut self) {
         let now = self.ctx.input(|input| input.time);
         if self.noted.is_none_or(|noted| now - noted > NOTE_INTERVAL) {
@@ -352,7 +354,7 @@ impl Laboratory {
         let scene = player.running();
         let changes: serde_json::Map<_, _> =
             scene.changes.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
-        // A camera that was not moved shows everything.
+        // An untouched camera fits the whole scene and is not reported.
         let camera = self.app.link().camera.filter(|camera| camera.fitted.is_none());
         let camera = camera.map(|camera| {
             json!({
@@ -400,7 +402,7 @@ impl eframe::App for OnCanvas {
         }
     }
 
-    // What is left for panels, which fill nothing here: `theme::panel`.
+    // Background of the panels, which are not filled themselves (`theme::panel`).
     fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
         visuals.panel_fill.to_normalized_gamma_f32()
     }

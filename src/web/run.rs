@@ -17,7 +17,7 @@ pub fn scenes() -> Vec<String> {
     BUILT_IN.map(str::to_owned).to_vec()
 }
 
-/// Words that parameter `key` accepts, e.g. those of `solver.method`; none if it accepts none.
+/// Named values of parameter `key`, e.g. those of `solver.method`; empty if it has none.
 #[wasm_bindgen]
 pub fn choices(key: &str) -> Vec<String> {
     let row = table().iter().find(|row| row.key == key);
@@ -60,7 +60,7 @@ impl Run {
     /// Text: the divergence guard stopped it.
     #[wasm_bindgen(js_name = advanceTo)]
     pub fn advance_to(&mut self, time: f64) -> Result<(), JsError> {
-        // The last step is shortened, as in `jointplay run`.
+        // The last step is truncated, as in `jointplay run`.
         while self.simulation.time() < time {
             self.simulation.step_until(time)?;
         }

@@ -1,4 +1,4 @@
-//! Long computations in a worker of the page: both ends. `web/worker.js` is one, `web/host.js` keeps it.
+//! Long computations in a web worker, both sides: `web/worker.js` is the worker, `web/host.js` manages it on the page.
 
 use std::ops::ControlFlow;
 
@@ -12,19 +12,19 @@ use crate::app::Running;
 
 #[wasm_bindgen]
 extern "C" {
-    /// In the worker: hands a message on to the page.
+    /// In the worker: posts a message to the page.
     #[wasm_bindgen(js_namespace = jointplayWork)]
     fn tell(message: &str);
-    /// In the worker: what to wait for before going on, if anything.
+    /// In the worker: the promise to await before continuing, if any.
     #[wasm_bindgen(js_namespace = jointplayWork)]
     fn rest() -> Option<Promise>;
-    /// On the page: starts a worker on a job; its number.
+    /// On the page: starts a worker for a job and returns its number.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = startWork)]
     fn start_work(job: &str) -> Option<u32>;
-    /// On the page: what a worker said next.
+    /// On the page: the next message of a worker, if any.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = pollWork)]
     fn poll_work(worker: u32) -> Option<String>;
-    /// On the page: how long a worker is to rest, as a multiple of the time that it computes.
+    /// On the page: sets the idle time of a worker, as a multiple of its computing time.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = restWork)]
     fn rest_work(worker: u32, rest: f64);
     /// On the page: ends a worker.
@@ -33,7 +33,7 @@ extern "C" {
 }
 
 fn say(message: &Message) {
-    // Plain data of this program.
+    // Serialising plain data cannot fail.
     tell(&serde_json::to_string(message).expect("a message is JSON"));
 }
 
@@ -51,19 +51,19 @@ pub async fn perform(job: String) {
     let mut clock = || start.elapsed().as_secs_f64();
     let mut tell = |message| {
         say(&message);
-        // The page ends the worker when it wants no more.
+        // The page terminates the worker to cancel the job.
         ControlFlow::Continue(())
     };
     let mut wait = async || {
         if let Some(promise) = rest() {
-            // It is never rejected.
+            // The promise is never rejected.
             let _ = JsFuture::from(promise).await;
         }
     };
     task::perform_with_rests(&job, &mut clock, &mut tell, &mut wait).await;
 }
 
-/// On the page: a worker at work. Dropping it ends it.
+/// On the page: a running worker, terminated on drop.
 pub struct Worker {
     number: u32,
     finished: bool,

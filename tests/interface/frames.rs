@@ -108,6 +108,20 @@ fn a_frame_has_the_same_bytes_each_time() {
     }
 }
 
+#[test]
+fn a_frame_of_the_window_shows_the_plots_that_its_link_asks_for() {
+    let shown = |scene: &str| {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        jointplay(folder.path(), &format!("render {scene} --ui --at 5ms --size 900x600 --out frames --quiet"));
+        fs::read(folder.path().join("frames/frame_00000.png")).expect("written")
+    };
+    let plain = shown("pendulum");
+    assert!(plain == shown("--link ?scene=pendulum"), "a link to the scene alone");
+    let energy = shown("--link ?scene=pendulum&plots=energy");
+    assert!(plain != energy, "other plots");
+    assert!(energy != shown("--link ?scene=pendulum&plots=energy&window=1ms"), "another time window");
+}
+
 /// A frame's hash is that of a run to the end of the step that contains it: with a fixed step the two take the same steps.
 #[test]
 fn the_manifest_has_the_state_that_a_run_reaches() {

@@ -1,26 +1,26 @@
-//! The beginning of a run: how hard its balls first touch their sockets.
+//! Largest contact forces at the beginning of a run.
 
 use jointplay_physics::simulate::{Peak, Simulation};
 
-/// How long is looked at, s.
+/// Simulated time examined, s.
 pub const LENGTH: f64 = 0.05;
-/// Evaluations times ball joints after which it is enough.
+/// Limit on evaluations times ball joints.
 const MOST_EVALUATIONS: u64 = 2_000_000;
 
 /// Largest contact forces of the beginning of a run.
 pub struct Beginning {
-    /// Until when, s: [`LENGTH`], or less where that costs too much or the run stops.
+    /// End of the examined time, s: [`LENGTH`], or less if the limit on work is reached or the run stops.
     pub until: f64,
-    /// Of each ball joint.
+    /// Peaks of the ball joints.
     pub peaks: Vec<Peak>,
 }
 
 impl Beginning {
-    /// Of `simulation`, which is at its start and is run on.
+    /// Examines `simulation`, which must be at its start, and advances it.
     pub fn of(simulation: &mut Simulation) -> Self {
         let joints = simulation.machine().ball_joints.len().max(1) as u64;
         while simulation.time() < LENGTH && simulation.statistics().evaluations < MOST_EVALUATIONS / joints {
-            // Where it stops a run says why.
+            // A run that stops here reports the reason itself.
             if simulation.step_until(LENGTH).is_err() {
                 break;
             }

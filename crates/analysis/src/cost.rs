@@ -1,4 +1,4 @@
-//! What each part of the model costs: the same scene with more and less of it.
+//! Cost of each part of the model: one scene with parts added and removed.
 
 use super::timing::time_to;
 use super::{AnalysisError, RunContext, Setting, WorkBudget};
@@ -18,11 +18,11 @@ const BATCHES: u32 = 40;
 pub struct CostCase {
     /// Built-in scene.
     pub scene: &'static str,
-    /// What differs from the unchanged scene.
+    /// Difference from the unchanged scene.
     pub label: &'static str,
     /// The parameter changes.
     pub changes: &'static [(&'static str, &'static str)],
-    /// Instant at which an evaluation is timed, s: the contacts carry load by then.
+    /// Instant of the timed evaluation, s: the contacts carry load by then.
     loaded: f64,
     /// Simulated time of the run, s.
     pub span: f64,
@@ -36,7 +36,7 @@ const fn chain(label: &'static str, changes: &'static [(&'static str, &'static s
     CostCase { scene: "chain", label, changes, loaded: 2e-3, span: 10e-3 }
 }
 
-/// The variations; the others are compared with the first.
+/// The variations; the first is the baseline.
 const PARTS: [CostCase; 11] = [
     spcmm("3 joints with clearance, with friction, tree", &[]),
     spcmm("the same without the energy ledger", &[("solver.energy_ledger", "off")]),

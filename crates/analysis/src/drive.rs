@@ -9,7 +9,7 @@ use jointplay_scene::Scene;
 /// Why a scene has no sections at a fixed drive phase.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPeriod {
-    /// Nothing that drives it repeats.
+    /// Nothing periodic drives it.
     #[error(
         "the scene `{scene}` has no drive that repeats, nor a tyre's ground, a motor's target or a load, so there is no phase to \
          take sections at"
@@ -33,7 +33,7 @@ pub enum NoPeriod {
     },
 }
 
-/// Common period of all drives, of what force elements follow and of harmonic loads of `scene`, s. Drives at rest do not count.
+/// Common period of all drives, time laws of force elements and harmonic loads of `scene`, s. Drives at rest do not count.
 ///
 /// # Errors
 /// A scene without a common period.
@@ -44,10 +44,10 @@ pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     period.ok_or_else(|| NoPeriod::None { scene: name() })
 }
 
-/// The same of a machine; `None` if nothing repeats.
+/// Common period of a machine, s; `None` if nothing repeats.
 ///
 /// # Errors
-/// Two periods that differ, s.
+/// Two different periods, s.
 pub fn common_period(machine: &Machine) -> Result<Option<f64>, [f64; 2]> {
     let mut period: Option<f64> = None;
     for own in periods_of(machine).filter(|own| own.is_finite()) {
@@ -59,7 +59,7 @@ pub fn common_period(machine: &Machine) -> Result<Option<f64>, [f64; 2]> {
     Ok(period)
 }
 
-/// What a section of a scene records: pose and rates of the output body, named as in the rows of a run.
+/// Observables of a section: pose and rates of the output body, named as in the rows of a run.
 pub const OBSERVABLES: [&str; 12] = [
     "x_m",
     "y_m",
@@ -119,7 +119,7 @@ impl ObservedRun {
     }
 }
 
-/// Why a machine cannot continue.
+/// Why a run cannot start or continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObservedError {
     /// The scene does not start.
@@ -169,7 +169,7 @@ impl Orbit for Simulation {
         self.step_like(other);
     }
 
-    /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
+    /// True only while the same balls touch: otherwise one run is in an impact that the other has not reached or has left.
     fn comparable(&self, twin: &Self) -> bool {
         (0..self.machine().ball_joints.len()).all(|j| self.contact_memory(j).active == twin.contact_memory(j).active)
     }
@@ -185,7 +185,7 @@ impl Orbit for Simulation {
     }
 }
 
-/// As its simulation, with room for what is observed.
+/// Delegates to the simulation; a frame buffer holds the observables.
 impl Orbit for ObservedRun {
     type Stop = ObservedError;
 

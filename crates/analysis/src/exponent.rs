@@ -1,19 +1,19 @@
 //! Largest Lyapunov exponent from two nearby runs with renormalisation.
 //!
-//! Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338. The twin starts at a small separation d0 and is rescaled to
-//! it at every section, and between two of them whenever the separation has grown or shrunk by more than a given factor; the
-//! exponent is the sum of the logarithms of these factors divided by the time. The twin takes the steps of the run, so that the two
-//! differ by their motion, and not by the errors of different steps.
+//! Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338. The twin starts at a small separation d0. It is rescaled to d0 at
+//! every section, and in between whenever the separation has grown or shrunk by more than a given factor; the exponent is the sum
+//! of the logarithms of these factors divided by the time. The twin repeats the steps of the run, so that the two differ by their
+//! motion and not by the errors of different steps.
 
 use super::orbit::Orbit;
 
 /// Between sections the twin is rescaled once its separation has changed by more than this factor.
 const RENORMALISE_AT: f64 = 100.0;
-/// Beyond this multiple of the nominal separation growth is no longer that of a small one.
+/// Beyond this multiple of the nominal separation, growth is no longer that of a small separation.
 const LOST_AT: f64 = 1e5;
 /// A separation lost in rounding counts as this fraction of the nominal one.
 const VANISHED: f64 = 1e-9;
-/// Sections that a twin placed anew runs before its growth counts, so that its offset aligns with the fastest-growing direction.
+/// Sections that a newly placed twin runs before its growth counts, so that its offset aligns with the fastest-growing direction.
 pub const ALIGNMENT: usize = 5;
 /// Blocks for the standard error.
 const BLOCKS: usize = 10;
@@ -32,30 +32,30 @@ pub struct Exponent {
 
 /// Separation of the twin and its history.
 ///
-/// What a small separation grows by says something only where both runs are in the same contacts: while one ball touches and its
-/// twin's does not yet, the difference of their velocities is that before and after an impact, whatever the separation. So growth
-/// is taken, and the twin rescaled, only where [`Orbit::comparable`] holds. A section that ends between two such events is counted
-/// with the next. A twin that is lost meanwhile is placed anew, and what had grown since the latest section counts for nothing.
+/// Growth of a small separation is meaningful only while both runs have the same contacts: while one ball touches and its twin's
+/// does not yet, their velocities differ as before and after an impact, whatever the separation. So growth is measured, and the
+/// twin rescaled, only where [`Orbit::comparable`] holds. A section that ends between two such events is counted with the next. A
+/// twin lost meanwhile is restarted, and growth since the latest counted section is discarded.
 #[derive(Clone, Debug)]
 pub struct Benettin {
     separation: f64,
     interval: f64,
     /// Separation after the latest renormalisation.
     from: f64,
-    /// Logarithm of the growth since the latest section that counted, and how many sections that is.
+    /// Logarithm of the growth since the latest counted section, and the number of sections since then.
     grown: f64,
     open: usize,
-    /// Sections before growth counts again.
+    /// Sections left before growth counts again.
     aligning: usize,
     counting: bool,
-    /// Growth and number of sections of each interval between sections that counted.
+    /// Growth and number of sections of each interval between counted sections.
     parts: Vec<(f64, usize)>,
-    /// Separation of the twin, and its direction when it was last comparable.
+    /// Separation of the twin, and its direction when the two were last comparable.
     difference: Vec<f64>,
 }
 
 impl Benettin {
-    /// For a twin at `separation` (in units of the scales), with at most `sections` sections at every `interval`.
+    /// Estimator for a twin at `separation` (in units of the scales) and at most `sections` sections, `interval` apart.
     pub fn new(separation: f64, interval: f64, sections: usize) -> Self {
         Self {
             separation,
@@ -114,7 +114,7 @@ impl Benettin {
         Ok(())
     }
 
-    /// Counts growth to `off` times the nominal separation, and takes the twin back to that.
+    /// Records growth to `off` times the nominal separation, and rescales the twin to that.
     fn renormalise<O: Orbit>(&mut self, orbit: &O, twin: &mut O, off: f64) {
         let reached = self.separation * if off.is_finite() { off.max(VANISHED) } else { VANISHED };
         self.grown += libm::log(reached / self.from);
@@ -122,18 +122,18 @@ impl Benettin {
             self.difference.clear();
             let pairs = orbit.state().iter().zip(twin.state());
             self.difference.extend(pairs.map(|(a, b)| (b - a) / off));
-            // What a settled contact remembers of its beginning matters no more, and does not fade: it is not made to grow.
+            // The onset history of a settled contact has no effect and does not decay, so it must not be amplified.
             twin.remember_like(orbit, (1.0 - 1.0 / off).max(0.0));
         }
         self.place(orbit, twin);
     }
 
-    /// Takes the twin to the orbit's state displaced by `difference`.
+    /// Moves the twin to the orbit's state displaced by `difference`.
     fn place<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         let states = orbit.state().iter().zip(twin.state());
         let away: Vec<f64> = self.difference.iter().zip(states).map(|(d, (a, b))| d + (a - b)).collect();
         twin.displace(&away);
-        // The requested and the actual separation differ because loops are closed again.
+        // The actual separation differs from the requested one because loops are closed again.
         self.from = distance(orbit, twin).max(VANISHED * self.separation);
     }
 
@@ -156,7 +156,7 @@ impl Benettin {
 
 /// An offset of length `separation` in units of `scales`, in a generic direction.
 pub fn offset(scales: &[f64], separation: f64) -> impl Iterator<Item = f64> {
-    // Weyl sequence: fixed, well spread, and aligned with no coordinate.
+    // Weyl sequence: deterministic, well spread, and aligned with no coordinate.
     let part = |i: usize| (0.618_033_988_749_894_9 * (i + 1) as f64).fract() - 0.5;
     let square: f64 = (0..scales.len()).map(|i| part(i) * part(i)).sum();
     let factor = separation / square.sqrt();

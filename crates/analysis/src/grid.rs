@@ -41,7 +41,7 @@ pub enum RangeError {
         /// What is wrong and what is allowed.
         error: ValueError,
     },
-    /// A parameter with words for values.
+    /// A parameter whose values are words.
     #[error("--vary {text}: {key} is not a number; only numbers can be varied")]
     Words {
         /// As written.
@@ -100,10 +100,10 @@ pub struct ParameterRange {
 }
 
 impl ParameterRange {
-    /// Parses `KEY=A..B:N` for `scene`, and tries both ends in it.
+    /// Parses `KEY=A..B:N` for `scene`, and tries both ends.
     ///
     /// # Errors
-    /// Anything but a range that the scene accepts.
+    /// A text that is not a range accepted by the scene.
     pub fn parse(scene: &Scene, text: &str) -> Result<Self, RangeError> {
         let own = || text.to_owned();
         let parts = || {
@@ -181,7 +181,7 @@ impl ParameterRange {
         }
     }
 
-    /// Whether its values take effect at a reset of `scene` only.
+    /// Whether its values take effect only at a reset of `scene`.
     fn waits(&self, scene: &Scene) -> bool {
         let at = |i| {
             let mut scene = scene.clone();
@@ -209,19 +209,19 @@ impl ParameterRange {
 /// State from which a point starts: [`Self::meaning`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Start {
-    /// Its own.
+    /// The scene's own initial state.
     Cold,
-    /// That of the point with the next lower value at its end.
+    /// Final state of the point with the next lower value.
     FollowUp,
-    /// That of the point with the next higher value at its end.
+    /// Final state of the point with the next higher value.
     FollowDown,
 }
 
 impl Start {
-    /// All of them, in the order of the help.
+    /// All variants, in the order of the help.
     pub const ALL: [Self; 3] = [Self::Cold, Self::FollowUp, Self::FollowDown];
 
-    /// What it means, for the help of the command line.
+    /// Description for the help of the command line.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Cold => "From the scene's own initial state",
@@ -248,7 +248,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The points of `axes`.
+    /// A grid over `axes`.
     ///
     /// # Errors
     /// No axis, more than two, a repeated key, too many points, or a followed parameter that changes only on reset.
@@ -330,7 +330,7 @@ impl Grid {
         Ok(scene)
     }
 
-    /// Number of blocks. A block is computed in one go, whatever the threads and shards.
+    /// Number of blocks. A block is computed in one piece, independently of threads and shards.
     pub fn blocks(&self) -> usize {
         self.rows() * self.blocks_per_row()
     }

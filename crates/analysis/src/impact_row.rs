@@ -1,4 +1,4 @@
-//! An impact as a row of a table: the columns of `run --impacts`, and of the file that the window saves.
+//! An impact as a row of a table: the columns of `run --impacts`, and of the file saved from the window.
 
 use jointplay_physics::simulate::Impact;
 

@@ -17,7 +17,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// The number in files.
+    /// Status code in files.
     pub fn code(self) -> i64 {
         match self {
             Self::Done => 0,
@@ -34,7 +34,7 @@ pub struct Column {
     pub name: String,
     /// Whether its values are whole numbers.
     pub whole: bool,
-    /// Whether a point has one value for each kept section instead of one.
+    /// Whether a point has one value per kept section instead of a single one.
     pub per_section: bool,
 }
 
@@ -81,7 +81,7 @@ const JOINT: [OfJoint; 6] = [
     ("last_separation_s", false, |joint| joint.last_separation.unwrap_or(f64::NAN)),
 ];
 
-/// A value that only a point that reached its end has.
+/// A value defined only for points that reached their end.
 fn known(status: Status, value: f64) -> f64 {
     if status == Status::Done { value } else { f64::NAN }
 }

@@ -1,11 +1,11 @@
-//! Results computed from whole runs. Starts no threads, and its clock comes from outside ([`RunContext`]).
+//! Results computed from whole runs. The crate starts no threads, and the caller supplies its clock ([`RunContext`]).
 //!
-//! - Sweeps: [`grid`] says which values, [`sweep`] runs them, [`point`] what is recorded of each; [`sweep_task`] and [`task`] are the
+//! - Sweeps: [`grid`] defines the values, [`sweep`] runs them, [`point`] records the results; [`sweep_task`] and [`task`] are the
 //!   same as plain data for a thread or a worker.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`speed`], [`presets`], [`model_costs`].
-//! - The paper's section 4 ([`paper`], [`reproduction`]), responses beside the ideal motion ([`response`]), and cases with known
-//!   answers ([`validation`]).
+//! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
+//!   known answers ([`validation`]).
 //!
 //! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
 //!

@@ -1,4 +1,4 @@
-//! Speed goals of machines with many loose joints, at the loosest tolerance that has the peaks of the first impacts.
+//! Speed goals of machines with many loose joints, at the loosest tolerance that reproduces the peaks of the first impacts.
 
 use super::timing::time_to;
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
@@ -6,7 +6,7 @@ use jointplay_scene::Scene;
 
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-9;
-/// Tolerances tried, from the loosest that raises no doubt; and the relative error of the peaks that is good enough.
+/// Tolerances tried, from the loosest that raises no doubt; and the acceptable relative error of the peaks.
 const TOLERANCES: [f64; 13] = [1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6, 5e-7, 2e-7, 1e-7];
 const ALLOWED: f64 = 0.01;
 const BUDGET: WorkBudget = WorkBudget { measured: 0.1, ..WorkBudget::REFERENCE };
@@ -34,26 +34,26 @@ const fn goal(
     SpeedGoal { label, scene, changes, span, asked }
 }
 
-/// All of them.
+/// All speed goals.
 pub const SPEED_GOALS: [SpeedGoal; 7] = [
     goal("chain of 8", "chain", &[("chain.links", "8")], 0.1, 5.0),
     goal("chain of 32", "chain", &[("chain.links", "32")], 0.1, 1.0),
     goal("hexapod, 12 loose", "hexapod", &[], 1.0, 12.0),
     goal("hexapod, 1 loose", "hexapod", &[("contact.clearance", "0"), ("joint.A6.clearance", "0.1 mm")], 1.0, 40.0),
-    // The rods held by nothing but their balls.
+    // The rods are held by their balls alone.
     goal("delta, 12 loose", "delta", &[("parameter.grip", "0.001 N")], 0.5, 6.0),
     goal("four-bar, 2 loose", "four-bar", &[], 1.0, 120.0),
     goal("suspension, 4 loose", "suspension", &[], 1.0, 40.0),
 ];
 
-/// Links of two chains whose costs per link and simulated second are compared, the span in s, and the ratio allowed.
+/// Numbers of links of two chains whose costs per link and simulated second are compared, the span in s, and the allowed ratio.
 pub const GROWTH: ([u32; 2], f64, f64) = ([32, 256], 10e-3, 1.5);
 
 impl SpeedGoal {
-    /// The machine.
+    /// Loads the machine.
     ///
     /// # Errors
-    /// None but a mistake in the machine's text or the changes.
+    /// Only a mistake in the machine's text or the changes.
     pub fn load(&self) -> Result<Scene, AnalysisError> {
         let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
         let changes: Vec<_> = self.changes.iter().map(owned).collect();
@@ -66,9 +66,9 @@ impl SpeedGoal {
 pub struct Speed {
     /// The machine.
     pub goal: SpeedGoal,
-    /// The loosest tolerance with good peaks; the tightest tried where none has them.
+    /// The loosest tolerance with good peaks; the tightest one tried if none has them.
     pub tolerance: f64,
-    /// Largest relative error of the first peaks with it; `None` where the run did not get that far.
+    /// Largest relative error of the first peaks at that tolerance; `None` if the run did not get that far.
     pub error: Option<f64>,
     /// Simulated seconds per clock second.
     pub speed: f64,
@@ -81,7 +81,7 @@ impl Speed {
     }
 }
 
-/// Speed of the automatic choice in one machine.
+/// Measures the speed of the automatic selection of methods on one machine.
 ///
 /// # Errors
 /// As [`super::work_precision`].

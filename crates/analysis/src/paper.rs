@@ -1,4 +1,4 @@
-//! What Sheng & Chen show, print and say in sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that
+//! Figures, numbers and statements of Sheng & Chen, sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that
 //! it names. Nothing is tuned to match; the paper omits one dimension and contradicts itself in places.
 
 #![allow(missing_docs, reason = "the table explains its keys")]
@@ -67,12 +67,12 @@ impl Series {
         self.row().runs
     }
 
-    /// A value of its parameter as legends and tables name it.
+    /// Label of a parameter value in legends and tables.
     pub fn name(self, value: impl std::fmt::Display) -> String {
         self.row().value.replace("{}", &value.to_string())
     }
 
-    /// What distinguishes a run from the others of the series.
+    /// Label of a run among the others of the series.
     pub fn run_name(self, case: Case) -> String {
         self.name(self.of(case))
     }
@@ -85,7 +85,7 @@ impl Series {
         }
     }
 
-    /// `count` values between two ends, as `sweep --vary` takes them.
+    /// `count` values between two ends, in the syntax of `sweep --vary`.
     pub fn vary(self, [from, to]: [f64; 2], count: usize) -> String {
         let SeriesRow { key, unit, .. } = self.row();
         format!("{key}={from}{unit}..{to}{unit}:{count}")
@@ -113,7 +113,7 @@ pub struct Variant {
     pub changes: Vec<(String, String)>,
 }
 
-/// What the paper's runs are computed with.
+/// Variants of the model in which the paper's runs are computed.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Variants {
@@ -200,7 +200,7 @@ pub struct Verification {
     pub commercial: f64,
 }
 
-/// What a figure shows. Columns are named as in [`super::reproduction::COLUMNS`].
+/// Content of a figure. Columns are named as in [`super::reproduction::COLUMNS`].
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Shows {
@@ -256,7 +256,7 @@ pub struct Section {
     pub figures: Vec<Figure>,
 }
 
-/// What must hold here for a statement to count as confirmed; [`super::reproduction::Findings::statements`] has the criterion of each.
+/// Test that confirms a statement; [`super::reproduction::Findings::statements`] has the criterion of each.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Test {

@@ -1,4 +1,4 @@
-//! One point of a sweep: a scene run through its periods, and what is recorded of it.
+//! One point of a sweep: the run of a scene through its periods, and the recorded results.
 
 use super::drive::{OBSERVABLES, ObservedError, ObservedRun};
 use super::orbit::Orbit;
@@ -10,20 +10,20 @@ use jointplay_scene::Scene;
 
 /// Largest number of samples per period for the means and the tip error.
 const SAMPLES: f64 = 400.0;
-/// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: at a tolerance of 1e-6 10 nm
-/// in a machine with balls of 10 mm. So small that the two part only where one grazes, and well above what two runs differ by that
-/// take the same steps: the last iteration of an implicit step.
+/// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: 10 nm at a tolerance of
+/// 1e-6 in a machine with balls of 10 mm. It is so small that the twins part only at a grazing contact, and well above the
+/// difference between runs with the same steps, which comes from the last iteration of an implicit step.
 const OVER_TOLERANCE: f64 = 1.0;
 const SEPARATIONS: (f64, f64) = (1e-6, 1e-5);
-/// Loosest tolerance at which a run keeps so near the motion of its scene that they have the same exponent.
+/// Loosest tolerance at which a run stays close enough to the motion of its scene to have the same exponent.
 pub const LOOSEST_FOR_EXPONENT: f64 = 1e-5;
-/// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and
-/// a stiff contact turns coordinate errors into larger rate errors.
+/// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and a stiff
+/// contact turns coordinate errors into larger rate errors.
 const RESOLUTION: [f64; 2] = [10.0, 100.0];
-/// Used as the tolerance of a fixed-step method.
+/// Substitute for the tolerance of a fixed-step method.
 const FIXED_STEP: f64 = 1e-5;
 
-/// How long a point runs and where its sections lie.
+/// Run length and section phase of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Drive periods, including those discarded.
@@ -67,9 +67,10 @@ pub struct PointResult {
     pub regime: Regime,
     /// Evidence for the regime.
     pub evidence: Evidence,
-    /// Reasons not to trust it: bit k for one of the kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
+    /// Reasons for distrust: bit k is set for kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
     pub doubts: u32,
-    /// Unaccounted energy over what the machine held and lost, since the run's start; NaN without a ledger.
+    /// Unaccounted energy since the start of the run, relative to the energy that the machine held and lost; NaN without a
+    /// ledger.
     pub residual: f64,
     /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
     pub sections: Vec<f64>,
@@ -100,7 +101,7 @@ impl PointRun {
         Ok(Self::begin(ObservedRun::new(scene)?, plan, period, part * period))
     }
 
-    /// Continues from the latest section of another point as `machine`; `None` if a running simulation cannot become that.
+    /// Continues from the latest section of another point as `machine`; `None` if a running simulation cannot change to that.
     pub fn follow(mut run: ObservedRun, machine: &Machine, plan: Plan, period: f64) -> Option<Self> {
         if run.simulation_mut().adopt(machine) != Ok(Effect::Now) {
             return None;
@@ -189,7 +190,7 @@ impl PointRun {
         Ok(())
     }
 
-    /// Ends the transient and starts keeping.
+    /// Ends the transient and starts recording.
     fn begin_keeping(&mut self) {
         let machine = self.watch.orbit_mut();
         let simulation = machine.simulation_mut();
@@ -201,7 +202,7 @@ impl PointRun {
         self.means.begin(machine);
     }
 
-    /// The result, and the scene in the state of the latest section for the next point to follow.
+    /// The result, and the scene in the state of its latest section, from which the next point can continue.
     pub fn finish(mut self) -> (PointResult, ObservedRun) {
         let simulation = self.watch.orbit_mut().simulation_mut();
         simulation.take_peaks(&mut self.peaks);
@@ -240,7 +241,7 @@ impl PointRun {
 }
 
 impl PointResult {
-    /// A result in which nothing is known.
+    /// A result without known values.
     pub fn empty(joints: usize) -> Self {
         let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
         let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
@@ -250,7 +251,7 @@ impl PointResult {
     }
 }
 
-/// Relative tolerance that the errors of a run are like.
+/// Relative tolerance that represents the errors of a run.
 fn tolerance_of(solver: &Solver) -> f64 {
     if solver.method.is_adaptive() { solver.tolerance } else { FIXED_STEP }
 }
@@ -260,7 +261,7 @@ fn separation(tolerance: f64) -> f64 {
     (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1)
 }
 
-/// The same of the twin of a run of `machine`.
+/// The same for the twin of a run of `machine`.
 pub fn separation_of(machine: &Machine) -> f64 {
     separation(tolerance_of(&machine.solver))
 }
@@ -308,7 +309,7 @@ impl Means {
         self.take(machine, 0.0);
     }
 
-    /// Takes a sample if the latest one is old enough.
+    /// Takes a sample if the latest one is old enough, or at a section.
     fn look(&mut self, machine: &mut ObservedRun, at_section: bool) {
         let ago = machine.time() - self.latest;
         if ago >= self.least || (at_section && ago > 0.0) {
@@ -326,7 +327,7 @@ impl Means {
             *sum += 0.5 * h * (*now + force);
             *now = force;
         }
-        // If the ideal motion ends on the way, there is no mean over the whole span.
+        // If the ideal motion ends early, there is no mean over the whole span.
         self.probe_lost |= frame.probe_error.is_none();
         if let Some(error) = frame.probe_error.filter(|_| !self.probe_lost) {
             let size = error.norm();

@@ -1,5 +1,4 @@
-//! Presets as measured points: cost and error, for the built-in scenes as measured once and stored in the program, and
-//! for any scene on request.
+//! Measured cost and error of the presets: stored in the program for the built-in scenes, computed on request for any scene.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -12,7 +11,7 @@ use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBu
 use jointplay_physics::machine::Preset;
 use jointplay_scene::Scene;
 
-/// What `jointplay tradeoff --all --write` measured.
+/// Results of `jointplay tradeoff --all --write`.
 const RECORD: &str = include_str!("../../../assets/presets.json");
 
 /// A preset measured on one scene.
@@ -31,7 +30,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// The part of a point that is kept.
+    /// The stored values of a point.
     pub fn of(point: &Point) -> Self {
         Self {
             peak_error: point.errors.peak,
@@ -52,14 +51,14 @@ pub struct Record {
     pub points: BTreeMap<String, (String, f64)>,
     /// By scene, then by preset.
     pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
-    /// By scene: simulated seconds per clock second of the preset `real-time`, as by [`pace`].
+    /// By scene: simulated seconds per clock second of the preset `real-time`, as measured by [`pace`].
     pub pace: BTreeMap<String, f64>,
 }
 
 /// Span over which the preset `real-time` is measured, s.
 const PACED: f64 = 1.0;
 
-/// A scene that the preset `real-time`, asked for, did not keep up with when it was measured.
+/// A scene that requests the preset `real-time` but ran slower than real time when measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "solver.preset real-time does not keep up with {scene}: its first second, with the values it comes with, ran at {pace:.2} times \
@@ -74,7 +73,7 @@ pub struct TooSlow {
     pub machine: &'static str,
 }
 
-/// Whether `scene` is a built-in one that asks for the preset `real-time` and was slower than that when it was measured.
+/// Returns the measurement of a built-in `scene` that requests the preset `real-time` but ran slower than real time.
 pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
     let (method, _, tolerance) = Preset::RealTime.point();
@@ -121,8 +120,8 @@ pub fn limit(preset: Preset) -> f64 {
     }
 }
 
-/// The best setting within a limit: of those whose peak-force error is at most `limit` on every scene of `found`, the one
-/// with the largest product of speed ratios, over the impacts and in settled motion of every scene.
+/// The best setting within a limit: among those whose peak-force error is at most `limit` on every scene of `found`, the one with
+/// the largest product of speed ratios over the impacts and the settled motion of every scene.
 pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
     let candidates = found.first()?.points.iter().map(|point| point.setting);
     let worth = |setting: &Setting| {
@@ -145,7 +144,7 @@ pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
         .map(|(setting, _)| setting)
 }
 
-/// Measures `presets` on `scene` as it is now, within seconds; results in the same order.
+/// Measures `presets` on `scene` in its current form, within seconds; results in the same order.
 ///
 /// # Errors
 /// As [`super::work_precision`].
@@ -187,7 +186,7 @@ mod tests {
             if let Some(said) = said {
                 assert!(said.to_string().contains(name), "{said}");
             }
-            // Not asked for, or not what was measured.
+            // The preset is not requested, or its values are overridden.
             assert_eq!(slow(name, &[]), None);
             assert_eq!(slow(name, &[ASKED, ("solver.tolerance", "1e-4")]), None);
         }

@@ -1,4 +1,4 @@
-//! Speed goals of the program: three spans of the default scene, each with the speed required of it.
+//! Speed goals of the program: three spans of the default scene, each with its required speed.
 
 use super::reference_solution::{MeanForces, done};
 use super::timing::{advance_capped, time_to};
@@ -6,11 +6,11 @@ use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
 
-/// Tolerance of the automatic pair that is to reach them.
+/// Tolerance of the automatic selection that must reach them.
 const TOLERANCE: f64 = 1e-5;
 /// Tolerance of the reference run for the settled forces.
 const CONVERGED: f64 = 1e-10;
-/// Allowed relative error, where there is one.
+/// Allowed relative error of goals that have one.
 const ALLOWED: f64 = 0.01;
 /// Number of instants over which settled forces are averaged.
 const SAMPLES: u32 = 3000;
@@ -39,7 +39,7 @@ impl Goal {
         }
     }
 
-    /// What its error measures.
+    /// Quantity whose error is measured.
     pub fn error_of(self) -> &'static str {
         match self {
             Self::FirstSecond => "peaks of the first six impacts",
@@ -75,8 +75,8 @@ pub struct GoalResult {
     pub setting: Setting,
     /// Simulated seconds per clock second.
     pub speed: f64,
-    /// Speed of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved, so that the stepper
-    /// does not matter.
+    /// Speed of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved and the stepper does not
+    /// matter.
     pub baseline: Option<f64>,
     /// Relative error; `None` where nothing is approximated.
     pub error: Option<f64>,
@@ -117,7 +117,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult
         let seconds = time_to(to, &budget, context, |_| Ok(Simulation::of(&start)))?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
-    // Timed before and after the baseline, so that a load that sets in between slows both.
+    // Timed before and after the baseline, so that load setting in meanwhile slows both.
     let first = speed(&setting, &mut context.part(0, 4))?;
     let baseline = if integrates { Some(speed(&baseline, &mut context.part(1, 4))?) } else { None };
     let second = speed(&setting, &mut context.part(2, 4))?;

@@ -1,4 +1,4 @@
-//! Sweeps that are ready to run: one click of the chaos bench, and each says beforehand what it will show.
+//! Ready-made sweeps for the chaos bench; each states beforehand what it will show.
 
 use super::grid::Start;
 use super::source::SceneSource;
@@ -8,37 +8,37 @@ use jointplay_scene::{Scene, SceneError};
 /// A sweep over a built-in scene.
 #[derive(Debug, PartialEq, Eq)]
 pub struct ReadySweep {
-    /// What the button says.
+    /// Label of the button.
     pub name: &'static str,
-    /// What its diagram will show, in a sentence (`tests/physics/ready_sweeps.rs`).
+    /// Expected result in one sentence (`tests/physics/ready_sweeps.rs`).
     pub shows: &'static str,
     /// The built-in scene.
     pub scene: &'static str,
-    /// What is changed in it.
+    /// Parameter changes.
     pub changes: &'static [(&'static str, &'static str)],
     /// The varied parameter.
     pub key: &'static str,
-    /// Its first and its last value, with their unit.
+    /// First and last value, with their unit.
     pub from: &'static str,
     #[allow(missing_docs)]
     pub to: &'static str,
     /// Number of values.
     pub values: usize,
-    /// Drive periods per value, including those discarded; forty kept ones tell chaos without an exponent.
+    /// Drive periods per value, including those discarded; forty kept periods reveal chaos without an exponent.
     pub periods: usize,
-    /// Of these, the transient.
+    /// Discarded transient periods.
     pub discard: usize,
 }
 
-/// All of them.
+/// All ready-made sweeps.
 pub const READY: [ReadySweep; 3] = [
     ReadySweep {
         name: "Road to chaos",
         shows: "The four-bar, its crank at 21 to 45 rad/s: every turn is alike until the balls knock, at 24. From there on chaos, but \
                 for two regular windows: at 27 every turn is alike again, at 29 every second one.",
         scene: "four-bar",
-        // The members of `automatic` err by different parts of the tolerance: with it the exponent of a regular motion is known
-        // to a third of 1/s only.
+        // The schemes of `automatic` have different errors, which leaves the exponent of a regular motion uncertain to a third of
+        // 1/s.
         changes: &[("solver.method", "radau5")],
         key: "parameter.speed",
         from: "21 rad/s",
@@ -74,7 +74,7 @@ pub const READY: [ReadySweep; 3] = [
 ];
 
 impl ReadySweep {
-    /// Its scene.
+    /// Loads its scene.
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -84,7 +84,7 @@ impl ReadySweep {
         Scene::load(self.scene, &changes)
     }
 
-    /// The sweep over `scene`, with its sections at the start of the drive period.
+    /// The sweep over `scene`, with sections at the start of the drive period.
     pub fn task(&self, scene: &Scene) -> SweepTask {
         let Self { key, from, to, values, .. } = self;
         SweepTask {

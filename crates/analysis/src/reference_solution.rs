@@ -1,5 +1,5 @@
-//! The reference that every run of a scene is measured against: the peaks of its first impacts, the position of its
-//! output body at the third, the mean contact forces once it has settled; and how much a tighter run still changes these.
+//! The reference for every run of a scene: the peaks of its first impacts, the position of its output body at the third, and the
+//! mean contact forces once it has settled, with the change of these values in a tighter run.
 //!
 //! The motion is sensitive: after some tens of impacts two good runs have diverged. So the first impacts are compared one
 //! by one, each within a time slot set by the reference, and settled motion starts from the same state for every method.
@@ -19,11 +19,11 @@ const POSITION_AT: usize = 3;
 /// Simulated time within which the impacts must occur, s; and the span compared in a scene without any, s.
 const IMPACTS_WITHIN: f64 = 0.5;
 const WITHOUT_IMPACTS: f64 = 0.1;
-/// A contact that lasts longer than this counts as ended, s: an impact takes 0.1 ms.
+/// A longer contact counts as ended after this time, s: an impact takes 0.1 ms.
 const LONG_CONTACT: f64 = 5e-3;
 /// Extra time run after the last impact, s.
 const AFTERWARDS: f64 = 0.1e-3;
-/// Contacts that have all been closed for this long have settled, s; and the time within which they must, s.
+/// Contacts that have all been closed for this long have settled, s; and the time limit for settling, s.
 const QUIET: f64 = 0.15;
 const SETTLED_WITHIN: f64 = 1.2;
 /// Tolerance of the run that settles a scene: all methods start from its final state.
@@ -119,7 +119,7 @@ struct Contact {
 }
 
 impl Contact {
-    /// Its end, or the time after which it counts as ended for its length; `None` while neither is known at `now`.
+    /// End of the contact, or the time after which it counts as ended; `None` while neither is known at `now`.
     fn over(&self, now: f64) -> Option<f64> {
         let long = self.begin + LONG_CONTACT;
         self.end.filter(|end| *end <= long).or((now >= long).then_some(long))
@@ -143,7 +143,7 @@ impl ReferenceSolution {
         Ok(reference)
     }
 
-    /// The first impacts alone, with the explicit pair at `tolerance`: nothing of settled motion, and no floor.
+    /// The first impacts alone, with the explicit pair at `tolerance`: no settled motion and no floor.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -408,7 +408,7 @@ impl MeanForces {
     }
 }
 
-/// The reference must reach its end; the error says why it did not.
+/// Requires that the reference reached its end; the error states why it did not.
 pub(super) fn done(end: End) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
@@ -454,18 +454,18 @@ fn first_contacts(
         contacts.len() >= IMPACTS && contacts[..IMPACTS].iter().all(over)
     })?;
     match end {
-        // A large scene may be capped before its sixth impact: those until then are compared.
+        // A large scene may be capped before its sixth impact: the impacts until then are compared.
         End::Capped if !contacts.is_empty() => {}
         end => done(end)?,
     }
     let last = simulation.time();
-    // A contact that has not ended by then cannot be compared to its end.
+    // Only contacts that have ended by then can be compared to their end.
     let over = |contact: &&Contact| contact.over(last).is_some_and(|end| end + AFTERWARDS <= last);
     let compared = contacts.iter().take(IMPACTS).take_while(over).count();
     Ok((contacts, compared))
 }
 
-/// The state in which every joint with clearance has been in contact, without a new impact, for a while.
+/// The state in which every joint with clearance has been in contact for a while without a new impact.
 fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<(Snapshot, f64)>, AnalysisError> {
     let setting = Setting::automatic(SETTLING);
     let mut simulation = setting.start(scene)?;

@@ -1,10 +1,10 @@
 //! Classification of a motion from its sections, with the evidence.
 //!
-//! In this order: sections that return to themselves within the resolution are periodic, unless an exponent clearly above 0
-//! contradicts them, which makes them unclear; otherwise an exponent clearly above 0 is chaos, unless the 0-1 test clearly says that
-//! the motion is regular; one clearly below 0 a cycle if the sections stay near one, else an unfinished transient, and one
-//! indistinguishable from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still converge to a cycle.
-//! Anything else is unclear.
+//! The rules, in order: sections that return to themselves within the resolution are periodic, or unclear if an exponent clearly
+//! above 0 contradicts them. Otherwise an exponent clearly above 0 means chaos, or an unclear motion if the 0-1 test clearly
+//! indicates a regular one. An exponent clearly below 0 means a cycle if the sections stay near one, else an unfinished
+//! transient. An exponent indistinguishable from 0 with a regular 0-1 test is quasi-periodic, unless the sections still converge
+//! to a cycle. Anything else is unclear.
 
 use super::exponent::Exponent;
 
@@ -24,10 +24,10 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Every regime in the order of its code; what is periodic has period 1.
+    /// Every regime in the order of its code; the periodic one has period 1.
     pub const ALL: [Self; 5] = [Self::Unclear, Self::Periodic(1), Self::QuasiPeriodic, Self::Chaotic, Self::NotSettled];
 
-    /// Its word for people and files.
+    /// Name for users and files.
     pub fn word(self) -> &'static str {
         match self {
             Self::Unclear => "unclear",
@@ -49,7 +49,7 @@ impl Regime {
         }
     }
 
-    /// The regime with this code in files, and with this period if it has one; `None` for a point that did not reach its end.
+    /// The regime for a code in files and, if periodic, a period; `None` for a point that did not reach its end.
     pub fn of_code(code: i64, period: usize) -> Option<Self> {
         let found = Self::ALL.into_iter().find(|regime| regime.code() == code);
         found.map(|regime| match regime {
@@ -68,7 +68,7 @@ impl Regime {
 }
 
 impl std::fmt::Display for Regime {
-    /// Its word, and its period if it has one.
+    /// Writes its name, with the period if it has one.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.word())?;
         match self {
@@ -86,27 +86,27 @@ pub struct Evidence {
     /// Largest distance between two of these sections that should coincide, in units of the resolution: for the period
     /// found, or for period 1 without one.
     pub return_distance: f64,
-    /// Number of sections that the resolution tells apart.
+    /// Number of sections distinguishable at the resolution.
     pub distinct: usize,
     /// Median correlation of the 0-1 test, near 0 for regular motion and near 1 for chaos; NaN for fewer than 40 sections.
     pub zero_one: f64,
-    /// Magnitude below which an exponent may still be zero: a separation that grows linearly in time would show ln(n) / n
-    /// intervals; 1/s.
+    /// Magnitude below which an exponent may still be zero, 1/s: a separation that grows linearly in time would show ln(n) over n
+    /// intervals.
     pub exponent_bound: f64,
     /// Largest Lyapunov exponent, if a twin was run.
     pub exponent: Option<Exponent>,
 }
 
-/// Fewer sections than this allow no verdict.
+/// Fewest sections that allow a verdict.
 pub const FEWEST: usize = 8;
 /// At least this many sections are examined, if there are that many.
 const LOOKED_AT: usize = 32;
-/// Resolutions within which sections repeat that attract one another for all the errors of their steps.
+/// Largest spread, in resolutions, of the sections of an attracting cycle despite the errors of its steps.
 const NEARBY: f64 = 100.0;
-/// How often such a cycle must be seen, and how far its places may move, as a fraction of their extent: errors come and go.
+/// How often such a cycle must occur, and how far its points may drift as a fraction of their extent: errors come and go.
 const SEEN: usize = 8;
 const DRIFT: f64 = 0.3;
-/// A period must be seen this many times.
+/// Number of times that a period must occur.
 const RETURNS: usize = 3;
 /// Sections whose spread falls below this fraction of their earlier spread are converging to a cycle.
 const CLOSING: f64 = 0.7;
@@ -134,7 +134,7 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
     let regime = match judge(period, &evidence) {
         // Close to a bifurcation a cycle attracts so weakly that its exponent is indistinguishable from 0.
         Regime::QuasiPeriodic if still_closing(used, resolution) => Regime::NotSettled,
-        // Errors of the steps keep a cycle that attracts from returning within the resolution, but not from staying near.
+        // Step errors keep the sections of an attracting cycle from returning within the resolution, but not from staying near.
         Regime::NotSettled if !still_closing(used, resolution) => {
             let stays = |n: &usize| {
                 let spread = spread(used, *n, resolution);
@@ -148,7 +148,7 @@ pub fn classify(sections: &[f64], resolution: &[f64], interval: f64, exponent: O
     (regime, evidence)
 }
 
-/// Whether the sections of the best-fitting period keep approaching each other.
+/// Whether the sections of the best-fitting period continue to approach each other.
 fn still_closing(sections: &[&[f64]], resolution: &[f64]) -> bool {
     let (first, second) = sections.split_at(sections.len() / 2);
     let by_spread = |&a: &usize, &b: &usize| {
@@ -166,7 +166,7 @@ fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
     let regular = evidence.zero_one < 0.5;
     let diverges = |e: &Exponent| e.value - 2.0 * e.standard_error > evidence.exponent_bound;
     if let Some(n) = period {
-        // Sections say that it repeats, and the twin that it could not: one of them is wrong.
+        // The sections indicate a repetition that the twin excludes: one of them is wrong.
         let contradicted = evidence.exponent.as_ref().is_some_and(diverges);
         return if contradicted { Regime::Unclear } else { Regime::Periodic(n) };
     }
@@ -179,7 +179,7 @@ fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
     };
     let (bound, doubt) = (evidence.exponent_bound, 2.0 * exponent.standard_error);
     if diverges(exponent) {
-        // Neighbours part, and the sections wander about as those of a regular motion do: one of them is wrong.
+        // Neighbours diverge, yet the sections wander like those of a regular motion: one of them is wrong.
         if evidence.zero_one < REGULAR { Regime::Unclear } else { Regime::Chaotic }
     } else if exponent.value + doubt < -bound {
         Regime::NotSettled
@@ -206,7 +206,7 @@ fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     largest
 }
 
-/// How far the sections that would coincide if the motion repeated after `n` move from their first half to their second, in
+/// Movement, from the first half to the second, of the sections that would coincide if the motion repeated after `n`, in
 /// resolutions.
 fn drift(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     let mut largest: f64 = 0.0;
@@ -221,7 +221,7 @@ fn drift(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     largest
 }
 
-/// Number of sections of which no two are within the resolution of each other, selected greedily.
+/// Number of mutually distinguishable sections, selected greedily.
 fn distinct(sections: &[&[f64]], resolution: &[f64]) -> usize {
     let mut kept: Vec<&[f64]> = Vec::new();
     for section in sections {

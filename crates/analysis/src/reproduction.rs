@@ -1,4 +1,4 @@
-//! All computations for section 4 of the paper, as jobs that any number of threads may run in any order, and their results.
+//! All computations for section 4 of the paper, as jobs that any number of threads can run in any order, and their results.
 
 mod findings;
 mod record;
@@ -54,7 +54,7 @@ impl Extent {
 pub struct RunError {
     /// Its name in files.
     pub name: String,
-    /// Why.
+    /// Reason.
     pub error: Box<ResponseError>,
 }
 
@@ -72,7 +72,7 @@ struct PlannedRun {
     name: String,
     case: Case,
     scene: Scene,
-    /// Whether its settled motion is taken, too.
+    /// Whether its settled motion is recorded as well.
     settles: bool,
 }
 
@@ -121,7 +121,7 @@ impl Agenda {
     /// All jobs of a report.
     ///
     /// # Panics
-    /// If the table of the paper, or `extent`, gives a run or a sweep that cannot be.
+    /// If the table of the paper, or `extent`, describes an invalid run or sweep.
     pub fn new(extent: Extent) -> Self {
         let over = |series: Series, count: usize| series.vary(series.row().range, count);
         let [c, f] = Series::ALL.map(|series| [over(series, extent.values[series as usize])]);
@@ -155,7 +155,7 @@ impl Agenda {
             sweeps.push(sweep_data(variant, &rows[0]));
         }
         runs.push(planned(&variants.corrected, "ideal", nominal, &[("contact.clearance", "0")]));
-        // Blocks take longest and come first, so that no thread is left with one at the end.
+        // Blocks take longest and come first, so that no thread is left running one at the end.
         let blocks =
             |(s, data): (usize, &SweepData)| (0..data.sweep.grid().blocks()).map(move |b| ReportJob::Block(s, b));
         let jobs = sweeps.iter().enumerate().flat_map(blocks).chain((0..runs.len()).map(ReportJob::Run)).collect();
@@ -194,7 +194,7 @@ impl Agenda {
         PAPER.period * periods as f64
     }
 
-    /// Runs job `job`; `go_on` receives how much of [`Self::length`] is done and returns false to cancel.
+    /// Runs job `job`; `go_on` receives the completed part of [`Self::length`] and returns false to cancel.
     ///
     /// # Errors
     /// A run stopped by the divergence guard; cancellation by `go_on`. Points of a sweep that diverge are no error.
@@ -253,7 +253,7 @@ impl Agenda {
     }
 }
 
-/// A run of section 4.2, and its settled motion if that is taken.
+/// Records a run of section 4.2, with its settled motion if requested.
 fn record(run: &PlannedRun, settle: usize, mut go_on: impl FnMut(f64) -> bool) -> Result<RecordedRun, ResponseError> {
     let mut rows = Vec::new();
     let observe = |look: &Observation| rows.push(COLUMNS.map(|column| (column.of)(look)));
@@ -262,7 +262,7 @@ fn record(run: &PlannedRun, settle: usize, mut go_on: impl FnMut(f64) -> bool) -
     Ok(RecordedRun { name: run.name.clone(), case: run.case, response, rows, settled: settled.transpose()? })
 }
 
-/// The period after `settle` periods and the next one, at equal phases.
+/// Settled motion over the period after `settle` periods and the next one, at equal phases.
 fn settled(scene: &Scene, settle: usize, mut go_on: impl FnMut(f64) -> bool) -> Result<SettledCurve, ResponseError> {
     let mut simulation = Simulation::new(&scene.machine)?;
     let mut frame = Frame::default();

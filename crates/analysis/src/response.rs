@@ -1,4 +1,4 @@
-//! Response of a mechanism beside its ideal motion: what Sheng & Chen show in section 4.2, Figures 5 to 17.
+//! Response of a mechanism compared with its ideal motion, as in section 4.2, Figures 5 to 17 of Sheng & Chen.
 
 use jointplay_physics::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 use jointplay_scene::{Scene, SceneError};
@@ -59,7 +59,7 @@ pub(super) fn derivatives(pose: &Pose) -> [[f64; COORDINATES]; 3] {
     ]
 }
 
-/// Coordinates less those of the ideal motion; angles the short way round.
+/// Coordinates less those of the ideal motion; differences of angles are wrapped.
 fn deviation(pose: &Pose, ideal: &Pose) -> [f64; COORDINATES] {
     let ([is, ..], [should, ..]) = (derivatives(pose), derivatives(ideal));
     let turn = std::f64::consts::TAU;
@@ -101,7 +101,7 @@ pub enum ResponseError {
     Cancelled,
 }
 
-/// The same scene with every ball joint ideal; `None` if it cannot move then.
+/// The same scene with every ball joint ideal; `None` if it then cannot move.
 fn ideal_of(scene: &Scene) -> Option<Simulation> {
     let mut ideal = scene.clone();
     ideal.set("contact.clearance", "0").ok()?;
@@ -119,7 +119,7 @@ struct Ideal {
 }
 
 impl Ideal {
-    /// The pose at `time`, which must not precede the last requested time; `None` where there is none.
+    /// Pose at `time`, which must not precede the latest request; `None` without an ideal motion.
     fn at(&mut self, time: f64) -> Option<&Pose> {
         let simulation = self.simulation.as_mut()?;
         if simulation.advance_to(time).is_err() {
@@ -179,7 +179,7 @@ pub fn respond(
     let mut next_sample = 0_u64;
     loop {
         let (start, end) = (simulation.step_start(), simulation.time());
-        // Examined instants and samples of the step, in order of time: the ideal motion only goes forward.
+        // Examined instants and samples of the step, in order of time: the ideal motion cannot go back.
         let mut look = 0;
         loop {
             let look_at = start + (end - start) * f64::from(look) / f64::from(OBSERVATIONS_PER_STEP);

@@ -1,4 +1,4 @@
-//! What an analysis needs from outside: a clock, and permission to continue.
+//! Clock and progress callback supplied by the caller of an analysis.
 
 use std::ops::ControlFlow;
 
@@ -9,7 +9,7 @@ use jointplay_scene::SceneError;
 pub struct RunContext<'a> {
     clock: &'a mut dyn FnMut() -> f64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
-    /// Current part of the whole, as fractions.
+    /// Range of the current part within the whole, as fractions.
     from: f64,
     to: f64,
 }
@@ -29,7 +29,7 @@ impl<'a> RunContext<'a> {
     /// Reports how much of the current part is done.
     ///
     /// # Errors
-    /// [`AnalysisError::Cancelled`] if it may not continue.
+    /// [`AnalysisError::Cancelled`] if the caller cancelled.
     pub(super) fn go_on(&mut self, done: f64) -> Result<(), AnalysisError> {
         let fraction = self.from + (self.to - self.from) * done.clamp(0.0, 1.0);
         match (self.progress)(fraction) {

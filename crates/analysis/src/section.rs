@@ -1,10 +1,10 @@
-//! A motion sampled at equal intervals of time, the Poincaré section of a driven system, with a twin run beside it that
-//! measures how fast neighbouring motions diverge.
+//! A motion sampled at equal intervals of time (the Poincaré section of a driven system), with a twin run that measures how fast
+//! neighbouring motions diverge.
 
 use super::exponent::{ALIGNMENT, Benettin};
 use super::orbit::Orbit;
 
-/// When sections are taken, and from which one on they are kept.
+/// Times of the sections, and the number of discarded ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     /// Time of the first section, s.
@@ -13,7 +13,7 @@ pub struct Schedule {
     pub interval: f64,
     /// Number of sections, discarded ones included.
     pub sections: usize,
-    /// Initial sections that are a transient and not kept.
+    /// Initial sections, discarded as a transient.
     pub discard: usize,
 }
 
@@ -64,8 +64,8 @@ enum Twin<O> {
 }
 
 impl<O: Orbit> SectionRun<O> {
-    /// Watches `orbit` from now on. `separation` is that of the twin in units of the scales of the state: well above the
-    /// error of a step, well below the amplitude of the motion; `None` runs no twin.
+    /// Observes `orbit` from now on. `separation` is that of the twin in units of the scales of the state: well above the error
+    /// of a step, well below the amplitude of the motion; `None` runs no twin.
     pub fn new(orbit: O, schedule: Schedule, separation: Option<f64>) -> Self {
         let mut watch = Self {
             kept: Vec::with_capacity(schedule.kept() * orbit.observables()),
@@ -122,7 +122,7 @@ impl<O: Orbit> SectionRun<O> {
         }
     }
 
-    /// One step of the motion; `true` where it ended at a section.
+    /// Takes one step of the motion; returns `true` if it ended at a section.
     ///
     /// # Errors
     /// The motion cannot continue.

@@ -43,7 +43,7 @@ impl Setting {
         Self { method, adaptive: method.is_adaptive(), step_s, tolerance }
     }
 
-    /// Runge-Kutta 4 at 10 microseconds, relative to which speeds are given.
+    /// Runge-Kutta 4 at 10 microseconds, the baseline of speed ratios.
     pub fn baseline() -> Self {
         Self::new(Method::RungeKutta4, 10e-6)
     }
@@ -53,7 +53,7 @@ impl Setting {
         Self::new(Method::DormandPrince5, tolerance)
     }
 
-    /// The automatic pair at `tolerance`.
+    /// The automatic selection of methods at `tolerance`.
     pub(super) fn automatic(tolerance: f64) -> Self {
         Self::new(Method::Automatic, tolerance)
     }
@@ -68,7 +68,7 @@ impl Setting {
         Ok(Simulation::new(&self.of(&scene.machine))?)
     }
 
-    /// Continues from `snapshot` with this setting, whichever setting that has.
+    /// Continues from `snapshot` with this setting in place of its own.
     pub(super) fn resume(&self, snapshot: &Snapshot) -> Result<Simulation, AnalysisError> {
         let mut simulation = Simulation::of(snapshot);
         let machine = self.of(simulation.machine());

@@ -9,16 +9,16 @@ use super::grid::RangeError;
 use super::sweep::SweepError;
 use jointplay_scene::{Scene, SceneError};
 
-/// A scene in transferable form: text and changes, from which it is parsed again.
+/// A scene in transferable form: its text and changes, to be parsed again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneSource {
     /// The TOML text.
     pub text: String,
-    /// Its file, for messages.
+    /// File name, for messages.
     pub file: Option<String>,
     /// Changed parameters, as a user writes them.
     pub changes: Vec<(String, String)>,
-    /// Texts of the files that it names.
+    /// Contents of the files that it refers to, by name.
     pub beside: BTreeMap<String, String>,
 }
 

@@ -1,5 +1,5 @@
-//! A whole sweep: its scene, its points, and the computation of one block of them. The caller decides who runs which
-//! block and when: a block's records depend only on the sweep and the block's number.
+//! A whole sweep: its scene, its points, and the computation of one block of them. The caller schedules the blocks: the records
+//! of a block depend only on the sweep and the block number.
 
 use super::drive::{NoPeriod, ObservedRun, drive_period};
 use super::grid::{Grid, ParameterRange, Start};
@@ -11,20 +11,20 @@ use jointplay_scene::{Scene, SceneError, Value};
 /// Largest total number of kept sections: an array of them takes 512 MiB.
 const MOST_SECTIONS: usize = 1 << 26;
 
-/// Largest number of values per range of a map at which its interior is tried before anything runs.
+/// Largest number of values per range at which the interior of a map is tried before anything runs.
 const MOST_WITHIN: usize = 64;
 
 /// Why a sweep is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
-    /// No period to keep.
+    /// No kept periods.
     #[error(
         "--periods {periods} --discard {discard}: the periods include those discarded, so --discard must be less than --periods"
     )]
     NothingKept {
         /// Periods.
         periods: usize,
-        /// Of these discarded.
+        /// Discarded periods.
         discard: usize,
     },
     /// More numbers than a result can hold.
@@ -40,7 +40,7 @@ pub enum SweepError {
         /// Most sections.
         most: usize,
     },
-    /// Longer than a run may be.
+    /// Longer than the longest allowed run.
     #[error("--periods {periods}: at {point} the longest run, {LONGEST_RUN:e} s, has {most} periods of {period} s")]
     TooLong {
         /// Periods.
@@ -75,11 +75,11 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// A sweep of `scene`. Every value of each range is tried with the other range at its ends, and values inside a map,
-    /// all of them if there are few enough.
+    /// A sweep of `scene`. Every value of each range is tried with the other range at its ends. Values inside a map are tried
+    /// too, all of them if there are few enough.
     ///
     /// # Errors
-    /// Nothing to keep, no drive phase, a value at which the scene cannot start.
+    /// No kept periods, no drive phase, or a value at which the scene cannot start.
     pub fn new(scene: Scene, grid: Grid, plan: Plan) -> Result<Self, SweepError> {
         if plan.discard >= plan.periods {
             return Err(SweepError::NothingKept { periods: plan.periods, discard: plan.discard });
@@ -117,8 +117,8 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// Points tried before anything runs: every value of each range with the other at its ends, and a lattice inside,
-    /// which is every point of a small map.
+    /// Points tried before anything runs: every value of each range with the other at its ends, and a lattice inside, which
+    /// covers every point of a small map.
     fn tried(&self) -> Vec<usize> {
         let tried = |point: &usize| {
             let indices = self.grid.indices(*point);
@@ -130,7 +130,7 @@ impl Sweep {
         (0..self.grid.points()).filter(tried).collect()
     }
 
-    /// Parameters of a point as people write them.
+    /// Parameters of a point, formatted for the user.
     pub fn describe(&self, point: usize) -> String {
         let written = |(key, value): (&str, Value)| {
             let shown = self.scene.parameter(key).map(|parameter| parameter.show(&value));
@@ -150,7 +150,7 @@ impl Sweep {
         &self.grid
     }
 
-    /// What each point runs.
+    /// Periods and sections of each point.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -172,7 +172,7 @@ pub struct BlockRun<'a> {
     order: Vec<usize>,
     at: usize,
     run: Option<PointRun>,
-    /// ObservedRun at the end of the previous point, if the next one follows it.
+    /// Run at the end of the previous point, if the next point follows it.
     machine: Option<ObservedRun>,
     done: Vec<(usize, Option<PointResult>)>,
 }

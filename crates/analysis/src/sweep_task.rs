@@ -14,7 +14,7 @@ use super::sweep::{BlockRun, Sweep};
 const STEPS: u32 = 400;
 /// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
 pub const COORDINATES: usize = 6;
-/// Largest total number of kept sections: what a window holds and draws.
+/// Largest total number of kept sections that a window holds and draws.
 const MOST_SECTIONS: usize = 50_000;
 
 /// A sweep to be computed.
@@ -26,7 +26,7 @@ pub struct SweepTask {
     pub vary: Vec<String>,
     /// Drive periods per point, including those discarded.
     pub periods: usize,
-    /// Of these, the transient.
+    /// Discarded transient periods.
     pub discard: usize,
     /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
     pub phase: f64,
@@ -36,17 +36,17 @@ pub struct SweepTask {
     pub exponent: bool,
 }
 
-/// Which of several computers of a sweep one is: its points are the same, whoever computes them.
+/// Share of a sweep for one of several workers; the points are the same whichever worker computes them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Share {
-    /// Its number, from 0.
+    /// Index, from 0.
     pub index: usize,
-    /// How many there are.
+    /// Number of shares.
     pub of: usize,
 }
 
 impl Share {
-    /// The only one.
+    /// The whole sweep.
     pub const WHOLE: Self = Self { index: 0, of: 1 };
 }
 
@@ -72,7 +72,7 @@ pub struct SweptPoint {
     pub values: Vec<f64>,
     /// Keys and values as a user writes them; they parse back to the same bits.
     pub settings: Vec<(String, String)>,
-    /// The point it followed; `None` for a cold start.
+    /// The preceding point, from which it continued; `None` for a cold start.
     pub after: Option<usize>,
     /// Time of its first section, including discarded ones, s.
     pub first: f64,
@@ -92,7 +92,7 @@ pub struct SweptPoint {
     pub peak: Option<f64>,
     /// Largest and root-mean-square tip error over the kept periods, m.
     pub probe: Option<(f64, f64)>,
-    /// Reasons not to trust it: bit k for one of the kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
+    /// Reasons for distrust: bit k is set for kind k of [`jointplay_physics::simulate::Doubt::KINDS`].
     pub doubts: u32,
 }
 
@@ -106,8 +106,8 @@ pub(super) enum SweepMessage {
     Point(Box<SweptPoint>),
 }
 
-/// Computes a share of a sweep point by point, from coarse to fine if points do not follow each other, and waits for `rest`
-/// every [`STEPS`] steps.
+/// Computes a share of a sweep point by point, from coarse to fine unless points follow each other, and awaits `rest` every
+/// [`STEPS`] steps.
 pub(super) async fn run(
     task: &SweepTask,
     share: Share,
@@ -177,7 +177,7 @@ fn coarse_first(n: usize) -> Vec<usize> {
     order
 }
 
-/// A block being computed, with what is needed to tell how its points can be reached again.
+/// A block being computed, with the data needed to reproduce its points.
 struct Block<'a> {
     sweep: &'a Sweep,
     run: BlockRun<'a>,
@@ -292,7 +292,7 @@ mod tests {
 
     fn told_of(task: SweepTask, share: Share, most: usize) -> Vec<Message> {
         let mut said = Vec::new();
-        // It travels as text, there and back.
+        // Jobs and messages are sent as text.
         let text = serde_json::to_string(&Job::Sweep(task, share)).expect("plain data");
         let job = serde_json::from_str(&text).expect("its own text");
         perform(&job, &mut || 0.0, &mut |message| {
@@ -334,7 +334,7 @@ mod tests {
             assert_eq!(point.sections.len(), 2);
             assert_eq!((point.first, point.interval), (0.05, 0.2));
             assert!(point.peak.is_some_and(|peak| peak > 1.0) && !point.regime.is_empty());
-            // The same section again, by the same steps.
+            // The same section again, with the same steps.
             let mut source = task.scene.clone();
             source.changes.extend(point.settings.iter().cloned());
             let scene = source.scene().expect("its own settings");
@@ -353,7 +353,7 @@ mod tests {
 
     #[test]
     fn several_share_the_points_and_each_is_the_same_to_the_bit() {
-        // One for each of four, of whom two have nothing to do; and two blocks of points that follow each other.
+        // One share for each of four workers, two of which have nothing to do; then two blocks of points that follow each other.
         let cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
         let mut followed = task(&["contact.friction=0.1..0.3:26"]);
         (followed.start, followed.periods, followed.discard) = (Start::FollowUp, 2, 1);

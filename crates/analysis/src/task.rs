@@ -12,7 +12,7 @@ use super::source::{SceneSource, TaskFault};
 use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
 use jointplay_physics::machine::Preset;
 
-/// What to compute.
+/// A computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Job {
     /// Cost and error of presets on a scene as it is.
@@ -29,7 +29,7 @@ pub enum Job {
 /// Messages of a running computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Message {
-    /// Fraction done, 0 to 1; of a share of a sweep as a fraction of the whole.
+    /// Fraction done, 0 to 1; for a share of a sweep, as a fraction of the whole.
     Progress(f64),
     /// The requested presets, by their words.
     Presets(Vec<(String, Measured)>),
@@ -39,7 +39,7 @@ pub enum Message {
     Point(Box<SweptPoint>),
     /// End of the results.
     Done,
-    /// Why there is no result.
+    /// Reason for the lack of a result.
     Failed(String),
 }
 
@@ -62,7 +62,7 @@ pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, tell: &mut dyn FnMut(M
     assert!(end.is_ready(), "nothing in it waits");
 }
 
-/// As [`perform`]; a sweep waits for `rest` every few milliseconds.
+/// As [`perform`]; a sweep awaits `rest` every few milliseconds.
 pub async fn perform_with_rests(
     job: &Job,
     clock: &mut dyn FnMut() -> f64,
@@ -78,7 +78,7 @@ pub async fn perform_with_rests(
         Err(TaskFault::Cancelled) => return,
         Err(fault) => Message::Failed(fault.to_string()),
     };
-    // Nothing follows that could be cancelled.
+    // Nothing is left to cancel.
     let _ = tell(last);
 }
 
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn a_preset_is_measured_on_the_scene_as_it_is() {
         let job = job(&[("contact.clearance", "0.2 mm")], &["preview"]);
-        // It travels as text.
+        // Jobs are sent as text.
         let text = serde_json::to_string(&job).expect("plain data");
         let job: Job = serde_json::from_str(&text).expect("its own text");
         let said = messages(&job, usize::MAX);

@@ -1,4 +1,4 @@
-//! A stretch of stepping under a cap on work, timed piece by piece.
+//! Stepping over a span under a cap on work, timed in pieces.
 
 use std::fmt::Display;
 
@@ -11,19 +11,19 @@ use jointplay_scene::Scene;
 
 /// Steps between two checks of the clock, the cap and cancellation.
 const STEPS_IN_A_PIECE: u32 = 32;
-/// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs are enough.
+/// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs suffice.
 const FEWEST_RUNS: usize = 3;
 const MOST_RUNS: usize = 40;
 const LONG: f64 = 4.0;
 
-/// How much work an analysis may take.
+/// Limits on the work of an analysis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorkBudget {
-    /// Evaluations of the equations after which a run is capped.
+    /// Cap on the evaluations of the equations in a run.
     pub evaluations: u64,
-    /// Clock seconds after which it is capped, too: the linear algebra of implicit methods is no evaluation.
+    /// Cap on the clock seconds of a run, since evaluations do not cover the linear algebra of implicit methods.
     pub seconds: f64,
-    /// Seconds to measure for each run, by repeating it.
+    /// Clock seconds to accumulate for each run, by repeating it.
     pub measured: f64,
     /// Step sizes of the fixed-step methods, s.
     pub steps: &'static [f64],
@@ -32,7 +32,7 @@ pub struct WorkBudget {
 }
 
 impl WorkBudget {
-    /// A coarse grid within seconds.
+    /// A coarse grid that takes seconds.
     pub const QUICK: Self = Self {
         evaluations: 400_000,
         seconds: 0.5,
@@ -40,7 +40,7 @@ impl WorkBudget {
         steps: &[50e-6, 20e-6, 10e-6, 5e-6, 2e-6],
         tolerances: &[1e-3, 1e-4, 1e-6, 1e-8],
     };
-    /// The whole grid within minutes.
+    /// The whole grid, which takes minutes.
     pub const FULL: Self = Self {
         evaluations: 4_000_000,
         seconds: 2.0,
@@ -48,10 +48,10 @@ impl WorkBudget {
         steps: &[1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6],
         tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
     };
-    /// More loose joints than these make runs long.
+    /// Runs with more loose joints than this are long.
     const MANY: usize = 8;
 
-    /// For `scene`: runs of many loose joints are capped earlier, at the same steps and tolerances.
+    /// Budget for `scene`: runs of many loose joints are capped earlier, at the same steps and tolerances.
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
         let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
@@ -81,7 +81,7 @@ pub enum End {
     /// The divergence guard stopped it.
     #[serde(serialize_with = "as_words")]
     Stopped(Stopped),
-    /// The method refused the scene, say one too large for its matrices; in files it is stopped, too.
+    /// The method refused the scene, for instance as too large for its matrices; files list it as stopped, too.
     #[serde(rename = "stopped", serialize_with = "as_words")]
     Refused(StartError),
 }
@@ -101,7 +101,7 @@ fn as_words<S: Serializer>(fault: &impl Display, serializer: S) -> Result<S::Ok,
     serializer.collect_str(fault)
 }
 
-/// Steps `simulation` to exactly `end`; `seen` is called after every step and returns whether that is enough.
+/// Steps `simulation` to exactly `end`; `seen` is called after every step and returns true to stop.
 pub(super) fn advance_capped(
     simulation: &mut Simulation,
     end: f64,
@@ -112,7 +112,7 @@ pub(super) fn advance_capped(
     run_until_timed(simulation, end, budget, context, &mut Vec::new(), &mut seen)
 }
 
-/// The same; `pieces` keeps the shortest time so far of each piece, s.
+/// The same with timing; `pieces` holds the shortest time so far of each piece, s.
 fn run_until_timed(
     simulation: &mut Simulation,
     end: f64,
@@ -144,7 +144,7 @@ fn run_until_timed(
     unreachable!("pieces are counted for ever")
 }
 
-/// Steps one piece; whether `end` is reached or `seen` has returned true.
+/// Steps one piece; returns whether `end` is reached or `seen` has returned true.
 fn some_steps(
     simulation: &mut Simulation,
     end: f64,
@@ -162,8 +162,8 @@ fn some_steps(
     Ok(simulation.time() >= end)
 }
 
-/// Seconds to step to `end`: the sum of the shortest times of all pieces, so that other load on the machine counts as
-/// little as possible. Every run starts from what `start` returns; the time for that does not count.
+/// Clock seconds to step to `end`: the sum of the shortest times of all pieces, so that other load on the machine counts as
+/// little as possible. Every run starts from the result of `start`, whose time does not count.
 pub(super) fn time_to(
     end: f64,
     budget: &WorkBudget,

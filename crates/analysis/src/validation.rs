@@ -1,4 +1,5 @@
-//! Cases whose answers are known from outside the program: a table (`assets/validation/cases.toml`), the right values, and ours.
+//! Cases with independently known answers: a table (`assets/validation/cases.toml`), reference values, and this program's
+//! results.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -8,7 +9,7 @@ use serde::Deserialize;
 use jointplay_physics::simulate::{Frame, Impact, NoChannel, Reading, Simulation, StartError, Stopped, chosen_columns};
 use jointplay_scene::{Scene, SceneError, evaluate};
 
-/// A run of a scene, and what is known of it.
+/// A run of a scene with known results.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
@@ -16,19 +17,19 @@ pub struct Case {
     pub title: String,
     /// The scene, by name.
     pub scene: String,
-    /// Keys and values that are changed in it.
+    /// Changed keys and values.
     #[serde(default)]
     pub changes: Vec<(String, String)>,
     /// Length of the run, s.
     pub duration: f64,
-    /// Where the data and the answer come from.
+    /// Source of the data and of the answer.
     pub source: String,
-    /// What is compared.
+    /// Compared quantities.
     #[serde(rename = "check")]
     pub checks: Vec<Check>,
 }
 
-/// A quantity, its right value, and how far ours may be from it.
+/// A quantity, its reference value, and the allowed difference.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
@@ -36,15 +37,15 @@ pub struct Check {
     pub quantity: String,
     /// SI unit; empty for a ratio.
     pub unit: String,
-    /// How it is read from the run.
+    /// Measurement in the run.
     pub measure: Measure,
-    /// Its right value.
+    /// Reference value.
     pub right: Right,
     /// Largest difference allowed, in `unit`.
     pub bound: f64,
 }
 
-/// How a quantity is read from a run. Channels are those of `run --channels`.
+/// Measurement of a quantity in a run. Channels are those of `run --channels`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Measure {
@@ -52,30 +53,30 @@ pub enum Measure {
     End(String),
     /// A channel at an instant.
     At {
-        /// Its name.
+        /// Name of the channel.
         channel: String,
         /// The instant, s.
         time: f64,
     },
     /// Largest absolute value of a channel at the ends of steps.
     Largest {
-        /// Its name.
+        /// Name of the channel.
         channel: String,
-        /// From when on, s.
+        /// Start of the search, s.
         from: f64,
     },
-    /// Mean interval at which a channel rises through a level.
+    /// Mean interval between the upward crossings of a level.
     Period {
-        /// Its name.
+        /// Name of the channel.
         channel: String,
         /// The level, SI unit.
         level: f64,
     },
     /// A property of an impact.
     Impact {
-        /// Number of the impact among those of the run, from 1.
+        /// Number of the impact in the run, from 1.
         number: usize,
-        /// Which property.
+        /// The property.
         property: ImpactProperty,
     },
 }
@@ -84,7 +85,7 @@ pub enum Measure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ImpactProperty {
-    /// When it begins, s.
+    /// Start time, s.
     Start,
     /// Approach speed, m/s.
     Approach,
@@ -105,7 +106,7 @@ impl ImpactProperty {
     }
 }
 
-/// A right value and its origin.
+/// A reference value and its origin.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Right {
@@ -127,7 +128,7 @@ impl Right {
     /// The value, SI unit.
     ///
     /// # Panics
-    /// If the embedded tables do not have it: a test reads every one.
+    /// If the embedded tables lack it: a test reads every value.
     pub fn value(&self) -> f64 {
         match self {
             Self::Published(value) => *value,
@@ -157,33 +158,33 @@ pub static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
 /// Why a case has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValidationError {
-    /// The scene, or a change of it.
+    /// The scene, or a change to it, is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// It does not start.
+    /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// It stopped before its end.
+    /// The run stopped before its end.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// A channel that it does not have.
+    /// The scene has no such channel.
     #[error(transparent)]
     Channel(#[from] NoChannel),
 }
 
-/// The right value of a check, and ours.
+/// Reference value of a check, and this program's result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// The right value, SI unit.
+    /// Reference value, SI unit.
     pub right: f64,
-    /// Ours; not a number if the run does not show it.
+    /// This program's result; NaN if the run does not show the quantity.
     pub ours: f64,
     /// Largest difference allowed.
     pub bound: f64,
 }
 
 impl Comparison {
-    /// Ours less the right value.
+    /// Result less reference value.
     pub fn difference(&self) -> f64 {
         self.ours - self.right
     }
@@ -239,13 +240,13 @@ impl Run {
     fn reading(&mut self, channel: &str) -> Result<Reading, NoChannel> {
         self.simulation.sample(self.simulation.time(), &mut self.frame);
         let (_, readings) = chosen_columns(self.simulation.machine(), &self.frame, &[channel.to_owned()])?;
-        // The first is the time.
+        // The first reading is the time.
         let [_, reading] = readings[..] else { panic!("{channel} is more than one channel") };
         Ok(reading)
     }
 }
 
-/// A measure while the run goes.
+/// Incremental evaluation of a measure during a run.
 enum Watch {
     At { reading: Reading, time: f64, value: f64 },
     Largest { reading: Reading, from: f64, value: f64 },
@@ -274,18 +275,18 @@ impl Watch {
         })
     }
 
-    /// Reads the latest step.
+    /// Processes the latest step.
     fn follow(&mut self, run: &mut Run) {
         let (start, end) = (run.simulation.step_start(), run.simulation.time());
         match self {
             Self::At { reading, time, value } if start < *time && *time <= end => *value = run.read(*reading, *time),
-            // The first one takes the place of NaN.
+            // The first value replaces NaN.
             Self::Largest { reading, from, value } if *from <= end => *value = value.max(run.read(*reading, end).abs()),
             Self::Period { reading, level, before, first, last, intervals } => {
                 let now = run.read(*reading, end);
                 if *before < *level && *level <= now {
                     let (mut below, mut above) = (start, end);
-                    // To the last bit.
+                    // Bisection to the last bit.
                     loop {
                         let middle = 0.5 * (below + above);
                         if middle <= below || above <= middle {
@@ -309,7 +310,7 @@ impl Watch {
     fn result(&self, impacts: &[Impact]) -> f64 {
         match self {
             Self::At { value, .. } | Self::Largest { value, .. } => *value,
-            // Not a number without an interval.
+            // NaN without an interval.
             Self::Period { first, last, intervals, .. } => (last - first) / f64::from(*intervals),
             Self::Impact { number, property } => impacts.get(number - 1).map_or(f64::NAN, |impact| property.of(impact)),
         }

@@ -128,7 +128,7 @@ pub fn work_precision(
         point.preset = preset;
         points.push(point);
     }
-    // Timed again after the points, so that other load on the machine slows the baseline as little as them.
+    // Timed again after the points, so that other load on the machine slows the baseline and the points alike.
     baseline.again(&reference, budget, &mut context.part(parts - 1, parts))?;
     for point in &mut points {
         baseline.divide(point);

@@ -1,8 +1,8 @@
-//! Expressions such as `10 * sin(2*pi*3*t) * exp(-t/2)`: parsed once into a postfix program, which any kind of number runs
-//! through without allocating.
+//! Expressions such as `10 * sin(2*pi*3*t) * exp(-t/2)`: parsed once into a postfix program, then evaluated for any number type
+//! without allocating.
 //!
-//! Written here because the crates for this call std's elementary functions, whose bits differ between native and wasm, or
-//! bring a regex engine, and do not say at which byte an expression is wrong.
+//! Implemented here because existing crates call std's elementary functions, whose bits differ between native and wasm, or
+//! require a regex engine, and do not report the byte of an error.
 
 mod derivatives;
 
@@ -11,9 +11,9 @@ use std::fmt;
 
 /// Longest expression, bytes.
 pub const LONGEST_EXPRESSION: usize = 4000;
-/// Deepest nesting of parentheses, calls, signs and powers.
+/// Maximum nesting of parentheses, calls, signs and powers.
 const DEEPEST: usize = 60;
-/// Most intermediate results at a time.
+/// Maximum number of intermediate results on the stack.
 const STACK: usize = 32;
 
 /// An operation on one number.
@@ -52,11 +52,11 @@ pub enum Binary {
     Max,
 }
 
-/// What an expression computes with: f64, or a number that carries more (derivatives, a dimension).
+/// Number type of an evaluation: f64, or one that carries more (derivatives, a dimension).
 ///
-/// An operation on constants must give the constant that f64 gives: the parser evaluates them beforehand.
+/// Operations on constants must agree with f64, because the parser folds constants.
 pub trait Number: Copy {
-    /// A number of the text.
+    /// A constant.
     fn constant(value: f64) -> Self;
     /// The result of `operation`.
     fn unary(self, operation: Unary) -> Self;
@@ -115,7 +115,7 @@ pub fn smooth_step(x: f64) -> (f64, f64, f64) {
     (x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * (x * y) * (x * y), 60.0 * x * y * (y - x))
 }
 
-/// What a name before `(` stands for.
+/// Meaning of a name before `(`.
 #[derive(Clone, Copy)]
 enum Call {
     One(Unary),
@@ -139,13 +139,13 @@ const FUNCTIONS: [(&str, Call, bool); 18] = [
     ("smoothstep", Call::One(Unary::SmoothStep), true),
     ("abs", Call::One(Unary::Abs), false),
     ("pow", Call::Two(Binary::Power), true),
-    // The jump at the negative x axis apart.
+    // Except for the jump at the negative x axis.
     ("atan2", Call::Two(Binary::Atan2), true),
     ("min", Call::Two(Binary::Min), false),
     ("max", Call::Two(Binary::Max), false),
 ];
 
-/// Constants; a variable of the same name goes before.
+/// Constants; a variable of the same name takes precedence.
 const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)];
 
 /// One step of a program.
@@ -165,11 +165,11 @@ pub struct Program {
 }
 
 impl Program {
-    /// Parses `text`. `variable` gives the index of a variable, by which [`Self::eval`] finds its value; `names` are those
-    /// that an error may suggest.
+    /// Parses `text`. `variable` maps a name to the index of its value in [`Self::eval`]; `names` are candidates for the
+    /// suggestions of an error.
     ///
     /// # Errors
-    /// Where the text is wrong, and why.
+    /// Position and cause of the error.
     pub fn parse(
         text: &str,
         variable: impl Fn(&str) -> Option<usize>,
@@ -178,12 +178,11 @@ impl Program {
         Self::parse_text(text, variable, names, |_| None, false)
     }
 
-    /// As [`Self::parse`]; a number may be followed by a unit, by which it is multiplied. `unit` gives the length of the unit with
-    /// which a text begins, and the index of its size among the variables.
+    /// As [`Self::parse`]; a number may be followed by a unit, which multiplies it. `unit` returns the length of the unit at the
+    /// start of a text, and the index of its size among the variables.
     ///
     /// # Errors
-    /// As [`Self::parse`], and a power of a number with its unit, unless it is written at a unit as in `m^2`: it could be meant for
-    /// either.
+    /// As [`Self::parse`], and a power of a number with a unit, which is ambiguous unless written at the unit as in `m^2`.
     pub fn parse_with_units(
         text: &str,
         variable: impl Fn(&str) -> Option<usize>,
@@ -225,7 +224,7 @@ impl Program {
     /// Value for these variables.
     ///
     /// # Panics
-    /// If `variables` lacks one that the text names.
+    /// If `variables` lacks one that the text uses.
     pub fn eval<N: Number>(&self, variables: &[N]) -> N {
         let mut stack = [N::constant(0.0); STACK];
         let mut top = 0;
@@ -249,7 +248,7 @@ impl Program {
         stack[0]
     }
 
-    /// The same with `values` for all variables but the first, and what is then constant computed.
+    /// The same program with `values` bound to all variables but the first, and constants folded.
     ///
     /// # Panics
     /// As [`Self::eval`].
@@ -272,60 +271,60 @@ impl Program {
         Self { steps, kink: self.kink }
     }
 
-    /// A function in it whose derivatives jump.
+    /// A function in the program whose derivatives jump, if any.
     pub fn kink(&self) -> Option<&'static str> {
         self.kink
     }
 
-    /// Number of its steps: constants, variables and operations.
+    /// Number of steps: constants, variables and operations.
     pub fn length(&self) -> usize {
         self.steps.len()
     }
 
-    /// Whether it names variable `index`.
+    /// Whether the program uses variable `index`.
     pub fn uses(&self, index: usize) -> bool {
         self.steps.contains(&Step::Variable(index))
     }
 }
 
-/// What is wrong with an expression.
+/// An error in an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExpressionError {
-    /// Byte of the text.
+    /// Byte offset in the text.
     pub at: usize,
-    /// What is wrong there.
+    /// The fault at that offset.
     pub fault: Fault,
 }
 
-/// Ways in which an expression is wrong.
+/// Faults of expressions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
-    /// Something else should stand here.
+    /// Unexpected text.
     Expected {
-        /// What should.
+        /// Expected text.
         wanted: &'static str,
-        /// What does; `None` at the end.
+        /// Character found; `None` at the end.
         found: Option<char>,
     },
     /// No variable, constant or function has this name.
     Unknown {
         /// The name.
         name: String,
-        /// One like it.
+        /// Nearest known name.
         near: Option<String>,
-        /// It is called like a function.
+        /// Whether it is called like a function.
         called: bool,
     },
-    /// A function has another number of arguments.
+    /// A function has the wrong number of arguments.
     Arguments {
         /// The function.
         function: &'static str,
-        /// What it needs.
+        /// Required number.
         wanted: usize,
     },
     /// A function without its arguments.
     NotCalled(&'static str),
-    /// No finite number of f64.
+    /// Not a finite f64.
     NoNumber,
     /// Nested too deeply.
     TooDeep,
@@ -369,14 +368,14 @@ struct Parser<'t> {
     text: &'t str,
     at: usize,
     steps: Vec<Step>,
-    /// Results on the stack after `steps`.
+    /// Depth of the stack after `steps`.
     held: usize,
     depth: usize,
     kink: Option<&'static str>,
     variable: &'t dyn Fn(&str) -> Option<usize>,
     names: &'t [&'t str],
     unit: &'t dyn Fn(&str) -> Option<(usize, usize)>,
-    /// Angles are not pure numbers: what gives one is not evaluated beforehand.
+    /// Whether angles are distinct from pure numbers; results in radians are then not folded.
     angles: bool,
 }
 
@@ -390,7 +389,7 @@ impl<'t> Parser<'t> {
         self.text[self.at..].chars().next()
     }
 
-    /// Skips `wanted` if it is next.
+    /// Consumes `wanted` if it is next.
     fn take(&mut self, wanted: &str) -> bool {
         self.peek();
         let found = self.text[self.at..].starts_with(wanted);
@@ -409,7 +408,7 @@ impl<'t> Parser<'t> {
         self.error(self.at, Fault::Expected { wanted, found })
     }
 
-    /// Adds a step, or its result if it is constant.
+    /// Adds a step, or folds it if its operands are constant.
     fn push(&mut self, step: Step) -> Parsed {
         let gives_angle =
             matches!(step, Step::Unary(Unary::Asin | Unary::Acos | Unary::Atan) | Step::Binary(Binary::Atan2));
@@ -466,7 +465,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// A power with its sign, which applies last: -x^2 = -(x^2). Every nesting passes here.
+    /// A power with its sign, which binds weaker: -x^2 = -(x^2). Every nesting passes through here.
     fn signed(&mut self) -> Parsed {
         self.depth += 1;
         if self.depth > DEEPEST {
@@ -479,7 +478,7 @@ impl<'t> Parser<'t> {
             self.signed()?;
         } else {
             self.atom()?;
-            // To the right first: x^y^z = x^(y^z).
+            // Right-associative: x^y^z = x^(y^z).
             if self.take("^") || self.take("**") {
                 self.signed()?;
                 self.push(Step::Binary(Binary::Power))?;
@@ -537,7 +536,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// The unit of the number before, if there is one.
+    /// The unit after a number, if any.
     fn unit(&mut self) -> Parsed {
         self.peek();
         let Some((length, size)) = (self.unit)(&self.text[self.at..]) else {
@@ -558,7 +557,7 @@ impl<'t> Parser<'t> {
         Ok(())
     }
 
-    /// A whole power written at the unit before, as in `m^2`, which is one of the unit alone.
+    /// A whole power written at a unit, as in `m^2`; it applies to the unit alone.
     fn unit_power(&mut self) -> Option<f64> {
         let mut rest = self.text[self.at..].strip_prefix('^')?.chars();
         let power = rest.next()?.to_digit(10).filter(|power| *power > 0)?;
@@ -727,7 +726,7 @@ mod tests {
         assert_eq!(fault("t^".repeat(1500)), Fault::TooDeep);
         assert_eq!(fault("t+(".repeat(40)), Fault::TooDeep);
         assert_eq!(fault(" ".repeat(5000)), Fault::TooLong);
-        // A long sum is not deep.
+        // A long sum is not nested deeply.
         assert_eq!(value(&vec!["t"; 1900].join("+")), 950.0);
         let nested = format!("{}t{}", "(t+".repeat(30), ")".repeat(30));
         assert_eq!(value(&nested), 15.5);

@@ -1,6 +1,6 @@
 //! A number with its first two time derivatives, carried exactly through every operation.
 //!
-//! Written here because dual-number crates call std's elementary functions, whose bits differ between native and wasm.
+//! Implemented here because dual-number crates call std's elementary functions, whose bits differ between native and wasm.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -26,7 +26,7 @@ impl Jet {
         Self { value, rate, acceleration }
     }
 
-    /// g(self) from g, g', g'' at the value.
+    /// Composition g(self), from g, g', g'' at the value.
     pub fn chain(self, g: f64, g1: f64, g2: f64) -> Self {
         Self { value: g, rate: g1 * self.rate, acceleration: g1 * self.acceleration + g2 * self.rate * self.rate }
     }

@@ -1,11 +1,10 @@
-//! The physics of Jointplay: what a machine is, its equations of motion, and a running simulation of it. No screen, clock, thread or
-//! file.
+//! The physics of Jointplay: machines, their equations of motion, and running simulations. No screen, clock, thread or file.
 //!
 //! Modules from the bottom up; each uses only those before it (`ARCHITECTURE.md`): [`words`], [`suggest`], [`units`] and [`jet`],
 //! [`expression`], [`contact`] and [`integrate`], [`machine`], [`mechanism`], [`simulate`].
 //!
-//! A machine is data, which a scene file describes (`jointplay-scene`) or a program builds. A ball that hangs in its socket by 0.2 mm
-//! of play, dropped:
+//! A machine is plain data, read from a scene file (`jointplay-scene`) or built in code. This example drops a ball that hangs in
+//! its socket with 0.2 mm of play:
 //!
 //! ```
 //! use jointplay_physics::machine::{
@@ -39,8 +38,8 @@ pub mod suggest;
 pub mod units;
 pub mod words;
 
-// The tests read scenes. Their source is compiled into the tests once more: `jointplay-scene` as a dependency would bring a second copy
-// of the types of this crate.
+// Unit tests read scenes. A dependency on `jointplay-scene` would bring in a second copy of this crate's types, so its sources
+// are compiled into the tests.
 #[cfg(test)]
 extern crate self as jointplay_physics;
 #[cfg(test)]

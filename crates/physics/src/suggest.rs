@@ -1,6 +1,6 @@
-//! What errors quote: the nearest right name, and the beginning of a long input.
+//! Text for error messages: the nearest known name, and a truncated quote of the input.
 
-/// The first line of an input, truncated to what an error can quote.
+/// First line of an input, truncated for an error message.
 pub fn brief(text: &str) -> String {
     let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
     if short.len() < text.len() {
@@ -9,10 +9,10 @@ pub fn brief(text: &str) -> String {
     short
 }
 
-/// A text longer than this, bytes, is no typing slip; comparing it takes quadratic time.
+/// Longest text, bytes, that is compared with the names: the comparison takes quadratic time.
 const LONGEST_SLIP: usize = 100;
 
-/// The one of `names` nearest to `wrong`; `None` if none is near.
+/// The name nearest to `wrong`; `None` if none is near.
 pub fn nearest_name<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if wrong.len() > LONGEST_SLIP {
         return None;
@@ -26,12 +26,12 @@ pub fn nearest_name<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -
         .map(|(_, name)| name)
 }
 
-/// A near name as errors quote it: in brackets, or empty.
+/// A suggestion for an error message, in brackets; empty if there is none.
 pub fn did_you_mean(near: Option<&str>) -> String {
     near.map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"))
 }
 
-/// The one of `names` nearest to `wrong`, as errors quote it: in brackets, or empty.
+/// As [`did_you_mean`], for the name nearest to `wrong`.
 pub fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     did_you_mean(nearest_name(wrong, names))
 }

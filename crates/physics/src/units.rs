@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-/// Physical dimension of a quantity; determines the units it may be written in.
+/// Physical dimension of a quantity; determines its units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// A pure number.
@@ -176,12 +176,12 @@ const UNITS: [(Dimension, &str, &[Unit]); 18] = [
     (Dimension::None, "pure number", &[]),
 ];
 
-/// Names of the units that a quantity of this dimension may be written in, SI first; empty for a pure number.
+/// Names of the units of a dimension, SI first; empty for a pure number.
 pub fn unit_names(dimension: Dimension) -> Vec<&'static str> {
     units(dimension).iter().map(|(name, _)| *name).collect()
 }
 
-/// What quantities of a dimension are called.
+/// Display name of a dimension.
 pub fn dimension_name(dimension: Dimension) -> &'static str {
     let row = UNITS.iter().find(|(of, ..)| *of == dimension);
     row.map_or("", |(_, name, _)| name)
@@ -205,7 +205,7 @@ pub fn si_unit(dimension: Dimension) -> &'static str {
     units(dimension).first().map_or("", |(name, _)| *name)
 }
 
-/// A quantity as a user writes it, in SI units. A bare 0 needs no unit; pure numbers take none.
+/// Parses a quantity as a user writes it, in SI units. A bare 0 needs no unit; pure numbers take none.
 ///
 /// # Errors
 /// Not a number, not finite, no unit, or a unit of another dimension.
@@ -278,27 +278,27 @@ pub fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)> {
     })
 }
 
-/// Length in bytes of the longest unit with which `text` begins, and its place in [`all_units`].
+/// Length in bytes of the longest unit at the start of `text`, and its index in [`all_units`].
 pub fn unit_at_start(text: &str) -> Option<(usize, usize)> {
     let ends = |length: usize| !text[length..].starts_with(|c: char| c.is_alphanumeric() || c == '_');
-    // Names alone: the sizes take most of the time that a scene takes to be read.
+    // Names alone: computing the sizes would dominate the time to read a scene.
     let names = UNITS.iter().flat_map(|(_, _, units)| units.iter().map(|(name, _)| *name));
     let begins =
         |(place, name): (usize, &str)| (text.starts_with(name) && ends(name.len())).then_some((name.len(), place));
     names.enumerate().filter_map(begins).max_by_key(|(length, _)| *length)
 }
 
-/// What follows the number with which `text` begins; empty if it does not begin with one.
+/// The text after the number at the start of `text`; empty without such a number.
 pub fn split_unit(text: &str) -> &str {
     split_number(text.trim()).1
 }
 
-/// Whether a unit is written so, too.
+/// Whether `written` is a spelling of `unit`.
 pub fn same_unit(unit: &str, written: &str) -> bool {
     letters(unit).eq(letters(written))
 }
 
-/// The unit of `dimension` that a quantity is written in.
+/// The unit of `dimension` in which the quantity `text` is written.
 pub fn unit_within(text: &str, dimension: Dimension) -> Option<&'static str> {
     let same = |(name, _): &&Unit| same_unit(name, split_unit(text));
     units(dimension).iter().find(same).map(|(name, _)| *name)
@@ -393,7 +393,7 @@ fn split_number(text: &str) -> (&str, &str) {
     if count == 0 {
         return ("", text);
     }
-    // An exponent only if digits follow: the `e` of a unit stays with the unit.
+    // An exponent needs digits; otherwise the `e` belongs to the unit.
     if matches!(bytes.get(end), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
         let exponent = digits(end + 1 + sign);
@@ -418,7 +418,7 @@ fn letters(unit: &str) -> impl Iterator<Item = char> {
     })
 }
 
-/// The possible units, as the end of a sentence.
+/// The allowed units, as the end of a sentence.
 fn example(dimension: Dimension) -> String {
     let names = unit_names(dimension);
     match names.first() {
@@ -427,7 +427,7 @@ fn example(dimension: Dimension) -> String {
     }
 }
 
-/// Says what a unit would measure, if anything.
+/// Names the quantity that a unit measures, if any.
 fn foreign(unit: &str) -> String {
     UNITS
         .iter()
@@ -472,7 +472,7 @@ mod tests {
         ];
         for (text, dimension, si) in cases {
             let read = parse_quantity(text, dimension).unwrap();
-            // pi brings one extra rounding.
+            // pi adds one rounding.
             assert!((read - si).abs() <= f64::EPSILON * si.abs(), "{text}: {read}");
         }
     }

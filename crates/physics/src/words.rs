@@ -12,8 +12,8 @@ pub trait Words: Copy + 'static {
     fn of_word(word: &str) -> Option<Self>;
 }
 
-/// Gives an enum `ALL`, `word`, [`Words`], and prints and serialises it as its word. A variant without a word does not
-/// compile.
+/// Implements `ALL`, `word` and [`Words`] for an enum, and prints and serialises each variant as its word. A variant without a
+/// word does not compile.
 #[macro_export]
 macro_rules! named_by_words {
     ($name:ident { $($variant:ident => $word:literal),+ $(,)? }) => {

@@ -8,13 +8,13 @@ use super::table::{contact_part, contact_rows, find};
 use super::*;
 use jointplay_physics::suggest::{brief, nearest};
 
-/// A key resolved against a scene: its row, and the joint it is for.
+/// A key resolved against a scene: its row, and the joint it applies to.
 struct Resolved {
     parameter: &'static Parameter,
     joint: Option<usize>,
 }
 
-/// A contact parameter of a ball joint by the last part of its key; `None` if there is no such part.
+/// A contact parameter of a ball joint by the last part of its key; `None` if there is no such parameter.
 pub fn contact_value(joint: &BallJoint, part: &str) -> Option<Value> {
     let (_, field) = contact_rows().find(|(of, _)| *of == part)?;
     Some((field.get)(&joint.contact))
@@ -26,7 +26,7 @@ impl Scene {
         &self.overrides[joint]
     }
 
-    /// Whether this scene has a row's keys.
+    /// Whether this scene has a parameter.
     fn has(&self, parameter: &Parameter) -> bool {
         match parameter.scope {
             Scope::Every | Scope::Contact => true,
@@ -36,12 +36,12 @@ impl Scene {
         }
     }
 
-    /// Parameters this scene has, in table order and then its own; a contact row also stands for `joint.<name>.<key>`.
+    /// Parameters of this scene in table order, then user-defined ones; a contact row also stands for `joint.<name>.<key>`.
     pub fn parameters(&self) -> Vec<&'static Parameter> {
         table().iter().filter(|parameter| self.has(parameter)).chain(self.source.own.iter().map(row_of_own)).collect()
     }
 
-    /// Row of a number of the file, by its key.
+    /// Row of a number of the file, by key.
     fn number(&self, key: &str) -> Option<&'static Parameter> {
         let number = self.source.numbers.get(key)?;
         if file_only(key) {
@@ -72,7 +72,7 @@ impl Scene {
                 None => {
                     let here = self.parameters();
                     let table = here.iter().map(|parameter| parameter.key);
-                    // Beyond this many the search takes longer than it helps.
+                    // A longer search would cost more than the hint is worth.
                     let numbers = self.source.numbers.keys().map(String::as_str).take(MOST_CHANGES);
                     let near = nearest_parameter(key, table.chain(numbers), &[]);
                     Err(SceneError::about(key, None, format!("unknown key{near}")))
@@ -86,7 +86,7 @@ impl Scene {
             let mut others = self.machine.joints.iter().chain(&self.machine.closing_joints);
             let hinge = others.any(|joint| joint.name == first);
             let message = if hinge {
-                // Its numbers are keys where the file gives them.
+                // Its numbers are keys only if they are in the file.
                 let own = format!("joint.{first}.");
                 let numbers = self.source.numbers.keys().map(String::as_str);
                 let given: Vec<&str> = numbers.filter(|key| key.starts_with(&own)).collect();
@@ -156,10 +156,10 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// As [`Self::set`] with a value in SI units, for sliders: the recorded text reads back to the same bits.
+    /// Like [`Self::set`], with a value in SI units, for sliders: the recorded text reads back to the same bits.
     ///
     /// # Errors
-    /// As [`Self::set`]; [`Value::Unset`] reverts the change, as [`Self::undo_change`].
+    /// Same as [`Self::set`]. [`Value::Unset`] reverts the change, like [`Self::undo_change`].
     pub fn set_value(&mut self, key: &str, value: &Value) -> Result<&'static Parameter, SceneError> {
         let parameter = self.parameter(key)?;
         if *value == Value::Unset {
@@ -171,7 +171,7 @@ impl Scene {
         self.set(key, &parameter.write(value))
     }
 
-    /// Reverts a change: the parameter is again as in the scene's text.
+    /// Reverts a change: the parameter returns to its value in the scene's text.
     ///
     /// # Errors
     /// A key this scene does not have, or an inconsistent scene; `self` is then unchanged.
@@ -228,8 +228,7 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// Writes a value already checked against the table; a contact value also goes to every joint that does not override
-    /// it.
+    /// Writes a value already checked against the table; a contact value also applies to joints that do not override it.
     pub(super) fn write(&mut self, parameter: &'static Parameter, value: &Value) {
         match parameter.access {
             Access::Contact(field) => {
@@ -241,12 +240,12 @@ impl Scene {
                 }
             }
             Access::Scene(field) => (field.set)(self, value),
-            // Read with the text.
+            // Applied when the text is read.
             Access::Number => {}
         }
     }
 
-    /// Whatever the scene's text does not give by name follows the preset.
+    /// Applies a preset to the solver settings that the scene's text does not set.
     pub(super) fn apply_preset(&mut self, preset: Preset) {
         let (method, step, tolerance) = preset.point();
         let [method_free, step_free, tolerance_free] = SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));

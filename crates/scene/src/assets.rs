@@ -1,5 +1,5 @@
-//! Files that a scene names: read once, when the scene is loaded, and kept in its source, so that whatever reads the scene
-//! again gets the same content.
+//! Files named by a scene. They are read once, when the scene is loaded, and stored in its source, so that re-reading the
+//! scene gives the same content.
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -14,12 +14,12 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use super::Texts;
 use super::mesh::{Fault, Format, Mesh};
 
-/// Largest file that is read, bytes: a scene is a few kilobytes.
+/// Size limit for scene and text files, bytes: a scene is a few kilobytes.
 pub const LARGEST_FILE: u64 = 4 << 20;
-/// Largest file with a mesh, and all of them together, bytes.
+/// Size limit for a mesh file, and for all mesh files together, bytes.
 pub const LARGEST_MESH: u64 = 8 << 20;
 
-/// Largest size, bytes, of the file `name` where it was chosen or dropped.
+/// Size limit for the user-supplied file `name`, bytes.
 pub fn largest_file(name: &str) -> u64 {
     match Format::of(name) {
         Some(_) => LARGEST_MESH,
@@ -27,10 +27,10 @@ pub fn largest_file(name: &str) -> u64 {
     }
 }
 
-/// Before the content of a file that is no text, or a text that begins so itself: base64 follows.
+/// Prefix of base64 content: for binary files, and for text that itself begins with it.
 const ENCODED: &str = "base64:";
 
-/// What the file held that a scene keeps as `text`.
+/// Decodes the bytes of a file that a scene stores as `text`.
 pub fn file_bytes(text: &str) -> Cow<'_, [u8]> {
     let decoded = text.strip_prefix(ENCODED).map(|data| BASE64.decode(data));
     match decoded {
@@ -39,7 +39,7 @@ pub fn file_bytes(text: &str) -> Cow<'_, [u8]> {
     }
 }
 
-/// How a scene keeps what a file holds.
+/// Encodes the bytes of a file for storage in a scene.
 fn encode(bytes: Vec<u8>) -> Arc<str> {
     match String::from_utf8(bytes) {
         Ok(text) if !text.starts_with(ENCODED) => text.into(),
@@ -52,7 +52,7 @@ fn encoded(bytes: &[u8]) -> Arc<str> {
     format!("{ENCODED}{}", BASE64.encode(bytes)).into()
 }
 
-/// Why a scene does not get a file that it names.
+/// Why a file named by a scene is unavailable.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum AssetFault {
     #[error("is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`")]
@@ -68,9 +68,8 @@ pub(super) enum AssetFault {
     Unreadable(#[from] std::io::Error),
     #[error("too large; allowed at most {} MiB in all {files} that a scene names", .limit >> 20)]
     TooLarge {
-        /// Bytes of all files of this kind.
+        /// Total limit for files of this kind, bytes.
         limit: u64,
-        /// The kind.
         files: &'static str,
     },
     #[error("not a text file: it is not valid UTF-8")]
@@ -79,49 +78,47 @@ pub(super) enum AssetFault {
     NotMesh,
 }
 
-/// Why a file gives no mesh.
+/// Why a mesh cannot be read.
 pub(super) enum NoMesh {
-    /// It is not there, or not of a known kind.
+    /// The file is unavailable or its format unknown.
     Nowhere(AssetFault),
-    /// What is wrong in it, with its text if it is one.
+    /// The file is invalid; `text` is its content if it is text.
     Within { text: Option<Arc<str>>, fault: Fault },
 }
 
-/// What a file is for.
 #[derive(Clone, Copy)]
 enum Use {
     Text,
     Mesh,
 }
 
-/// Where a scene finds the files that it names, and those that it has asked for.
+/// Resolves the files named by a scene, and records those requested.
 #[derive(Default)]
 pub(super) struct AssetResolver<'d> {
-    /// Folder of a scene file that is being loaded; `None` where only `known` and `given` may be used.
+    /// Folder of the scene file; `None` if only `known` and `given` may be used.
     folder: Option<&'d Path>,
-    /// Read before.
+    /// Files read earlier.
     known: Option<&'d Texts>,
-    /// Opened together with the scene, by their own names without a folder.
+    /// Files opened together with the scene, by name without folder.
     given: Option<&'d BTreeMap<String, Vec<u8>>>,
     asked: RefCell<Texts>,
-    /// Bytes that were read for each [`Use`].
+    /// Bytes read so far for each [`Use`].
     held: [Cell<u64>; 2],
-    /// Read from the files in `asked`.
+    /// Meshes parsed from the files in `asked`.
     meshes: RefCell<BTreeMap<String, Arc<Mesh>>>,
 }
 
 impl<'d> AssetResolver<'d> {
-    /// Reads files in `folder`.
     pub fn in_folder(folder: &'d Path) -> Self {
         Self { folder: Some(folder), ..Self::default() }
     }
 
-    /// Uses what was read before.
+    /// A resolver that uses files read earlier.
     pub fn known(texts: &'d Texts) -> Self {
         Self { known: Some(texts), ..Self::default() }
     }
 
-    /// Uses what was `given` with the scene, and its `folder`, if it has one.
+    /// A resolver that uses the files `given` with the scene, and its `folder` if it has one.
     pub fn given(given: &'d BTreeMap<String, Vec<u8>>, folder: Option<&'d Path>) -> Self {
         Self { folder, given: Some(given), ..Self::default() }
     }
@@ -129,7 +126,7 @@ impl<'d> AssetResolver<'d> {
     /// Text of the file `name`.
     ///
     /// # Errors
-    /// Why there is none.
+    /// The file is unavailable or not text.
     pub fn text(&self, name: &str) -> Result<Arc<str>, AssetFault> {
         let text = self.content(name, Use::Text)?;
         if text.starts_with(ENCODED) {
@@ -138,17 +135,17 @@ impl<'d> AssetResolver<'d> {
         Ok(text)
     }
 
-    /// Triangles of the file `name`.
+    /// Mesh of the file `name`.
     ///
     /// # Errors
-    /// Why there are none.
+    /// The file is unavailable or invalid.
     pub fn mesh(&self, name: &str) -> Result<Arc<Mesh>, NoMesh> {
         if let Some(mesh) = self.meshes.borrow().get(name) {
             return Ok(mesh.clone());
         }
         let format = Format::of(name).ok_or(NoMesh::Nowhere(AssetFault::NotMesh))?;
         let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
-        // A file that this one names lies beside it.
+        // References are relative to the folder of the mesh file.
         let other = |other: &str| {
             let other = Path::new(name).with_file_name(other);
             let text = self.content(&other.to_string_lossy(), Use::Mesh)?;
@@ -165,7 +162,7 @@ impl<'d> AssetResolver<'d> {
         Ok(mesh)
     }
 
-    /// What the file `name` holds, as it is kept.
+    /// Encoded content of the file `name`.
     fn content(&self, name: &str, what: Use) -> Result<Arc<str>, AssetFault> {
         let found = self.asked.borrow().get(name).cloned();
         let found = found.or_else(|| self.known?.get(name).cloned());
@@ -178,7 +175,7 @@ impl<'d> AssetResolver<'d> {
         Ok(text)
     }
 
-    /// All texts that the scene asked for.
+    /// Contents of all files requested.
     pub fn into_texts(self) -> Texts {
         self.asked.into_inner()
     }
@@ -206,7 +203,7 @@ impl<'d> AssetResolver<'d> {
     /// The first `most` bytes of the file `name`.
     fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, AssetFault> {
         let path = self.folder.map(|folder| folder.join(name));
-        // Only names come with a file that was dropped on a page.
+        // Files dropped on a web page come without a folder.
         let given = name.file_name().and_then(|own| self.given?.get(own.to_str()?));
         match (given, path) {
             (Some(bytes), path) if !path.as_ref().is_some_and(|path| path.exists()) => {

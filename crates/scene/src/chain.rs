@@ -1,4 +1,4 @@
-//! A row of equal links from one template.
+//! Chains of identical links built from one template.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use super::read_bodies::read_rigid_body;
 use super::read_joints::read_own_contact;
 use super::*;
 
-/// Adds the bodies, free joints and ball joints of the `[chain]` in `node`: link 1 hangs from a fixed socket at `hang`,
-/// every other link from the socket at the lower end of the previous one; all start in a straight line, at rest, rotated by
-/// `rotation`. A `[[chain.joint]]` gives a ball joint its own contact parameters; their places are returned.
+/// Adds the bodies, free joints and ball joints of the `[chain]` in `node`. Link 1 hangs from a fixed socket at `hang`, every
+/// other link from the socket at the lower end of the previous one. All start at rest in a straight line rotated by
+/// `rotation`. Returns the nodes of contact parameters overridden by `[[chain.joint]]`, by key.
 ///
 /// # Errors
-/// Anything wrong in the section, a name already used in the file, or a joint that the chain does not have.
+/// Invalid section, a name already used in the file, or a joint that the chain does not have.
 pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
     let section = node.section()?;
     let hang = section.vector("hang")?;
@@ -98,7 +98,7 @@ pub(super) fn expand<'d>(node: &Node<'d>, scene: &mut Scene) -> Result<BTreeMap<
     read_own(&section, scene, links)
 }
 
-/// Reads the `[[chain.joint]]` of a chain of `links` links, the last ball joints of `scene`.
+/// Reads every `[[chain.joint]]`; the chain's joints are the last `links` ball joints of `scene`.
 fn read_own<'d>(
     section: &Section<'d>,
     scene: &mut Scene,

@@ -1,4 +1,4 @@
-//! Which key of a scene is to blame for an inconsistency.
+//! Finds the key responsible for an inconsistent scene.
 
 use super::error::{line_text, place_of};
 use super::*;
@@ -7,7 +7,7 @@ use jointplay_physics::mechanism::{CostOf, MechanismError};
 use jointplay_physics::simulate::StartError;
 
 impl Scene {
-    /// Why its machine cannot start, with the line of the file and the change that it concerns.
+    /// Explains why the machine cannot start, with the relevant line of the file and change.
     pub fn locate(&self, error: &StartError) -> SceneError {
         let one = |joint: &str, parts: &[&str]| {
             let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
@@ -31,15 +31,15 @@ impl Scene {
                 let title = if of_form { keys[2] } else { keys[0] };
                 (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
-            // A scene file is read into a machine whose parts fit together.
+            // The reader builds only consistent machines.
             MechanismError::Machine(_) => ("body".to_owned(), Vec::new()),
             MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),
         };
         self.start_error(&title, &keys, error.to_string())
     }
 
-    /// An error found when the scene starts, about `title` (see [`Source::places`]): it points to that line of the file,
-    /// and names the latest change whose key is among `keys` or, for those ending in a dot, begins with one.
+    /// An error at start about `title` (see [`Source::places`]). It points to that line of the file and names the latest change
+    /// of one of `keys`; an entry that ends in a dot is a prefix.
     fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
         let concerns =
             |changed: &str| keys.iter().any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)));
@@ -51,7 +51,7 @@ impl Scene {
             None => SceneError::about(title, None, message),
         };
         error.file.clone_from(&self.source.file);
-        // A built-in scene has no file to look at: a change that explains the error is enough.
+        // A built-in scene has no file to edit, so a change that explains the error is enough.
         if self.source.file.is_some() || change.is_none() {
             error.position = place;
             error.line_text = place.and_then(|(line, _)| line_text(&self.source.text, line));
@@ -61,7 +61,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// Keys that could be at fault, the likelier first.
+    /// Keys that could be at fault, most likely first.
     pub(super) fn keys_of(&self, conflict: &ContactConflict) -> Vec<String> {
         let key = |part| match conflict.joint {
             Some(joint) if self.overrides[joint].contains(&part) => {
@@ -70,7 +70,7 @@ impl Scene {
             _ => format!("contact.{part}"),
         };
         let mut keys: Vec<String> = conflict.fault.parts().into_iter().map(key).collect();
-        // A joint's own setting is likelier at fault than the general one.
+        // A joint's override is more likely at fault than the shared setting.
         keys.sort_by_key(|key| !key.starts_with("joint."));
         keys
     }
@@ -90,7 +90,7 @@ impl Scene {
         SceneError::about(key, value, self.conflict_text(conflict, key))
     }
 
-    /// The error for the latest change related to the conflict; `None` if it was in the file.
+    /// The error for the latest change related to the conflict; `None` if the file alone causes it.
     pub(super) fn blame_changes(&self, conflict: &ContactConflict) -> Option<SceneError> {
         let keys = self.keys_of(conflict);
         let (key, _) = self.changes.iter().rfind(|(changed, _)| keys.contains(changed))?;

@@ -17,7 +17,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The text being read, its name in errors, and what its values may refer to.
+/// The text being read, its name in errors, and the context of its values.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'d> {
     pub file: Option<&'d str>,
@@ -25,11 +25,11 @@ pub(super) struct Document<'d> {
     pub reading: &'d Reading<'d>,
     /// Whether another file includes it.
     pub included: bool,
-    /// The copy of a pattern that the values belong to.
+    /// Pattern copy that the values belong to.
     pub copy: Option<&'d PatternInstance>,
-    /// Whether the values belong to a hinge, where some have other dimensions.
+    /// Whether the values belong to a hinge, which changes some dimensions.
     pub on_hinge: bool,
-    /// Files that it names.
+    /// Resolver of the files it names.
     pub beside: &'d AssetResolver<'d>,
 }
 
@@ -40,9 +40,9 @@ pub(super) struct Section<'d> {
     pub path: String,
     pub table: &'d DeTable<'d>,
     pub span: Range<usize>,
-    /// Which keys it may have.
+    /// Rows of its allowed keys.
     pub rows: &'static FileTable,
-    /// Its variant.
+    /// Selected variant of the table.
     pub word: Option<&'static str>,
 }
 
@@ -51,19 +51,19 @@ pub(super) struct Section<'d> {
 pub(super) struct Node<'d> {
     pub document: Document<'d>,
     pub key: String,
-    /// Row of the key; of an entry of a list, that of the list.
+    /// Row of the key; for a list entry, the row of the list.
     pub row: &'static FileKey,
     pub value: &'d Spanned<DeValue<'d>>,
-    /// Where the text gives a value, and whether it is not this one: a change came after it.
+    /// Byte range of the value in the text, if any, and whether a change replaces it.
     written: Option<Range<usize>>,
     changed: bool,
 }
 
 impl<'d> Document<'d> {
-    /// Its text as TOML.
+    /// Parses the text as TOML.
     ///
     /// # Errors
-    /// Where it is none.
+    /// Invalid TOML.
     pub fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
         DeTable::parse(self.text).map_err(|error| {
             let span = error.span().unwrap_or(0..0);
@@ -89,7 +89,7 @@ impl<'d> Document<'d> {
     }
 }
 
-/// A number with a unit that `line` gives as a value without quotes.
+/// The value in `line`, if it is a number with a unit but without quotes.
 fn unquoted(line: &str) -> Option<&str> {
     let value = line.split_once('=')?.1.split('#').next()?.trim();
     let (unit, number) = (split_unit(value), value.trim_end_matches(split_unit(value)));
@@ -98,10 +98,10 @@ fn unquoted(line: &str) -> Option<&str> {
 }
 
 impl<'d> Section<'d> {
-    /// A table of the file; `rows` says which keys it may have.
+    /// A table of the file; `rows` describes its allowed keys.
     ///
     /// # Errors
-    /// The word that selects its variant is missing or wrong, or another key does not belong there.
+    /// The word that selects its variant is missing or wrong, or a key is not allowed.
     pub fn new(
         document: Document<'d>,
         path: String,
@@ -110,7 +110,7 @@ impl<'d> Section<'d> {
         rows: &'static FileTable,
     ) -> Result<Self, SceneError> {
         let mut section = Self { document, path, table, span, rows, word: None };
-        // First of all: a word may decide which other keys there are.
+        // Words come first: one may select the variant, and thus the allowed keys.
         for key in rows.keys {
             if let (ValueType::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
                 let word = node.choice()?;
@@ -167,7 +167,7 @@ impl<'d> Section<'d> {
         self.find(name)
     }
 
-    /// The value of a key, if it is there and has a row.
+    /// The value of a key, if present and with a row.
     fn find(&self, name: &str) -> Option<Node<'d>> {
         let row = self.rows.key(name, self.word)?;
         Node::new(self.document, self.key(name), row, self.table.get(name))
@@ -182,7 +182,7 @@ impl<'d> Section<'d> {
         })
     }
 
-    /// What the row of a key gives where it is left out, if that is a number.
+    /// Default of a key, if it is a number.
     fn default(&self, name: &str) -> Option<f64> {
         match self.rows.key(name, self.word)?.absent {
             DefaultRule::Is(number) => Some(number),
@@ -190,7 +190,7 @@ impl<'d> Section<'d> {
         }
     }
 
-    /// A number as its row says, SI.
+    /// A number with the dimension, range and default of its row, SI.
     pub fn number(&self, name: &str) -> Result<f64, SceneError> {
         match (self.get(name), self.default(name)) {
             (None, Some(default)) => Ok(default),
@@ -198,7 +198,7 @@ impl<'d> Section<'d> {
         }
     }
 
-    /// A vector as its row says, SI.
+    /// A vector with the dimension, range and default of its row, SI.
     pub fn vector(&self, name: &str) -> Result<Vec3, SceneError> {
         match (self.get(name), self.default(name)) {
             (None, Some(default)) => Ok(Vec3::repeat(default)),
@@ -224,7 +224,7 @@ impl<'d> Section<'d> {
 }
 
 impl<'d> Node<'d> {
-    /// What `key` stands for: its change if there is one, else the value in the text, if any.
+    /// The value of `key`: its change if there is one, else the value in the text, if any.
     fn new(
         document: Document<'d>,
         key: String,
@@ -263,7 +263,7 @@ impl<'d> Node<'d> {
         self.document.error(span.clone(), &self.key, Some(&self.document.excerpt(span)), message)
     }
 
-    /// The error that this names another `what` by the `name` that `first` has given to one.
+    /// The error for a second `what` with the `name` of `first`.
     pub fn repeats(&self, first: &Self, what: &str, name: &str) -> SceneError {
         let (line, _) = place_of(first.document.text, first.place());
         let file = first.document.file.filter(|_| first.document.file != self.document.file);
@@ -281,7 +281,7 @@ impl<'d> Node<'d> {
         ))
     }
 
-    /// A number or a text, as written.
+    /// A number or a string, as written.
     pub fn scalar(&self) -> Result<&'d str, SceneError> {
         match self.value.get_ref() {
             DeValue::String(text) => Ok(text),
@@ -291,7 +291,7 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// A text.
+    /// A string.
     pub fn text(&self) -> Result<&'d str, SceneError> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a text in quotes"))
     }
@@ -301,13 +301,13 @@ impl<'d> Node<'d> {
         self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// A finite quantity, SI: a number with its unit, or an expression. From now on it is a number of the scene, under this key.
+    /// A finite quantity, SI: a number with its unit, or an expression. It is recorded as a number of the scene under this key.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
         let place = self.place_of(Place::Value);
         self.evaluated(self.scalar()?, dimension, place)
     }
 
-    /// Where the scene's text gives this value.
+    /// Location of this value in the scene's text.
     fn place_of(&self, here: fn(Range<usize>) -> Place) -> Place {
         match &self.written {
             _ if self.document.included => Place::Included,
@@ -316,7 +316,7 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// The quantity `text`, at `place`, as [`Self::quantity`].
+    /// Evaluates and records the quantity `text` at `place`, like [`Self::quantity`].
     fn evaluated(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
         let reading = self.document.reading;
         let value =
@@ -348,7 +348,7 @@ impl<'d> Node<'d> {
         Ok(())
     }
 
-    /// A number as its row says: a quantity of its dimension, in its range, SI.
+    /// A quantity with the dimension and range of its row, SI.
     pub fn number(&self) -> Result<f64, SceneError> {
         self.within(self.dimension(), self.row.range())
     }
@@ -373,18 +373,18 @@ impl<'d> Node<'d> {
         Err(self.error(allowed))
     }
 
-    /// An example of a value, by its row.
+    /// Example value from its row.
     pub fn like(&self) -> &'static str {
         self.row.like(self.document.on_hinge)
     }
 
-    /// Dimension of its numbers, by its row.
+    /// Dimension of its numbers, from its row.
     pub fn dimension(&self) -> Dimension {
         let dimension = self.row.dimension(self.document.on_hinge);
         dimension.unwrap_or(Dimension::None)
     }
 
-    /// A whole number as its row says.
+    /// A whole number in the range of its row.
     pub fn whole(&self) -> Result<u32, SceneError> {
         let (least, most) = match self.row.takes {
             ValueType::Whole(least, most) => (least, most),
@@ -410,13 +410,13 @@ impl<'d> Node<'d> {
         })
     }
 
-    /// One of an enum's words, which are those of its row.
+    /// An enum variant by its word; the row lists the enum's words.
     pub fn word<T: Words>(&self) -> Result<T, SceneError> {
         let word = self.choice()?;
         Ok(T::of_word(word).expect("the row has the words of the enum"))
     }
 
-    /// A name: letters, digits, `_` and `-`, as keys and column names are built from it; in a copy of a pattern, numbered.
+    /// A name: letters, digits, `_` and `-`, because keys and column names are built from it; numbered in a pattern copy.
     pub fn name(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
         let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
@@ -426,14 +426,14 @@ impl<'d> Node<'d> {
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
     }
 
-    /// The name of a body: in a copy of a pattern that has this body, that of the copy.
+    /// The name of a body, numbered in a copy of a pattern that has this body.
     pub fn body(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
         let copy = self.document.copy;
         Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.body(name)))
     }
 
-    /// The name of a joint, as [`Self::body`].
+    /// The name of a joint, numbered like [`Self::body`].
     pub fn joint(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
         let copy = self.document.copy;
@@ -447,7 +447,7 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// The entries of a list, as many as its row allows. As [`Self::elements`].
+    /// The entries of a list, like [`Self::elements`], limited in number by its row.
     pub fn entries(&self) -> Result<Vec<Node<'d>>, SceneError> {
         let elements = self.elements()?;
         let Some(ListLimit { most, what }) = self.row.many() else {
@@ -474,8 +474,8 @@ impl<'d> Node<'d> {
         Ok(array.iter().enumerate().filter_map(node).collect())
     }
 
-    /// N quantities: `["1 mm", 0, "3 mm"]`, or with a common unit, `"1 0 3 mm"`. Each is a number of the scene, with the letter
-    /// of its component for its key where there are three or four.
+    /// N quantities: `["1 mm", 0, "3 mm"]`, or with a common unit, `"1 0 3 mm"`. Each is recorded as a number of the scene; with
+    /// three or four, its key ends in the letter of the component.
     pub fn quantities<const N: usize>(&self, dimension: Dimension) -> Result<[f64; N], SceneError> {
         let letters = match N {
             3 => "xyz",
@@ -518,12 +518,12 @@ impl<'d> Node<'d> {
         Ok(values)
     }
 
-    /// Numbers as its row says, SI.
+    /// N numbers with the dimension of its row, SI.
     pub fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
         self.quantities(self.dimension())
     }
 
-    /// A vector as its row says, SI.
+    /// A vector with the dimension and range of its row, SI.
     pub fn vector(&self) -> Result<Vec3, SceneError> {
         let vector = Vec3::from(self.numbers::<3>()?);
         let (least, most) = self.row.range();
@@ -542,19 +542,19 @@ impl<'d> Node<'d> {
         if size > 0.0 { Ok((vector / size).normalize()) } else { Err(self.error("a direction must not be zero")) }
     }
 
-    /// A table as its row says.
+    /// A table with the keys of its row.
     pub fn section(&self) -> Result<Section<'d>, SceneError> {
         self.section_as(self.key.clone())
     }
 
-    /// As [`Self::section`], with a different path for its keys.
+    /// Like [`Self::section`], with a different path for its keys.
     pub fn section_as(&self, path: String) -> Result<Section<'d>, SceneError> {
         let rows = self.row.table().expect("a row that takes tables");
         let table = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
         Section::new(self.document, path, table, self.value.span(), rows)
     }
 
-    /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.
+    /// Path of the table's keys: `prefix` and its name, or its array index if it has none.
     pub fn title(&self, prefix: &str) -> String {
         let name = self.value.get_ref().get("name").and_then(|name| name.get_ref().as_str());
         let title = |name| format!("{prefix}.{}", self.numbered(name));
@@ -568,7 +568,7 @@ impl<'d> Node<'d> {
             _ => None,
         };
         let parameter = parameter.expect("a row of a parameter");
-        // A count or a pure number may be written bare; text and bare numbers read alike.
+        // A count or a pure number may be bare; strings and bare numbers are read alike.
         let text = self.scalar()?;
         let (read, Kind::Number { dimension, .. }) = (parameter.read(text), parameter.kind) else {
             let read = parameter.read(text);
@@ -576,7 +576,7 @@ impl<'d> Node<'d> {
         };
         match read {
             Err(error) if matches!(error.fault, ValueFault::Quantity(_)) => {
-                // No quantity: an expression, perhaps.
+                // Not a quantity: it may be an expression.
                 let value = self.document.reading.evaluate(text, dimension, self.document.copy);
                 let value = value.map_err(|why| self.error(format!("{why}; {}", error.allowed)))?;
                 let value = super::Value::Number(value);
@@ -589,17 +589,17 @@ impl<'d> Node<'d> {
     }
 }
 
-/// Entries of the list `name` of all `files`, and `more` of other origin, as many as the row of the list allows.
+/// Entries of the list `name` in all `files`, followed by `more`, limited in number by the row of the list.
 ///
 /// # Errors
-/// No list, or too many entries.
+/// Not a list, or too many entries.
 pub(super) fn lists<'d>(files: &[Section<'d>], name: &str, more: Vec<Node<'d>>) -> Result<Vec<Node<'d>>, SceneError> {
     let mut nodes = Vec::new();
     for file in files {
         if let Some(list) = file.get(name) {
             let first = nodes.len();
             nodes.extend(list.entries()?);
-            // Counted through all files.
+            // Indices continue across files.
             for (index, node) in nodes.iter_mut().enumerate().skip(first) {
                 node.key = format!("{name}[{index}]");
             }

@@ -1,4 +1,4 @@
-//! Laws of driven joints: one row per law, from which `drive` is read. The motion they prescribe is in `mechanism/drives`.
+//! Drive laws: one row per law, and the reader of `drive`. The motion is computed in `mechanism/drives`.
 
 use super::document::{Node, Section};
 use super::formula::read_formula;
@@ -7,11 +7,11 @@ use super::points::{Graph, MOST_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
 use std::sync::LazyLock;
 
-/// Highest frequency of a harmonic drive, Hz.
+/// Maximum frequency of a harmonic drive, Hz.
 pub(super) const FASTEST_DRIVE: f64 = 1e4;
-/// Why the law spcmm drives nothing but a slide.
+/// Error message for the law spcmm on a coordinate that is not a slide.
 pub(super) const SLIDERS_ONLY: &str = "the law spcmm drives prismatic joints only";
-/// Most terms of a sum of harmonics.
+/// Maximum number of terms in a sum of harmonics.
 const MOST_TERMS: usize = 100;
 
 const fn place(name: &'static str, help: &'static str) -> FileKey {
@@ -34,18 +34,18 @@ const START: FileKey = key("start", number(Dimension::Time), "\"1 s\"", "when it
 const DURATION: FileKey =
     key("duration", ValueType::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)), "\"0.5 s\"", "how long it lasts");
 
-/// A law of driven joints in a scene file.
+/// A drive law of the scene file.
 #[derive(Debug)]
 pub struct DriveLaw {
-    /// Word of the file: `law = "harmonic"`.
+    /// Its word in the file: `law = "harmonic"`.
     pub word: &'static str,
-    /// What it is.
+    /// Help text.
     pub help: &'static str,
-    /// Its keys.
+    /// Keys of the law.
     pub keys: &'static [FileKey],
 }
 
-/// Every law of a drive. On a hinge lengths are angles, and speeds angular speeds.
+/// All drive laws. On a hinge, lengths become angles, and speeds angular speeds.
 pub static DRIVE_LAWS: [DriveLaw; 8] = [
     DriveLaw {
         word: "spcmm",
@@ -170,7 +170,7 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
     },
 ];
 
-/// Laws of drives: the rows of each, with its word.
+/// Table of `drive`: its law, and the keys of each law.
 pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     let words: &[&str] = DRIVE_LAWS.each_ref().map(|kind| kind.word).to_vec().leak();
     let law = key("law", ValueType::Word(words), "\"constant\"", "which motion");
@@ -184,7 +184,7 @@ pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
         .by(Variants::Word("law", ""))
 });
 
-/// A law of a coordinate that is an angle if it `turns`.
+/// Reads the drive of a coordinate, which is an angle if `turns`.
 pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<Drive, SceneError> {
     let mut node = node.clone();
     node.document.on_hinge = turns;

@@ -1,4 +1,4 @@
-//! Force elements of a scene file: one table per kind, and how its section is read. Their physics is in `mechanism/elements`.
+//! Force elements of a scene file: a table and a reader per kind. Their physics is in `mechanism/elements`.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -21,9 +21,9 @@ use jointplay_physics::words::Words;
 
 const LARGEST_FORCE: f64 = 1e12;
 
-/// Every kind of force element: its table, and how the rest of its section is read, where it acts being known.
-pub(super) static ELEMENTS: LazyLock<[(&FileTable, ReadKind); 7]> = LazyLock::new(|| {
-    [
+/// All kinds of force elements: table, and reader of the section once the attachment is known.
+pub(super) static ELEMENTS: LazyLock<Vec<(&FileTable, ReadKind)>> = LazyLock::new(|| {
+    vec![
         (&SPRING, read_spring),
         (&LOAD, read_load),
         (&JOINT_SPRING, read_joint_spring),
@@ -34,7 +34,7 @@ pub(super) static ELEMENTS: LazyLock<[(&FileTable, ReadKind); 7]> = LazyLock::ne
     ]
 });
 
-/// Whether `table` is that of a force element.
+/// Whether `table` describes a force element.
 pub fn is_element(table: &FileTable) -> bool {
     ELEMENTS.iter().any(|(of, _)| of.name == table.name)
 }
@@ -59,12 +59,12 @@ const fn point(name: &'static str) -> FileKey {
     key(name, ValueType::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "where it holds")
 }
 
-/// A number of either sign, such as a force, no larger than any element exerts.
+/// A number of either sign, such as a force, up to `LARGEST_FORCE`.
 const fn signed(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
     key(name, ValueType::Number(dimension, (-LARGEST_FORCE, LARGEST_FORCE)), like, help)
 }
 
-/// The same, not below 0.
+/// A nonnegative number up to `LARGEST_FORCE`.
 const fn unsigned(name: &'static str, dimension: D, like: &'static str, help: &'static str) -> FileKey {
     key(name, ValueType::Number(dimension, (0.0, LARGEST_FORCE)), like, help)
 }
@@ -78,7 +78,7 @@ const fn joint_damping(help: &'static str) -> FileKey {
     unsigned("damping", D::Damping, "\"20 N s/m\"", help).zero().on_hinge(D::TurningDamping, "\"0.1 N m s/rad\"")
 }
 
-/// A coordinate at which something of an element begins.
+/// A reference value of a joint coordinate.
 const fn coordinate(name: &'static str, like: [&'static str; 2], help: &'static str) -> FileKey {
     key(name, number(D::Length), like[0], help).on_hinge(D::Angle, like[1])
 }
@@ -106,7 +106,7 @@ fn law(name: &'static str, help: &'static str) -> FileKey {
 
 const CURVE_LIKE: &str = "[[\"-10 mm\", \"-50 N\"], [0, 0], [\"10 mm\", \"80 N\"]]";
 
-/// Points of a curve in place of `stiffness` and `preload`.
+/// Points of a force curve in place of `stiffness` and `preload`.
 const fn curve(help: &'static str) -> FileKey {
     let pairs = ValueType::Pairs([D::Length, D::Force], many(MOST_POINTS, "points"));
     key("characteristic", pairs, CURVE_LIKE, help).absent(WITHOUT_CURVE)
@@ -306,7 +306,7 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
     )
 });
 
-/// Where an element acts, and the section that says what else it is.
+/// Attachment of an element, and the section with its other keys.
 pub(super) struct Place<'s, 'd> {
     section: &'s Section<'d>,
     scene: &'s Scene,
@@ -319,7 +319,6 @@ impl Place<'_, '_> {
         self.section.document.on_hinge
     }
 
-    /// The coordinate of an element that acts on a joint.
     fn on(&self) -> JointCoordinate {
         self.coordinate.expect("the element's table has a joint")
     }
@@ -328,7 +327,7 @@ impl Place<'_, '_> {
         self.section.number(name)
     }
 
-    /// A number with one key on a slide and another on a hinge.
+    /// The value of `force` on a slide, of `torque` on a hinge.
     fn force_or_torque(&self) -> Result<f64, SceneError> {
         let (own, other, here, there) = match self.on_hinge() {
             true => ("torque", "force", "hinge", "slide"),
@@ -348,7 +347,7 @@ impl Place<'_, '_> {
         node.map(|node| read_drive(&node, self.on_hinge(), self.scene)).transpose()
     }
 
-    /// The pattern's copy that is read, unless its element holds first (`place` 0) or second (1) at a body of that copy.
+    /// The pattern copy being read, unless attachment `place` (0 or 1) is on a body of that copy.
     fn copy_outside(&self, place: usize) -> Option<&PatternInstance> {
         let copy = self.section.document.copy?;
         let body = self.points.get(place).and_then(|point| point.body);
@@ -356,7 +355,7 @@ impl Place<'_, '_> {
         (!own).then_some(copy)
     }
 
-    /// What a spring exerts by its stretch: a curve, whose numbers have these names and dimensions, or a line.
+    /// Elastic law of a spring: a line, or a curve whose `axes` have these names and dimensions.
     fn elastic(&self, axes: [(&'static str, D); 2]) -> Result<Elastic, SceneError> {
         let line = Elastic::Line { stiffness: self.number("stiffness")?, preload: self.number("preload")? };
         let most = [MAX_SI, LARGEST_FORCE];
@@ -377,16 +376,17 @@ impl Place<'_, '_> {
         Ok(Elastic::Curve(points))
     }
 
-    /// The error for values without any effect, unless one of those under `keys` has one.
+    /// Rejects an element without effect; `keys` lists the values of which one must not be 0.
     fn must_act(&self, acts: bool, keys: &str) -> Result<(), SceneError> {
         if acts {
             return Ok(());
         }
         let kind = self.section.rows.name;
-        Err(self.section.error("", format!("this {kind} does nothing: {keys} are 0; one must not be")))
+        let zero = if keys.contains(',') { "are 0; one must not be" } else { "is 0; it must not be" };
+        Err(self.section.error("", format!("this {kind} does nothing: {keys} {zero}")))
     }
 
-    /// An error about a key that may not be there.
+    /// An error about a key that may be absent.
     fn fault<T>(&self, name: &str, why: &str) -> Result<T, SceneError> {
         Err(match self.section.get(name) {
             Some(node) => node.error(why),
@@ -394,7 +394,7 @@ impl Place<'_, '_> {
         })
     }
 
-    /// Refuses the closed form of the scene as the law of an element.
+    /// Rejects the scene's closed form as the law of an element.
     fn refuse_closed_form(&self, law: Option<&Drive>, name: &str, what: &str) -> Result<(), SceneError> {
         match law.and_then(Drive::closed_form) {
             Some(_) => self.fault(name, &format!("a {what} follows a law of its own, not that of the scene's sliders")),
@@ -416,7 +416,7 @@ fn read_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
 
 fn read_load(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
     let axes = place.word("axes")?;
-    // A vector in axes that do not belong to the pattern turns with its copies.
+    // A vector in axes outside the pattern rotates with the copies.
     let copy = match axes {
         LoadAxes::World => place.section.document.copy,
         LoadAxes::Body => place.copy_outside(0),
@@ -487,7 +487,7 @@ fn read_bushing(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
     let vector = |name: &str| place.section.vector(name);
     let [stiffness, damping] = [vector("stiffness")?, vector("damping")?];
     let [turning_stiffness, turning_damping] = [vector("turning_stiffness")?, vector("turning_damping")?];
-    // An orientation to a body outside a pattern turns with the pattern's copies; a shifted one needs no turning.
+    // An orientation relative to a body outside the pattern rotates with the copies; a translation does not change it.
     let outside = |at| place.copy_outside(at).filter(|copy| !copy.keeps_axes());
     if outside(0).is_none() && outside(1).is_some() {
         let why = "a body outside the pattern does not turn with its copies: make it that of `from`";
@@ -554,14 +554,14 @@ fn read_tyre(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
     Ok(ElementKind::Tyre(tyre))
 }
 
-/// Upwards, against the gravity that the file gives; `None` if it gives none.
+/// Unit vector against gravity; `None` if gravity is 0.
 fn up_of(scene: &Scene) -> Option<Vec3> {
     let gravity = scene.machine.gravity;
     let size = gravity.amax();
     (size > 0.0).then(|| -(gravity / size).normalize())
 }
 
-/// One element with this table; `bodies` and `joints` map names to indices in the sorted scene.
+/// Reads an element of this kind; `bodies` and `joints` map names to indices in the sorted scene.
 pub(super) fn read_element<'d>(
     node: &Node<'d>,
     (table, read_kind): (&'static FileTable, ReadKind),

@@ -4,14 +4,14 @@ use super::visible::{visible, visible_line};
 use jointplay_physics::suggest::{brief, did_you_mean, nearest, nearest_name};
 use std::fmt;
 
-/// What is wrong with a scene or a parameter value, in a form the user can act on.
+/// An error in a scene or a parameter value, in a form the user can act on.
 ///
-/// Its text is complete: place, key, value, reason, and the line of the file with a mark under the fault.
+/// `Display` gives location, key, value, reason, and the source line with a caret under the error.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SceneError {
     /// File as the user named it; `None` for a built-in scene or the command line.
     pub file: Option<String>,
-    /// Line and column, from 1.
+    /// Line and column, one-based.
     pub position: Option<(u32, u32)>,
     /// Key at fault, e.g. `joint.S1.clearance`.
     pub key: Option<String>,
@@ -28,7 +28,7 @@ pub struct SceneError {
 impl std::error::Error for SceneError {}
 
 impl SceneError {
-    /// An error at byte `at` of `text`, of a file or built in; `key` and `value` where they are known.
+    /// An error at byte `at` of `text`; `file` is `None` for a built-in scene, `key` and `value` are `None` if unknown.
     pub fn in_text(
         file: Option<&str>,
         text: &str,
@@ -82,19 +82,19 @@ impl fmt::Display for SceneError {
     }
 }
 
-/// Line and column, from 1, of what follows `before`. Scene texts are short: the counts fit.
+/// One-based line and column of the position after `before`. Scene texts are short, so the counts fit.
 pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     let line_start = before.rfind('\n').map_or(0, |at| at + 1);
     let from_one = |count: usize| u32::try_from(count + 1).unwrap_or(u32::MAX);
     (from_one(before.matches('\n').count()), from_one(before[line_start..].chars().count()))
 }
 
-/// Line and column, from 1, of byte `at` of `text`.
+/// One-based line and column of byte `at` of `text`.
 pub(super) fn place_of(text: &str, at: usize) -> (u32, u32) {
     line_and_column(&text[..text.floor_char_boundary(at)])
 }
 
-/// Line number `line`, from 1, of a text; `None` if it is too long for a terminal or contains control characters.
+/// Text of the one-based line `line`; `None` if it is too long for a terminal or contains control characters.
 pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     let line = text.lines().nth(line.saturating_sub(1) as usize).unwrap_or("");
     let line = line.replace('\t', " ");
@@ -102,14 +102,14 @@ pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     fit.then(|| line.into())
 }
 
-/// The parameter whose key, or last part of it, is nearest to `wrong`, or one of the other `words`, as errors quote it.
+/// A hint for error messages: the parameter whose key or last key part is nearest to `wrong`, or the nearest of `words`.
 pub(super) fn nearest_parameter<'a>(
     wrong: &str,
     mut keys: impl Iterator<Item = &'a str> + Clone,
     words: &[&'a str],
 ) -> String {
     let last = |key: &'a str| key.rsplit('.').next().unwrap_or(key);
-    // Keys without their section are a common slip: compare both forms.
+    // Omitting the section is a common mistake: compare both forms.
     let forms = keys.clone().map(last).chain(keys.clone());
     let near = nearest_name(wrong, words.iter().copied().chain(forms));
     let full =

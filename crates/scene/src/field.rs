@@ -1,4 +1,4 @@
-//! How a row of the parameter table is read from a scene and written to it.
+//! Accessors that read and write parameters of a scene.
 
 use super::Scene;
 use super::value::Value;
@@ -12,7 +12,7 @@ pub struct Field<T> {
     pub(super) set: fn(&mut T, &Value),
 }
 
-// Derived, these would require `T: Copy`.
+// A derive would require `T: Copy`.
 impl<T> Clone for Field<T> {
     fn clone(&self) -> Self {
         *self
@@ -24,11 +24,11 @@ impl<T> Copy for Field<T> {}
 /// Where the value of a row is stored.
 #[derive(Clone, Copy, Debug)]
 pub enum Access {
-    /// In the contact parameters: of the scene, and of each ball joint.
+    /// In the contact parameters of the scene and of each ball joint.
     Contact(Field<contact::Parameters>),
     /// In the scene itself.
     Scene(Field<Scene>),
-    /// In the scene's text: changing it reads the scene again.
+    /// In the scene's text; a change reads the scene again.
     Number,
 }
 
@@ -51,7 +51,7 @@ impl FieldValue for f64 {
     }
 }
 
-/// Words of a switch.
+/// Words for `true` and `false`.
 pub(super) const SWITCH: [&str; 2] = ["on", "off"];
 
 impl FieldValue for bool {
@@ -64,7 +64,7 @@ impl FieldValue for bool {
     }
 }
 
-/// The variant that `value` names.
+/// The enum variant named by `value`.
 pub(super) fn word_of<T: Words>(value: &Value) -> T {
     match value {
         Value::Choice(word) => T::of_word(word).expect("the table has checked the word"),

@@ -1,6 +1,5 @@
-//! The sections of a scene file and the tables within them, key by key: what reads a key asks for it by its name, and its value
-//! is taken as its row says. Parameters have their rows in `table.rs`, force elements in `elements.rs`, laws of drives in
-//! `drives.rs`.
+//! Sections and nested tables of a scene file, one row per key. Readers ask for a key by name; its row determines how the
+//! value is read. Rows of parameters are in `table.rs`, of force elements in `elements.rs`, of drive laws in `drives.rs`.
 
 use std::sync::LazyLock;
 
@@ -15,11 +14,11 @@ use jointplay_physics::simulate::PLOT_WORDS;
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
 
-/// Most parameters that a file may define.
+/// Maximum number of user-defined parameters.
 const MOST_OWN: usize = 1000;
-/// Time scales that a window may begin with.
+/// Range of the initial time scale.
 const SLOWEST_TO_REAL: (f64, f64) = (1e-4, 1.0);
-/// Most files that a scene may include.
+/// Maximum number of included files.
 const MOST_FILES: usize = 100;
 /// Largest length of a shape, and of the paper's machine, m.
 const LARGEST: f64 = 1000.0;
@@ -29,7 +28,7 @@ const WORLD: &str = "the world's";
 const PARENT: &str = "the parent's: the world's where there is no `parent`";
 const BODY_FRAME: &str = "the body's; of a fixed shape, the world's";
 
-/// Rows one after the other.
+/// Concatenated rows.
 fn joined(rows: &[&[FileKey]]) -> &'static [FileKey] {
     rows.concat().leak()
 }
@@ -49,14 +48,14 @@ fn parameters(section: &str) -> Vec<FileKey> {
     table().iter().filter_map(own).collect()
 }
 
-/// Rows of the parameters that a ball joint may have of its own.
+/// Rows of the parameters that a ball joint may override.
 fn contact_keys() -> Vec<FileKey> {
     let all = parameters("contact");
     let own = |key: &FileKey| contact_rows().any(|(part, _)| part == key.name);
     all.into_iter().filter(own).collect()
 }
 
-/// The whole file.
+/// Top-level table of a scene file.
 pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     let names = [
         key("name", ValueType::Name, "\"press\"", "short name, for outputs").absent("the file's").fixed(),
@@ -102,13 +101,13 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     )
 });
 
-/// An included file.
+/// Top-level table of an included file.
 pub(super) static INCLUDED: LazyLock<FileTable> = LazyLock::new(|| {
     let help = "lists that belong to the scene that includes it";
     FileTable::new("included", "an included file", help, lists().leak())
 });
 
-/// Lists that a file may have.
+/// Lists allowed in a file.
 fn lists() -> Vec<FileKey> {
     let own = [
         list_of(&PARAMETER, many(MOST_OWN, "parameters"), "{ name = \"stroke\", value = \"20 mm\" }"),
@@ -117,7 +116,7 @@ fn lists() -> Vec<FileKey> {
     own.into_iter().chain(parts()).collect()
 }
 
-/// Lists that a file and a pattern may have.
+/// Lists allowed in a file and in a pattern.
 fn parts() -> Vec<FileKey> {
     let parts = [
         list_of(
@@ -146,7 +145,7 @@ fn parts() -> Vec<FileKey> {
     parts.into_iter().chain(elements).collect()
 }
 
-/// A list of tables, each like the one in `like` if that is not empty, under the name of the table.
+/// A list of tables under the table's name; `like` is an example of an entry, or empty.
 fn list_of(table: &'static FileTable, many: ListLimit, like: &'static str) -> FileKey {
     let like = match like {
         "" => "",
@@ -298,7 +297,7 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
     FileTable::new("body", "[[body]]", "a rigid body", joined(&[&name, &mass()]))
 });
 
-/// What a body weighs and looks like.
+/// Rows of mass properties and shapes.
 fn mass() -> [FileKey; 6] {
     [
         key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "its mass").or("density"),
@@ -577,7 +576,7 @@ static CYLINDRICAL_START: FileTable = FileTable::new(
     ],
 );
 
-/// A motion of one of two coordinates.
+/// Row of the drive of one of two coordinates.
 fn motion(freedom: Freedom, like: &'static str, help: &'static str) -> FileKey {
     key(freedom.word(), ValueType::Table(&DRIVE), like, help).absent("it is free to move")
 }
@@ -709,7 +708,7 @@ static ABOUT: FileTable = FileTable::new(
     ],
 );
 
-/// Every table of a scene file: the whole file, then the tables that its keys take, each after the one that names it first.
+/// All tables of a scene file: the top level, then the nested tables, each once, after the table that first refers to it.
 pub fn file_tables() -> Vec<&'static FileTable> {
     fn add(table: &'static FileTable, all: &mut Vec<&'static FileTable>) {
         if all.iter().all(|other| other.name != table.name) {

@@ -1,12 +1,11 @@
-//! Formulas of time that prescribe a motion.
+//! Drive formulas: a prescribed coordinate as a function of time.
 
 use super::document::Node;
 use super::{Dimension, SceneError, parse_quantity};
 use jointplay_physics::expression::Program;
 use jointplay_physics::jet::Jet;
 
-/// The expression under a key that prescribes a coordinate of `dimension`, with `t` as its only variable, and one `unit` of
-/// it in SI.
+/// Reads a drive formula in `t` for a coordinate of `dimension`; returns the compiled program and the size of its `unit`, SI.
 pub(super) fn read_formula(
     node: &Node<'_>,
     unit: Option<&Node<'_>>,
@@ -48,11 +47,10 @@ pub(super) fn read_formula(
     Ok((program, scale))
 }
 
-/// An error at byte `at` of a text value.
 fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
     let span = node.value.span();
     let inner = span.start + 1;
-    // With escapes, or in three quotes, the value as a whole is marked.
+    // A string with escapes or triple quotes is marked as a whole, because its offsets differ from the source.
     let plain = node.document.text.get(inner..).is_some_and(|rest| rest.starts_with(text));
     let start = if plain { inner + at } else { span.start };
     let excerpt = node.document.excerpt(span.clone());

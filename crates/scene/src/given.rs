@@ -1,56 +1,56 @@
-//! What a scene's text gives: its numbers by key, and the parameters of its own.
+//! Values parsed from the scene file: numbers by key, and user-defined parameters.
 
 use std::ops::Range;
 
 use jointplay_physics::units::{Dimension, si_unit, unit_within};
 
-/// A number that the scene was built from.
+/// A number parsed from the scene file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileNumber {
-    /// SI.
+    /// Value, SI.
     pub value: f64,
-    /// Its dimension.
+    /// Physical dimension.
     pub dimension: Dimension,
     pub(super) place: Place,
-    /// Unit in which the file writes it, or the SI one.
+    /// Unit used in the file, or the SI unit if the text names none.
     pub(super) unit: &'static str,
 }
 
-/// Where in the scene's text a number is written: a range of bytes.
+/// Location of a number in the scene's text, as a byte range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Place {
-    /// The number alone.
+    /// A single number.
     Value(Range<usize>),
-    /// A vector in one text.
+    /// A component of a vector written as one string; the range covers the string.
     Part(Range<usize>),
-    /// In a file that the scene includes.
+    /// In an included file.
     Included,
-    /// Nowhere: it has a default, and was changed.
+    /// Not in the text: a default that was changed.
     DefaultRule,
 }
 
 impl FileNumber {
-    /// Written as `text` at `place`.
+    /// A number written as `text` at `place`.
     pub(super) fn new(value: f64, dimension: Dimension, place: Place, text: &str) -> Self {
         Self { value, dimension, place, unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)) }
     }
 }
 
-/// A parameter that a scene file defines.
+/// A user-defined parameter from `[[parameter]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UserParameter {
     /// `parameter.<name>`.
     pub key: String,
-    /// Name for the interface.
+    /// Display name.
     pub label: String,
-    /// What it is.
+    /// Help text.
     pub help: String,
-    /// Its dimension.
+    /// Physical dimension.
     pub dimension: Dimension,
-    /// Unit in which it is shown.
+    /// Display unit.
     pub unit: &'static str,
     /// Closed range, SI; `None` if the file gives none.
     pub range: Option<(f64, f64)>,
-    /// Value that the file gives, SI; `None` if that is an expression.
+    /// Value in the file, SI; `None` if it is an expression.
     pub default: Option<f64>,
 }

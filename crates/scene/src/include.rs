@@ -1,4 +1,4 @@
-//! Other files that a scene file takes its parts from: `include = ["leg.toml"]`.
+//! Files included by a scene file: `include = ["leg.toml"]`.
 
 use std::sync::Arc;
 use toml::Spanned;
@@ -8,10 +8,10 @@ use super::document::{Document, Section};
 use super::format::{FILE, INCLUDED};
 use super::*;
 
-/// Names and texts of the files that `top` includes, in its order.
+/// Names and texts of the files included by `top`, in the order listed.
 ///
 /// # Errors
-/// No list of names, a name that is there twice, a file that cannot be read, or that of the scene itself.
+/// `include` is not a list of names, lists a file twice or names the scene's own file, or a file cannot be read.
 pub(super) fn included_texts<'d>(top: &Section<'d>) -> Result<Vec<(&'d str, Arc<str>)>, SceneError> {
     let mut texts: Vec<(&str, Arc<str>)> = Vec::new();
     let nodes = top.get("include").map(|node| node.entries());
@@ -34,10 +34,10 @@ pub(super) fn document<'d>(of: Document<'d>, name: &'d str, text: &'d str) -> Do
     Document { file: Some(name), text, included: true, ..of }
 }
 
-/// What an included file holds.
+/// Top-level section of an included file.
 ///
 /// # Errors
-/// A key that only the scene's own file may have.
+/// The file has a key that is allowed only in the scene's own file.
 pub(super) fn section<'d>(document: Document<'d>, parsed: &'d Spanned<DeTable<'d>>) -> Result<Section<'d>, SceneError> {
     let keys = parsed.get_ref().iter().map(|(key, _)| key);
     let own = keys.filter(|key| INCLUDED.key(key.get_ref(), None).is_none() && FILE.key(key.get_ref(), None).is_some());

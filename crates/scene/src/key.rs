@@ -1,87 +1,87 @@
-//! What the sections of a scene file are made of: rows, each a key with the value that it takes. The reader, the JSON schema and
-//! the reference all go by the same rows. They are in `format.rs`, and those of force elements and laws of drives where these are.
+//! Row types of the scene file: a row describes a key and its value. The reader, the JSON schema and the reference use the
+//! same rows. They are in `format.rs`; those of force elements and drive laws are in `elements.rs` and `drives.rs`.
 
 use jointplay_physics::units::Dimension;
 
-/// Largest length, speed, angle, … in SI units that a file may give.
+/// Largest length, speed, angle, … allowed in a file, SI.
 pub(super) const MAX_SI: f64 = 1e6;
 /// Lower end of a range that excludes 0.
 pub const ABOVE_ZERO: f64 = f64::MIN_POSITIVE;
-/// Range of a number that only [`MAX_SI`] bounds.
+/// Range of a number limited only by [`MAX_SI`].
 pub(super) const ANY: (f64, f64) = (-MAX_SI, MAX_SI);
-/// Range of numbers that are checked together.
+/// Range of numbers that are not checked one by one.
 const UNCHECKED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// A section of the file, or a table within one.
 #[derive(Debug)]
 pub struct FileTable {
-    /// Its name, that of no other table.
+    /// Unique name.
     pub name: &'static str,
-    /// What it is called: `[[body]]` where the file has a section for it.
+    /// Heading: `[[body]]` for a section of the file.
     pub head: &'static str,
-    /// What it is.
+    /// One-line description.
     pub help: &'static str,
-    /// Its keys. One may stand there twice, for different variants.
+    /// Keys. A name may occur twice, for different variants.
     pub keys: &'static [FileKey],
-    /// What decides which of them there are.
+    /// Rule that selects the variant; `None` if there is only one.
     pub variants: Option<Variants>,
-    /// Another table, all of whose keys are among its own.
+    /// Another table whose keys are all included in this one.
     pub also: Option<&'static FileTable>,
 }
 
-/// What decides which keys a table has.
+/// Rule that selects the variant of a table, and thus its keys.
 #[derive(Clone, Copy, Debug)]
 pub enum Variants {
-    /// The word of a key, and what one of a word is called: `a {} joint`; "" where the keys of other words are as unknown
-    /// as any others.
+    /// By the word under a key. The second text is a noun for errors, with `{}` for the word: `{} joint`; if it is "", keys of
+    /// other variants are reported as unknown.
     Word(&'static str, &'static str),
-    /// Which one of these keys is there.
+    /// By which one of these keys is present.
     Presence(&'static [&'static str]),
 }
 
 /// A key of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct FileKey {
-    /// As the file writes it.
+    /// Name in the file.
     pub name: &'static str,
-    /// Its value.
+    /// Type of its value.
     pub takes: ValueType,
-    /// An example, as a file writes it; "" for a parameter of the table of parameters.
+    /// Example in TOML; "" for a parameter of the parameter table.
     pub like: &'static str,
-    /// Dimension and example where it belongs to a hinge, if they are others there.
+    /// Dimension and example on a hinge, if different.
     pub on_hinge: Option<(Dimension, &'static str)>,
-    /// What holds where it is left out.
+    /// Default.
     pub absent: DefaultRule,
-    /// In whose frame its value is; "" where it has none.
+    /// Reference frame of the value; "" if none.
     pub frame: &'static str,
-    /// What it is, in a line.
+    /// One-line description.
     pub help: &'static str,
-    /// Variants of the table that have it; all if empty.
+    /// Variants of the table that have this key; all if empty.
     pub of: &'static [&'static str],
-    /// Whether it can only be changed in the file, although it is a number.
+    /// Whether it can be changed only in the file.
     pub fixed: bool,
 }
 
-/// Values that a key takes.
+/// Type of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum ValueType {
-    /// A quantity or an expression: dimension, and closed range, SI.
+    /// A quantity or an expression: dimension and closed range, SI.
     Number(Dimension, (f64, f64)),
-    /// Three of them.
+    /// Three numbers: dimension and closed range of each component, SI.
     Vector(Dimension, (f64, f64)),
-    /// A number of them.
+    /// This many numbers of one dimension.
     Numbers(usize, Dimension),
-    /// A vector that is not 0, of pure numbers; its length does not matter.
+    /// A nonzero vector of pure numbers, of any length.
     Direction,
     /// A quantity of any dimension.
     Quantity,
-    /// Two of them.
+    /// A range: two quantities.
     Range,
     /// A whole number in a closed range.
     Whole(u32, u32),
     /// `true` or `false`.
     Flag,
-    /// A text.
+    /// A string.
     Text,
     /// A new name.
     Name,
@@ -91,11 +91,11 @@ pub enum ValueType {
     Joint,
     /// The name of a file beside the scene.
     File,
-    /// One of some words.
+    /// One of these words.
     Word(&'static [&'static str]),
-    /// A list of them.
+    /// A list of these words.
     Words(&'static [&'static str], ListLimit),
-    /// The value of a row of the table of parameters, by its key there.
+    /// The value of a parameter, by its key in the parameter table.
     Parameter(&'static str),
     /// A table.
     Table(&'static FileTable),
@@ -105,16 +105,16 @@ pub enum ValueType {
     Vectors(Dimension, ListLimit),
     /// A list of pairs of quantities.
     Pairs([Dimension; 2], ListLimit),
-    /// A list of names of files beside the scene.
+    /// A list of file names, beside the scene.
     Files(ListLimit),
 }
 
-/// How many entries a list may have, and what they are called.
+/// Maximum length of a list, and the noun for its entries.
 #[derive(Clone, Copy, Debug)]
 pub struct ListLimit {
-    /// Most of them.
+    /// Maximum number of entries.
     pub most: usize,
-    /// What they are called.
+    /// Plural noun for the entries.
     pub what: &'static str,
 }
 
@@ -123,16 +123,16 @@ pub(super) const fn many(most: usize, what: &'static str) -> ListLimit {
     ListLimit { most, what }
 }
 
-/// What holds where a key is left out.
+/// Default of an omitted key.
 #[derive(Clone, Copy, Debug)]
 pub enum DefaultRule {
-    /// It must be given.
+    /// Required.
     Fault,
-    /// It must be given, unless this other key is.
+    /// Required unless this other key is present.
     Or(&'static str),
-    /// This number, SI, of each component; no rotation; no limit if it is infinite.
+    /// This number, SI, for each component; for a rotation, the identity; infinite for no limit.
     Is(f64),
-    /// What the words say.
+    /// A default described in words.
     Means(&'static str),
 }
 
@@ -147,31 +147,31 @@ impl FileTable {
         Self { name, head, help, keys, variants: None, also: None }
     }
 
-    /// With all keys of `other` among its own.
+    /// Declares that the table includes all keys of `other`.
     pub(super) const fn also(mut self, other: &'static Self) -> Self {
         self.also = Some(other);
         self
     }
 
-    /// With variants.
+    /// Adds variants.
     pub(super) const fn by(mut self, variants: Variants) -> Self {
         self.variants = Some(variants);
         self
     }
 
-    /// Rows of the variant `word`; all if there is none.
+    /// Rows of the variant `word`; all rows if `None`.
     pub fn of(&self, word: Option<&'static str>) -> impl Iterator<Item = &'static FileKey> + use<> {
         let keys = self.keys.iter();
         keys.filter(move |key| word.is_none_or(|word| key.is_of(word)))
     }
 
-    /// Row of the key `name`: that of the variant `word` if it has one.
+    /// Row of the key `name`, of the variant `word` if it has one.
     pub fn key(&self, name: &str, word: Option<&'static str>) -> Option<&'static FileKey> {
         let named = |key: &&FileKey| key.name == name;
         self.of(word).find(named).or_else(|| self.keys.iter().find(named))
     }
 
-    /// Words of its variants; none if it has no variants.
+    /// Names of its variants; empty if it has none.
     pub fn words(&self) -> &'static [&'static str] {
         match self.variants {
             None => &[],
@@ -184,65 +184,65 @@ impl FileTable {
     }
 }
 
-/// A key that must be given.
+/// A required key.
 pub(super) const fn key(name: &'static str, takes: ValueType, like: &'static str, help: &'static str) -> FileKey {
     FileKey { name, takes, like, on_hinge: None, absent: DefaultRule::Fault, frame: "", help, of: &[], fixed: false }
 }
 
 impl FileKey {
-    /// One that may be left out; `words` say what holds then.
+    /// Makes the key optional, with a default described by `words`.
     pub(super) const fn absent(mut self, words: &'static str) -> Self {
         self.absent = DefaultRule::Means(words);
         self
     }
 
-    /// One that is `value`, SI, where it is left out.
+    /// Sets the default, SI.
     pub(super) const fn is(mut self, value: f64) -> Self {
         self.absent = DefaultRule::Is(value);
         self
     }
 
-    /// One that is 0 where it is left out.
+    /// Sets the default to 0.
     pub(super) const fn zero(self) -> Self {
         self.is(0.0)
     }
 
-    /// One that may be left out where `other` is given.
+    /// Makes the key optional if `other` is present.
     pub(super) const fn or(mut self, other: &'static str) -> Self {
         self.absent = DefaultRule::Or(other);
         self
     }
 
-    /// In the frame `frame`.
+    /// Sets the reference frame.
     pub(super) const fn frame(mut self, frame: &'static str) -> Self {
         self.frame = frame;
         self
     }
 
-    /// Of these variants of its table.
+    /// Restricts the key to these variants of its table.
     pub(super) const fn of(mut self, variants: &'static [&'static str]) -> Self {
         self.of = variants;
         self
     }
 
-    /// Of another dimension on a hinge.
+    /// Sets dimension and example on a hinge.
     pub(super) const fn on_hinge(mut self, dimension: Dimension, like: &'static str) -> Self {
         self.on_hinge = Some((dimension, like));
         self
     }
 
-    /// One that only the file can change.
+    /// Makes the key changeable only in the file.
     pub(super) const fn fixed(mut self) -> Self {
         self.fixed = true;
         self
     }
 
-    /// Whether the variant `word` has it.
+    /// Whether the variant `word` has this key.
     pub fn is_of(&self, word: &str) -> bool {
         self.of.is_empty() || self.of.contains(&word)
     }
 
-    /// The table that it takes, or those of which it takes a list.
+    /// Table of its value, or of the entries of its list.
     pub fn table(&self) -> Option<&'static FileTable> {
         match self.takes {
             ValueType::Table(table) | ValueType::List(table, _) => Some(table),
@@ -250,13 +250,13 @@ impl FileKey {
         }
     }
 
-    /// An example; `hinge`: whether it belongs to one.
+    /// Example, that for a hinge if `hinge`.
     pub(super) fn like(&self, hinge: bool) -> &'static str {
         let own = self.on_hinge.filter(|_| hinge);
         own.map_or(self.like, |(_, like)| like)
     }
 
-    /// Dimension of its numbers, where they have one; of pairs, that of the second. `hinge`: whether it belongs to one.
+    /// Dimension of its numbers, if any; for pairs, of the second number. `hinge` selects the dimension on a hinge.
     pub fn dimension(&self, hinge: bool) -> Option<Dimension> {
         let dimension = match self.takes {
             ValueType::Number(dimension, _)
@@ -278,7 +278,7 @@ impl FileKey {
         }
     }
 
-    /// Most entries of its list.
+    /// Limit of its list, if any.
     pub fn many(&self) -> Option<ListLimit> {
         match self.takes {
             ValueType::List(_, many)
@@ -291,7 +291,7 @@ impl FileKey {
     }
 }
 
-/// A quantity that only [`MAX_SI`] bounds.
+/// A quantity limited only by [`MAX_SI`].
 pub(super) const fn number(dimension: Dimension) -> ValueType {
     ValueType::Number(dimension, ANY)
 }
@@ -301,7 +301,7 @@ pub(super) const fn positive(dimension: Dimension, most: f64) -> ValueType {
     ValueType::Number(dimension, (ABOVE_ZERO, most))
 }
 
-/// Three quantities.
+/// A vector without a range.
 pub(super) const fn vector(dimension: Dimension) -> ValueType {
     ValueType::Vector(dimension, UNCHECKED)
 }

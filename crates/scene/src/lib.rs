@@ -1,8 +1,8 @@
-//! Scenes as data: a text file, the machine that it describes, and the single table of its parameters.
+//! Scenes as data: a text file, the machine it describes, and the single parameter table.
 //!
-//! [`Scene::load`] reads a built-in scene or a file, [`Scene::parse`] a text. Errors name line, key and what is allowed
-//! ([`SceneError`]). A [`Scene`] holds a [`Machine`], which is all that a simulation needs, and
-//! changes it by key ([`Scene::set`]); [`table()`] lists the keys. A [`LiveScene`] changes parameters while it runs.
+//! [`Scene::load`] reads a built-in scene or a file, [`Scene::parse`] a text. Errors name the line, the key and the allowed
+//! values ([`SceneError`]). A [`Scene`] holds the [`Machine`] to simulate and changes it by key ([`Scene::set`]);
+//! [`table()`] lists the keys. A [`LiveScene`] changes parameters during a run.
 //!
 //! ```
 //! use jointplay_physics::simulate::Effect;
@@ -90,8 +90,8 @@ use jointplay_physics::machine::{
 };
 use jointplay_physics::units::{Dimension, format_quantity, parse_quantity, si_unit, unit_names};
 
-/// The parameter of any scene (by its key or the last part of it) or other word from `words` nearest to `wrong`, as errors
-/// quote it: in brackets, or empty.
+/// A hint for error messages: the parameter nearest to `wrong`, by its key or last key part, or the nearest of `words`; in
+/// brackets, or empty if none is near.
 pub fn suggest_parameter(wrong: &str, words: &[&'static str]) -> String {
     let keys = table().iter().map(|parameter| parameter.key);
     error::nearest_parameter(wrong, keys, words)

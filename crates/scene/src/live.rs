@@ -1,4 +1,4 @@
-//! A scene in motion: a running simulation, and the scene whose parameters change it.
+//! A running simulation with its scene, whose parameters can be changed.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
@@ -9,19 +9,19 @@ use jointplay_physics::simulate::{ChangeError, Effect, Simulation, Snapshot, Sta
 /// Why a parameter of a running scene was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SetError {
-    /// A key or value that the scene does not accept.
+    /// The scene rejects the key or value.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A change that the running simulation does not accept.
+    /// The running simulation rejects the change.
     #[error(transparent)]
     Change(#[from] ChangeError),
 }
 
-/// A running simulation with its scene: as it is running, and as it is wanted, with the changes that wait for a reset.
+/// A running simulation with its scene in effect, and a pending scene with the changes that wait for a reset.
 pub struct LiveScene {
     pending: Arc<Scene>,
     running: Arc<Scene>,
-    /// Of the machine of `running`.
+    /// Simulates the machine of `running`.
     simulation: Simulation,
 }
 
@@ -59,7 +59,7 @@ impl LiveScene {
     /// Starts `scene` at t = 0.
     ///
     /// # Errors
-    /// As [`Simulation::new`].
+    /// Same as [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         let simulation = Simulation::new(&scene.machine)?;
         let scene = Arc::new(scene.clone());
@@ -71,7 +71,7 @@ impl LiveScene {
         &self.pending
     }
 
-    /// The scene as it is running: without the changes that wait for a reset.
+    /// The scene in effect, without the changes that wait for a reset.
     pub fn running(&self) -> &Scene {
         &self.running
     }
@@ -79,15 +79,15 @@ impl LiveScene {
     /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
     ///
     /// # Errors
-    /// Unknown key, bad unit, out of range: the running simulation is unchanged.
+    /// Unknown key, wrong unit or value out of range; the running simulation is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
         self.change(|scene| scene.set(key, value).map(|_| ()))
     }
 
-    /// As [`Self::set`], with a value in SI units.
+    /// Like [`Self::set`], with a value in SI units.
     ///
     /// # Errors
-    /// As [`Self::set`].
+    /// Same as [`Self::set`].
     pub fn set_value(&mut self, key: &str, value: &Value) -> Result<Effect, SetError> {
         self.change(|scene| scene.set_value(key, value).map(|_| ()))
     }
@@ -96,7 +96,7 @@ impl LiveScene {
         let mut pending = Scene::clone(&self.pending);
         change(&mut pending)?;
         let mut running = Scene::clone(&self.running);
-        // What the running scene cannot accept may suit the pending one, say a joint of a longer chain.
+        // A change may be valid only for the pending scene, e.g. for a joint of a longer chain.
         let effect = match change(&mut running) {
             Ok(()) => self.simulation.adopt(&running.machine)?,
             Err(_) => Effect::AtReset,
@@ -108,17 +108,17 @@ impl LiveScene {
         Ok(effect)
     }
 
-    /// Back to t = 0 with the current parameters, including those that wait for a reset.
+    /// Restarts at t = 0 with all changes, including those that wait for a reset.
     ///
     /// # Errors
-    /// As [`Simulation::new`]; nothing has changed then.
+    /// Same as [`Simulation::new`]; `self` is then unchanged.
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation = Simulation::new(&self.pending.machine)?;
         self.running = self.pending.clone();
         Ok(())
     }
 
-    /// The whole state.
+    /// Captures the complete state.
     pub fn snapshot(&self) -> SceneSnapshot {
         SceneSnapshot {
             pending: self.pending.clone(),
@@ -127,7 +127,7 @@ impl LiveScene {
         }
     }
 
-    /// A scene in the state of `snapshot`, as [`Simulation::of`].
+    /// A live scene in the state of `snapshot`; see [`Simulation::of`].
     pub fn of(snapshot: &SceneSnapshot) -> Self {
         Self {
             pending: snapshot.pending.clone(),
@@ -136,7 +136,7 @@ impl LiveScene {
         }
     }
 
-    /// Restores a state of this scene, or of any other, as [`Simulation::restore`].
+    /// Restores a state of this scene or of any other; see [`Simulation::restore`].
     pub fn restore(&mut self, snapshot: &SceneSnapshot) {
         self.simulation.restore(&snapshot.simulation);
         self.pending = snapshot.pending.clone();

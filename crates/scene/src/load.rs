@@ -1,4 +1,4 @@
-//! Where scenes come from: the built-in ones, and files.
+//! Loading of built-in scenes and scene files.
 
 use super::assets::{AssetResolver, LARGEST_FILE};
 use super::error::line_and_column;
@@ -8,7 +8,7 @@ use std::ffi::OsStr;
 use std::io::Read;
 use std::path::Path;
 
-/// Scenes that are embedded in the program: lists of their names, each with the folder of `assets/` in which they lie, and their texts.
+/// Embeds scenes from folders of `assets/`: defines the lists of their names and a lookup of their texts.
 macro_rules! embedded {
     ($($(#[$about:meta])* $list:ident in $folder:literal: $($name:literal),+;)+) => {
         $($(#[$about])* pub const $list: [&str; [$($name),+].len()] = [$($name),+];)+
@@ -33,39 +33,39 @@ embedded! {
         "scott-russell", "trammel";
 }
 
-/// The scene that opens if none is named.
+/// The scene opened if none is named.
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 
-/// Most bodies of a scene, including a chain's links.
+/// Maximum number of bodies in a scene, including chain links.
 pub const MOST_BODIES: usize = 10_000;
-/// Most ball joints of a scene, including a chain's.
+/// Maximum number of ball joints in a scene, including a chain's.
 pub const MOST_BALL_JOINTS: usize = 10_000;
-/// Most shapes of a scene, on bodies and fixed.
+/// Maximum number of shapes in a scene, on bodies and fixed.
 pub const MOST_SHAPES: usize = 50_000;
-/// Most force elements of each kind.
+/// Maximum number of force elements of each kind.
 pub const MOST_ELEMENTS: usize = 10_000;
-/// Most corners of a plate.
+/// Maximum number of corners of a plate.
 pub const MOST_CORNERS: usize = 100;
-/// Most changes of a scene.
+/// Maximum number of changed parameters.
 pub const MOST_CHANGES: usize = 4096;
 
-/// The message for a larger one.
+/// Error message for a scene file above the size limit.
 pub fn too_large() -> String {
     format!("too large for a scene file: more than {} MiB", LARGEST_FILE >> 20)
 }
 
-/// The name of a built-in scene or a benchmark that is nearest to `name`, as a question, and both lists.
+/// A question with the built-in scene or benchmark nearest to `name`, and the list of both.
 fn known_names(name: &str) -> (String, String) {
     let near = nearest(name, BUILT_IN.into_iter().chain(BENCHMARKS));
     (near, format!("{}; benchmarks: {}", BUILT_IN.join(", "), BENCHMARKS.join(", ")))
 }
 
 impl Scene {
-    /// A built-in scene or a benchmark by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; the last
-    /// change of a key wins.
+    /// Loads a built-in scene or benchmark by name, or a file (contains `/` or ends in `.toml`). Changes are applied in order;
+    /// the last change of a key wins.
     ///
     /// # Errors
-    /// Unreadable file, anything wrong in it, or a bad change.
+    /// Unknown name, unreadable or invalid file, or invalid change.
     pub fn load(argument: impl AsRef<OsStr>, changes: &[(String, String)]) -> Result<Self, SceneError> {
         let path = argument.as_ref();
         // A file name need not be valid UTF-8; messages about it must be.

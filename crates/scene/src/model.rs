@@ -1,5 +1,5 @@
-//! A scene: the machine that its file describes, how that is to be viewed, and the text from which it was read. `read.rs` builds it
-//! from a file, `parameters.rs` changes it by key.
+//! A scene: the machine described by its file, the view settings and the source text. `read.rs` builds it from a file,
+//! `access.rs` changes it by key.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,30 +8,30 @@ use super::given::{FileNumber, UserParameter};
 use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::words::words;
 
-/// A scene file with the machine that it describes.
+/// A scene file and the machine it describes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Short name: that of the built-in scene, or of the file without its extension.
+    /// Short name: `name` in the file, or else the file name without its extension.
     pub name: String,
     /// A one-line title, for lists.
     pub title: String,
     /// A paragraph for the user.
     pub description: String,
-    /// What it describes.
+    /// The machine to simulate.
     pub machine: Machine,
-    /// Set in scenes made of repeated links.
+    /// Set if the file has a `[chain]`.
     pub chain: Option<Chain>,
-    /// How it is to be viewed.
+    /// View settings.
     pub view: ViewSettings,
     /// Keys (without prefix) in which each ball joint differs from the scene's `contact.*`.
     pub(super) overrides: Vec<Vec<&'static str>>,
-    /// Text the scene was read from, and its origin: a reset reads it again with the changes.
+    /// Source text and its origin; a rebuild reads it again with the changes.
     pub source: Source,
     /// Parameters changed since the file was read, in order: key and value as a user would write them.
     pub changes: Vec<(String, String)>,
 }
 
-/// Texts of files by the names that a scene gives them.
+/// Texts of files, by the names used in the scene.
 pub type Texts = BTreeMap<String, Arc<str>>;
 
 /// Where a scene's text came from.
@@ -41,18 +41,18 @@ pub struct Source {
     pub file: Option<String>,
     /// The TOML text.
     pub text: String,
-    /// Byte offsets in the text of what errors found after reading point to: each parameter given in the text, by key;
-    /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
+    /// Byte offsets in the text for errors found after reading: each parameter in the text, by key; `spcmm` for its section;
+    /// `joint.<name>` for each ball joint (in a chain, the chain's section).
     pub places: BTreeMap<String, usize>,
-    /// Numbers from which the scene was built, by key.
+    /// Numbers parsed from the text, by key.
     pub numbers: Arc<BTreeMap<String, FileNumber>>,
-    /// The scene's own parameters, in the order of the file.
+    /// User-defined parameters, in file order.
     pub own: Vec<UserParameter>,
-    /// Texts of the files beside the scene that it names, as they were when it was loaded.
+    /// Contents of the files named by the scene, as of loading.
     pub beside: Texts,
 }
 
-/// A row of equal links.
+/// A chain of identical links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chain {
     /// Number of links.
@@ -94,23 +94,24 @@ impl SignedAxis {
     }
 }
 
-/// How the scene is to be viewed.
+/// Initial view of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewSettings {
     /// World axis that points down on the screen.
     pub down: SignedAxis,
     /// Position of the floor grid: coordinate along `down`, m; `None` lets the view choose.
     pub floor: Option<f64>,
-    /// Azimuth about the vertical and elevation of the isometric view, rad, where the usual one would hide something.
+    /// Azimuth about the vertical and elevation of the isometric view, rad, if the default would hide something.
     pub isometric: Option<(f64, f64)>,
-    /// Simulated seconds per second that a window begins with; `None` lets it choose.
+    /// Initial time scale, simulated seconds per second; `None` lets the window choose.
     pub time_scale: Option<f64>,
-    /// Plots that a window begins with, each one of [`PLOT_WORDS`](jointplay_physics::simulate::PLOT_WORDS); `None` at first lets it choose.
+    /// Initial plots, each one of [`PLOT_WORDS`](jointplay_physics::simulate::PLOT_WORDS); if the first is `None`, the window
+    /// chooses.
     pub plots: [Option<&'static str>; MOST_PLOTS],
 }
 
-/// Most plots that a window may begin with.
+/// Maximum number of initial plots.
 pub const MOST_PLOTS: usize = 4;
 
-/// Keys of what a preset stands for, in the order of [`jointplay_physics::machine::Preset::point`].
+/// Keys set by a preset, in the order of [`jointplay_physics::machine::Preset::point`].
 pub const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];

@@ -1,4 +1,4 @@
-//! Rows, like those of the table, of the numbers and parameters that a scene file gives.
+//! Parameter rows for the numbers and user-defined parameters of a scene file.
 
 use std::collections::BTreeMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -9,7 +9,7 @@ use super::parameters::{Kind, Parameter, Scope};
 use super::value::Value;
 use jointplay_physics::units::Dimension;
 
-/// Row of a number of the file. What the reader allows is checked when the scene is read again.
+/// Row of a number of the file. The reader checks the allowed range when the scene is read again.
 pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {
     interned(Row {
         key,
@@ -23,7 +23,7 @@ pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Paramete
     })
 }
 
-/// Row of a parameter that the file defines.
+/// Row of a user-defined parameter.
 pub(super) fn row_of_own(own: &UserParameter) -> &'static Parameter {
     let default = own.default.unwrap_or_default();
     let around = match default {
@@ -42,10 +42,10 @@ pub(super) fn row_of_own(own: &UserParameter) -> &'static Parameter {
     })
 }
 
-/// Beyond any number of a scene file: limits are the reader's.
+/// Larger than any number in a scene file: the reader enforces the actual limits.
 const LARGEST: f64 = 1e13;
 
-/// What distinguishes one such row from others.
+/// Contents of a row; equal rows are shared.
 struct Row<'a> {
     key: &'a str,
     label: &'a str,
@@ -57,8 +57,7 @@ struct Row<'a> {
     default: Option<f64>,
 }
 
-/// Rows live as long as the program, like those of the table: one for each
-/// key that was asked for, whatever values it takes.
+/// Interned rows live as long as the program, like those of the table. A change of value adds none.
 fn interned(row: Row<'_>) -> &'static Parameter {
     static ROWS: LazyLock<Mutex<BTreeMap<String, &'static Parameter>>> = LazyLock::new(Mutex::default);
     let bits = |(a, b): (f64, f64)| (a.to_bits(), b.to_bits());

@@ -1,40 +1,40 @@
-//! Outlines of plates: whether corners bound a flat area, and the triangles that fill it.
+//! Plate outlines: validity checks and triangulation.
 
 use super::Vec3;
 
-/// How far a corner may lie from the plane of all, as a fraction of the outline's extent: coordinates are typed with few digits.
+/// Tolerance of flatness, as a fraction of the outline's extent: coordinates are typed with few digits.
 const FLAT: f64 = 1e-3;
 
-/// Why corners bound no area. Its `Display` continues "corners: ".
+/// Why an outline is invalid. Its `Display` continues "corners: ".
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum OutlineFault {
-    /// Fewer than three.
+    /// Fewer than three corners.
     #[error("a plate needs at least 3 corners, has {0}")]
     TooFew(usize),
-    /// All on one line.
+    /// All corners are collinear.
     #[error("the corners of a plate lie on one line: they enclose nothing")]
     Line,
-    /// Two neighbours in one place.
+    /// Two adjacent corners coincide.
     #[error("corners {0} and {1} of a plate are the same point")]
     Same(usize, usize),
-    /// One outside the plane of the others.
+    /// A corner is out of the plane.
     #[error("corner {corner} of a plate is {} mm out of the plane of its corners", 1e3 * off)]
     NotFlat {
-        /// Counted from 1.
+        /// One-based index of the corner.
         corner: usize,
         /// Distance from the plane, m.
         off: f64,
     },
-    /// Edges that cross.
+    /// Two edges cross.
     #[error("the edge from corner {0} of a plate crosses that from corner {1}")]
     Crosses(usize, usize),
 }
 
-/// Triangles that fill the polygon with these `corners` in space, in its order, as indices of corners: convex or not, by clipping
-/// ears (Meisters 1975: a polygon that is no triangle has at least two).
+/// Triangulates a planar polygon in space, convex or not, by ear clipping (Meisters 1975: a polygon with more than three corners
+/// has at least two ears). `corners` follow the outline; triangles are indices into them.
 ///
 /// # Errors
-/// Corners that bound no area, or are not in a plane.
+/// The corners bound no area or are not in a plane, or edges cross.
 pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
     let n = corners.len();
     if n < 3 {
@@ -45,7 +45,7 @@ pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
     }
     let middle = corners.iter().sum::<Vec3>() / n as f64;
     let off = |i: usize| corners[i % n] - middle;
-    // Newell's normal: twice the area, whatever the shape.
+    // Newell's normal; its length is twice the area, whatever the shape.
     let normal = (0..n).map(|i| off(i).cross(&off(i + 1))).sum::<Vec3>();
     let extent = (0..n).map(|i| off(i).norm()).fold(0.0, f64::max);
     if normal.norm() <= 1e-9 * extent * extent {
@@ -58,7 +58,7 @@ pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
     {
         return Err(OutlineFault::NotFlat { corner: corner + 1, off: height(corner) });
     }
-    // Twice the signed area of a triangle, as seen from where the polygon runs anticlockwise.
+    // Twice the signed area of a triangle, positive if oriented like the polygon.
     let area = |i: usize, j: usize, k: usize| {
         let (a, b) = (corners[j] - corners[i], corners[k] - corners[i]);
         a.cross(&b).dot(&normal)
@@ -83,7 +83,7 @@ pub fn fill(corners: &[Vec3]) -> Result<Vec<[usize; 3]>, OutlineFault> {
             let others = || left.iter().copied().filter(|&p| ![i, j, l].iter().any(|&q| corners[p] == corners[q]));
             area(i, j, l) > 0.0 && !others().any(holds)
         };
-        // From the second on, so that a convex outline becomes a fan. Without an ear, rounding has made what is left flat.
+        // Starting at the second corner turns a convex outline into a fan. If there is no ear, rounding made the rest flat.
         let ear = (1..m).chain([0]).find(|&k| is_ear(k));
         if let Some(k) = ear {
             triangles.push(at(k));
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn triangles_fill_convex_and_concave_outlines_in_either_direction() {
-        // In the plane's own coordinates an area is sqrt(1 + 1 + 1/4) as large.
+        // The map to the inclined plane scales areas by sqrt(1 + 1 + 1/4).
         let stretch = 1.5;
         let comb = [
             [0.0, 0.0],

@@ -1,4 +1,4 @@
-//! Parameters that a scene file defines.
+//! User-defined parameters of a scene file.
 
 use super::document::{Node, Section, lists};
 use super::given::UserParameter;
@@ -6,10 +6,10 @@ use super::numbers::row_of_own;
 use super::*;
 use jointplay_physics::units::{all_units, same_unit, split_unit};
 
-/// Reads `[[parameter]]`: the scene's own parameters, in the order of the files, in which one may be made of those before it.
+/// Reads every `[[parameter]]` in file order; a value may use the parameters defined before it.
 ///
 /// # Errors
-/// Anything wrong in one.
+/// An invalid or repeated parameter.
 pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<UserParameter>, SceneError> {
     let mut all: Vec<UserParameter> = Vec::new();
     let nodes = lists(files, "parameter", Vec::new())?;
@@ -23,12 +23,12 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<UserParameter>, Scen
         }
         all.push(own);
     }
-    // What follows from others, in no range of its own, is a number like any other.
+    // An expression without a range is an ordinary number, not an adjustable parameter.
     all.retain(|own| own.default.is_some() || own.range.is_some());
     Ok(all)
 }
 
-/// The error that the value of a parameter uses one of those defined after it, if it does.
+/// The error for a value that uses a parameter defined later; `None` if it uses none.
 fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
     let named = |node: &Node<'_>| Some(node.section().ok()?.require("name").ok()?.name().ok()?.to_string());
     let value = node.section_as(node.title("parameter")).ok()?.require("value").ok()?;
@@ -56,7 +56,7 @@ fn read_parameter(node: &Node<'_>) -> Result<UserParameter, SceneError> {
     let value_node = section.require("value")?;
     let text = value_node.scalar()?;
     let unit = section.get("unit").map(|node| node.text()).transpose()?;
-    // The unit's dimension; without one, that of the value as it is written.
+    // The dimension is that of `unit`, or else of the unit written in the value.
     let wanted = unit.unwrap_or_else(|| split_unit(text));
     let found = all_units().find(|(of, ..)| same_unit(of, wanted));
     let (unit, dimension) = match found {

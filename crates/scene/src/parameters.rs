@@ -1,20 +1,20 @@
-//! What a row of the parameter table says, and the values it takes.
+//! Rows of the parameter table, and checks of their values.
 
 use super::field::Access;
 use super::value::Value;
 use jointplay_physics::suggest::{did_you_mean, nearest_name};
 use jointplay_physics::units::{Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
 
-/// What kind of value a parameter takes.
+/// Type and range of a parameter's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// A number with its dimension and closed range in SI units; `display` is the unit shown to the user.
     Number {
-        /// Dimension.
+        /// Physical dimension.
         dimension: Dimension,
-        /// Least value, SI.
+        /// Minimum, SI.
         min: f64,
-        /// Greatest value, SI.
+        /// Maximum, SI.
         max: f64,
         /// Unit for display and sliders, e.g. "mm".
         display: &'static str,
@@ -25,16 +25,16 @@ pub enum Kind {
     },
     /// A whole number in a closed range.
     Count {
-        /// Least.
+        /// Minimum.
         min: u64,
-        /// Greatest.
+        /// Maximum.
         max: u64,
     },
     /// One of a list of words.
     Choice(&'static [&'static str]),
 }
 
-/// Where a key exists.
+/// Scenes in which a key exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// In every scene.
@@ -45,12 +45,12 @@ pub enum Scope {
     Spcmm,
     /// Only in chains.
     Chain,
-    /// In the scene whose file gives it.
+    /// Only in the scene whose file defines it.
     Own,
 }
 
 impl Scope {
-    /// Where the scope's keys exist, in words.
+    /// The scope in words.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Every => "every scene",
@@ -62,7 +62,7 @@ impl Scope {
     }
 }
 
-/// One row of the table.
+/// A row of the parameter table.
 #[derive(Clone, Debug)]
 pub struct Parameter {
     /// Key, e.g. `contact.clearance`.
@@ -73,11 +73,11 @@ pub struct Parameter {
     pub label: &'static str,
     /// Heading it is listed under, e.g. "Contact".
     pub group: &'static str,
-    /// Values it takes.
+    /// Type and range of its value.
     pub kind: Kind,
     /// Value if neither the file nor a change gives one.
     pub default: Value,
-    /// Where it exists.
+    /// Scenes in which it exists.
     pub scope: Scope,
     /// Takes effect only at the next reset (it would move a drive mid-run, or change the equations).
     pub at_reset: bool,
@@ -91,13 +91,13 @@ pub struct Parameter {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{fault}; {allowed}")]
 pub struct ValueError {
-    /// What is wrong.
+    /// Cause.
     pub fault: ValueFault,
-    /// What is allowed, in words.
+    /// Allowed values, in words.
     pub allowed: String,
 }
 
-/// What is wrong with a value.
+/// Cause of an invalid value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueFault {
     /// Not a quantity of the right dimension.
@@ -112,10 +112,10 @@ pub enum ValueFault {
     /// Not one of the choices.
     #[error("is not one of the choices{}", did_you_mean(*.nearest))]
     NoChoice {
-        /// The nearest of them, if one is near.
+        /// The nearest choice, if one is near.
         nearest: Option<&'static str>,
     },
-    /// A number where a choice is expected, or the like.
+    /// A value of the wrong type, such as a number for a choice.
     #[error("is of the wrong kind")]
     WrongKind,
 }
@@ -142,7 +142,7 @@ impl Parameter {
     /// The range or the choices, in words: `0 Hz to 50 Hz`.
     pub fn range(&self) -> String {
         match self.kind {
-            // The table's upper end is the largest ball radius; what counts is this joint's.
+            // The table's upper end is the largest ball radius; the actual limit is this joint's ball radius.
             Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
                 format!("{} to below the ball radius", format_quantity(min, display))
             }
@@ -154,7 +154,7 @@ impl Parameter {
         }
     }
 
-    /// The units it may be written in, in words; "" for a choice.
+    /// Accepted units, in words; "" for a choice.
     pub fn units(&self) -> String {
         match self.kind {
             Kind::Number { dimension, .. } => match unit_names(dimension).as_slice() {
@@ -166,17 +166,17 @@ impl Parameter {
         }
     }
 
-    /// The allowed values in words, with the units they may be written in.
+    /// Allowed values and units, in words.
     pub fn allowed(&self) -> String {
         let units = self.units();
         let separator = if units.is_empty() { "" } else { "; " };
         format!("allowed {}{separator}{units}", self.range())
     }
 
-    /// Reads a value as users write it, and checks its range.
+    /// Parses a value as users write it, and checks its range.
     ///
     /// # Errors
-    /// What is wrong and what is allowed, without the key.
+    /// Invalid value; the error states what is allowed, without the key.
     pub fn read(&self, text: &str) -> Result<Value, ValueError> {
         let text = text.trim();
         let value = match self.kind {
@@ -211,10 +211,10 @@ impl Parameter {
         Ok(value)
     }
 
-    /// Whether a value is of this parameter's kind and in its range.
+    /// Checks that a value has this parameter's type and is in range.
     ///
     /// # Errors
-    /// What is wrong and what is allowed, without the key.
+    /// Invalid value; the error states what is allowed, without the key.
     pub fn check(&self, value: &Value) -> Result<(), ValueError> {
         let fine = match (self.kind, value) {
             (Kind::Number { min, max, .. }, Value::Number(number)) => (min..=max).contains(number),
@@ -229,7 +229,7 @@ impl Parameter {
         ValueError { fault, allowed: self.allowed() }
     }
 
-    /// A text that [`Self::read`] turns back into exactly this value.
+    /// Formats a value so that [`Self::read`] returns exactly the same value.
     pub fn write(&self, value: &Value) -> String {
         match (self.kind, value) {
             (Kind::Number { dimension, display, .. }, Value::Number(si)) => exact_quantity(*si, display, dimension),

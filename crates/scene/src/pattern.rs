@@ -15,10 +15,10 @@ pub(super) struct Pattern<'d> {
     copies: Vec<PatternInstance>,
 }
 
-/// The patterns of a scene's files.
+/// Reads the patterns of all files of a scene.
 ///
 /// # Errors
-/// Anything wrong in their own keys, or too many copies.
+/// Invalid keys of a pattern, a repeated name, or too many copies.
 pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>>, SceneError> {
     let mut names = BTreeMap::new();
     let mut patterns = Vec::new();
@@ -33,10 +33,10 @@ pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>
     Ok(patterns)
 }
 
-/// Most values that the copies of a pattern may have together.
+/// Maximum number of values in all copies of a pattern.
 const MOST_VALUES: usize = 1_000_000;
 
-/// Number of values in a value.
+/// Number of scalars in a TOML value.
 fn values(value: &DeValue<'_>) -> usize {
     match value {
         DeValue::Array(array) => array.iter().map(|value| values(value.get_ref())).sum(),
@@ -114,17 +114,17 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
     Ok(Pattern { section, copies })
 }
 
-/// The rotation by `angle` about the unit vector `axis`, from `libm`'s functions: start values must be the same bits everywhere.
+/// Rotation by `angle`, rad, about the unit vector `axis`. `libm` gives start values the same bits on every platform.
 fn turned(axis: Vec3, angle: f64) -> Quat {
     let (sin, cos) = libm::sincos(0.5 * angle);
     Quat::new_unchecked(nalgebra::Quaternion::from_parts(cos, axis * sin))
 }
 
 impl<'d> Pattern<'d> {
-    /// What its list `name` gives, copy by copy.
+    /// Entries of the list `name`, repeated for each copy.
     ///
     /// # Errors
-    /// Not a list.
+    /// The value is not a list.
     pub fn nodes(&'d self, name: &str) -> Result<Vec<Node<'d>>, SceneError> {
         let mut nodes = Vec::new();
         if let Some(list) = self.section.get(name) {

@@ -1,4 +1,4 @@
-//! Points on bodies and orientations: their tables, and how they are read.
+//! Attachment points and orientations: tables and readers.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub(super) static ROTATION: FileTable = FileTable::new(
 )
 .by(Variants::Presence(&["axis", "sequence", "x", "quaternion"]));
 
-/// An orientation, none if the key is left out, in one of four forms:
+/// Reads an orientation in one of four forms; the identity if the key is omitted:
 /// `{ axis = [0, 1, 0], angle = "15 deg" }`;
 /// `{ sequence = "xzy", angles = ["0 deg", "2 deg", "15 deg"] }`, R = Rx Rz Ry as in paper eq. (2);
 /// `{ x = [1, 0, 0], y = [0, 1, 0] }`, the body's x axis, and the side on which its y axis lies;
@@ -98,7 +98,7 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
     }
 }
 
-/// A point on a body or the world, under `key`; `bodies` maps names to indices in the sorted scene.
+/// Reads a point on a body or the world from `key`; `bodies` maps names to indices in the sorted scene.
 pub(super) fn read_attachment(
     section: &Section<'_>,
     key: &str,

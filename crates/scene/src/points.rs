@@ -1,4 +1,4 @@
-//! Points of a motion or of a curve: pairs of numbers of which the first rises, from the scene or from a CSV file beside it.
+//! Points of a motion or curve: pairs of numbers with rising abscissas, from the scene or a CSV file beside it.
 
 use std::ops::Range;
 
@@ -9,14 +9,13 @@ use jointplay_physics::units::{Dimension, QuantityError, format_quantity, parse_
 
 /// Shortest interval of a table, ramp or pulse, s.
 pub(super) const SHORTEST_PART: f64 = 1e-6;
-/// Most points of a table.
+/// Maximum number of points in a table.
 pub(super) const MOST_POINTS: usize = 10_000;
-/// First and last point of a period may differ by this fraction of the range of all, as measured ones do.
+/// Allowed mismatch of the ends of a period, as a fraction of the range: measured data do not match exactly.
 const CLOSED: f64 = 1e-9;
 
 type Points = Vec<[f64; 2]>;
 
-/// What is wrong with points.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum PointsFault {
     #[error("has {count} points; allowed {least} to {MOST_POINTS}")]
@@ -39,7 +38,7 @@ enum PointsFault {
     Quantity(#[from] QuantityError),
 }
 
-/// An example of a column's header.
+/// Example of a column header.
 fn header(dimension: Dimension) -> &'static str {
     match dimension {
         Dimension::Time => "time_s",
@@ -50,35 +49,35 @@ fn header(dimension: Dimension) -> &'static str {
     }
 }
 
-/// One of the two numbers of a point.
+/// One of the two axes of a graph.
 #[derive(Clone, Copy)]
 pub(super) struct Axis {
     pub name: &'static str,
     pub dimension: Dimension,
-    /// Largest, SI.
+    /// Largest absolute value, SI.
     pub most: f64,
 }
 
 impl Axis {
-    /// `a time`.
+    /// The name with its article: `a time`.
     fn article(self) -> String {
         let article = if self.name.starts_with('a') { "an" } else { "a" };
         format!("{article} {}", self.name)
     }
 }
 
-/// What points are read.
+/// Axes of a list of points, and the rules that it must obey.
 #[derive(Clone, Copy)]
 pub(super) struct Graph {
     pub axes: [Axis; 2],
-    /// Least rise of the first number from one point to the next, SI, and in words.
+    /// Minimum rise of the abscissa from one point to the next, SI, and in words.
     pub rise: (f64, &'static str),
-    /// Whether they are a period.
+    /// Whether the points are one period.
     pub repeats: bool,
 }
 
 impl Graph {
-    /// A motion, whose coordinate has this dimension.
+    /// A motion whose coordinate has this dimension.
     pub fn motion(dimension: Dimension, repeats: bool) -> Self {
         let axis = |name, dimension| Axis { name, dimension, most: MAX_SI };
         Self {
@@ -88,7 +87,7 @@ impl Graph {
         }
     }
 
-    /// Whether the latest point comes after the one before.
+    /// Checks that the latest point is far enough after the previous one.
     fn check_rise(&self, points: &[[f64; 2]]) -> Result<(), PointsFault> {
         let (least, words) = self.rise;
         match points {
@@ -100,7 +99,7 @@ impl Graph {
     }
 }
 
-/// Points that are written in the scene.
+/// Reads points written in the scene.
 pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneError> {
     let [first, second] = graph.axes;
     let nodes = node.entries()?;
@@ -125,8 +124,8 @@ pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, Scen
     Ok(points)
 }
 
-/// Points of a CSV file: two columns under a header such as `time_s,position_mm` or `t [s]; z [mm]`. Lines that are empty or
-/// begin with `#` do not count.
+/// Reads points from a CSV file: two columns under a header such as `time_s,position_mm` or `t [s]; z [mm]`. Empty lines
+/// and lines that begin with `#` are ignored.
 pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneError> {
     let [first, second] = graph.axes;
     let name = node.text()?;
@@ -181,7 +180,7 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
     Ok(points)
 }
 
-/// Ranges of the cells of a line.
+/// Byte ranges of the trimmed cells of a line.
 fn cells(text: &str, line: Range<usize>) -> Vec<Range<usize>> {
     let mut start = line.start;
     let cell = |cell: &str| {
@@ -203,7 +202,7 @@ struct Column<'t> {
 }
 
 impl<'t> Column<'t> {
-    /// With the unit in its header: in brackets, or after the last underscore.
+    /// Takes the unit from the header: in brackets, or after the last underscore.
     fn new(header: &'t str, axis: Axis) -> Result<Self, PointsFault> {
         let dimension = axis.dimension;
         let bracketed = |open: char, close: char| {
@@ -218,7 +217,7 @@ impl<'t> Column<'t> {
         }
     }
 
-    /// A number of this column, SI.
+    /// Parses a number of this column, SI.
     fn read(&self, number: &str) -> Result<f64, PointsFault> {
         if number.parse::<f64>().is_err() {
             return Err(PointsFault::NotANumber);
@@ -229,7 +228,7 @@ impl<'t> Column<'t> {
     }
 }
 
-/// Whether there are enough points, and whether they make a period; its ends are then made equal.
+/// Checks the number of points. The ends of a period must match, and are then made equal.
 fn close(points: &mut Points, repeats: bool) -> Result<(), PointsFault> {
     let least = if repeats { 3 } else { 2 };
     if points.len() < least {

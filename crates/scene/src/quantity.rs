@@ -1,4 +1,4 @@
-//! Numbers with a dimension, as expressions of a scene file compute with them.
+//! Dimensioned numbers for the expressions in scene files.
 
 use super::{Dimension, format_quantity, si_unit, unit_names};
 use jointplay_physics::expression::{Binary, ExpressionError, Number, Program, Unary};
@@ -8,7 +8,7 @@ use jointplay_physics::units::{all_units, powers, unit_at_start};
 #[derive(Clone, Copy, Debug)]
 pub struct Quantity {
     value: f64,
-    /// Powers of kg, m, s and rad.
+    /// Exponents of kg, m, s and rad.
     powers: Result<[i8; 4], DimensionError>,
 }
 
@@ -18,21 +18,21 @@ pub enum DimensionError {
     /// Sum or comparison of different dimensions.
     #[error("adds or compares quantities of different dimensions")]
     Mixed,
-    /// A function of something that is not a pure number.
+    /// A function of a quantity that is not a pure number.
     #[error("takes a function of a quantity that is not a pure number")]
     NotPure,
-    /// A root or power that leaves no whole powers of the units.
+    /// A root or power that gives units with non-integer exponents.
     #[error("takes a root or a power whose unit would not be whole")]
     Power,
     /// Infinite or NaN.
     #[error("is not a finite number")]
     NotFinite,
-    /// A value of another dimension.
+    /// A value of the wrong dimension.
     #[error("gives {}", foreign(*.value, *.powers, *.wanted))]
     Foreign {
         /// SI value.
         value: f64,
-        /// Its powers of kg, m, s and rad.
+        /// Exponents of kg, m, s and rad.
         powers: [i8; 4],
         /// The dimension required.
         wanted: Dimension,
@@ -50,21 +50,21 @@ impl Quantity {
         self.value
     }
 
-    /// Whether it is a number without a unit.
+    /// Whether it is a pure number.
     pub fn is_pure(&self) -> bool {
         matches!(self.powers, Ok([0, 0, 0, 0]))
     }
 
-    /// Powers of kg, m, s and rad; `None` where an operation made no sense.
+    /// Exponents of kg, m, s and rad; `None` after an invalid operation.
     pub fn powers(&self) -> Option<[i8; 4]> {
         self.powers.ok()
     }
 
-    /// Its SI value if it has this dimension. Radians come and go in products (omega r, 2 pi f) unless `exact`; a bare number for
-    /// an angle would be a slip.
+    /// Its SI value if it has this dimension. Unless `exact`, radians are optional in products (omega r, 2 pi f); a bare number
+    /// for an angle is rejected as a likely mistake.
     ///
     /// # Errors
-    /// Why it has not, or that it is not finite.
+    /// Wrong dimension, an invalid operation, or a value that is not finite.
     pub fn of(self, dimension: Dimension, exact: bool) -> Result<f64, DimensionError> {
         let found = self.powers?;
         if !self.value.is_finite() {
@@ -79,10 +79,10 @@ impl Quantity {
     }
 }
 
-/// The value of an expression, such as `first + 0.2 ms`, in which names stand for quantities.
+/// Evaluates an expression such as `first + 0.2 ms` with named quantities.
 ///
 /// # Errors
-/// Where the text is wrong, and why.
+/// Position and cause of an error in the text.
 pub fn evaluate(text: &str, names: &[(&str, Quantity)]) -> Result<Quantity, ExpressionError> {
     let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
     let units = all_units().map(|(_, dimension, size)| Quantity::new(size, dimension));
@@ -97,7 +97,7 @@ pub fn evaluate(text: &str, names: &[(&str, Quantity)]) -> Result<Quantity, Expr
     Ok(program.eval(&values))
 }
 
-/// A value with its unit, and what is wanted instead.
+/// Error text: a value with its unit, and the required units.
 fn foreign(value: f64, powers: [i8; 4], wanted: Dimension) -> String {
     let (value, unit) = (format_quantity(value, ""), unit_of(powers));
     match unit_names(wanted).as_slice() {
@@ -111,7 +111,7 @@ fn foreign(value: f64, powers: [i8; 4], wanted: Dimension) -> String {
     }
 }
 
-/// Powers of the base units in words: `kg m s^-2`.
+/// Unit with these exponents of the base units: `kg m s^-2`.
 fn unit_of(powers: [i8; 4]) -> String {
     let part = |(unit, power): (&str, i8)| match power {
         0 => None,
@@ -122,7 +122,7 @@ fn unit_of(powers: [i8; 4]) -> String {
     parts.join(" ")
 }
 
-/// Powers of a sum. Beside other units, radians do not count.
+/// Exponents of a sum. Radians are ignored next to other units.
 fn common(a: Quantity, b: Quantity) -> Result<[i8; 4], DimensionError> {
     let (of_a, of_b) = (a.powers?, b.powers?);
     let zero = |q: Quantity, powers: [i8; 4]| q.value == 0.0 && powers == [0; 4];
@@ -133,7 +133,7 @@ fn common(a: Quantity, b: Quantity) -> Result<[i8; 4], DimensionError> {
     (same || zero(b, of_b)).then_some(of_a).ok_or(DimensionError::Mixed)
 }
 
-/// Powers times `factor`, if whole and small.
+/// Exponents times `factor`, which must give small integers.
 fn scaled(powers: [i8; 4], factor: f64) -> Result<[i8; 4], DimensionError> {
     let mut scaled = [0; 4];
     for (to, power) in scaled.iter_mut().zip(powers) {

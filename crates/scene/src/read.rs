@@ -19,22 +19,22 @@ use std::sync::Arc;
 /// Parameters that determine the bodies: changing one reads the file again.
 pub(super) const REBUILDS: [&str; 2] = ["chain.links", "spcmm.slider_plane"];
 
-/// Where the file gives each parameter's value.
+/// Node of each parameter given in the file, by key.
 type Places<'d> = BTreeMap<String, Node<'d>>;
 
 impl Scene {
     /// Parses a scene from TOML text; `file` is its name in errors.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// Same as [`Self::load`].
     pub fn parse(text: &str, file: Option<&str>, changes: &[(String, String)]) -> Result<Self, SceneError> {
         Self::parse_beside(text, file, AssetResolver::default(), changes)
     }
 
-    /// As [`Self::parse`] for the text of a file in `folder`, where the files that it names are read.
+    /// Like [`Self::parse`], for the text of a file in `folder`, from which the files it names are read.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// Same as [`Self::load`].
     pub fn parse_in_folder(
         text: &str,
         file: Option<&str>,
@@ -44,11 +44,11 @@ impl Scene {
         Self::parse_beside(text, file, AssetResolver::in_folder(folder), changes)
     }
 
-    /// As [`Self::parse`] for a text opened together with other files, `given` by their names without a folder; one that its
-    /// `folder` has as well is read there.
+    /// Like [`Self::parse`], for a text opened together with other files, `given` by name without folder. A file that also
+    /// exists in `folder` is read there.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// Same as [`Self::load`].
     pub fn parse_given(
         text: &str,
         file: Option<&str>,
@@ -59,10 +59,10 @@ impl Scene {
         Self::parse_beside(text, file, AssetResolver::given(given, folder), changes)
     }
 
-    /// As [`Self::parse`] for a text that names the files `beside` it.
+    /// Like [`Self::parse`], with the contents of the named files in `beside`.
     ///
     /// # Errors
-    /// As [`Self::load`].
+    /// Same as [`Self::load`].
     pub fn parse_with(
         text: &str,
         file: Option<&str>,
@@ -72,7 +72,7 @@ impl Scene {
         Self::parse_beside(text, file, AssetResolver::known(beside), changes)
     }
 
-    /// Parses a scene that finds the files it names in `beside`.
+    /// Parses a scene; `beside` resolves the files it names.
     pub(super) fn parse_beside(
         text: &str,
         file: Option<&str>,
@@ -136,14 +136,14 @@ impl Scene {
     }
 }
 
-/// Whether a key may be one of the numbers that the text gives, and not a parameter of the table.
+/// Whether a key may be a number of the text rather than a parameter of the table.
 fn is_of_text(key: &str) -> bool {
     let of_joint = key.strip_prefix("joint.").and_then(|key| key.rsplit_once('.'));
     let in_table = |part: &str| find(&format!("contact.{part}")).is_some();
     find(key).is_none() && !of_joint.is_some_and(|(_, part)| in_table(part)) && !file_only(key)
 }
 
-/// Whether a key belongs in a scene file although it can never be changed from outside.
+/// Whether a key exists in scene files but can never be changed from outside.
 pub(super) fn file_only(key: &str) -> bool {
     let mut table: Option<&FileTable> = Some(&FILE);
     let mut fixed = false;
@@ -156,7 +156,7 @@ pub(super) fn file_only(key: &str) -> bool {
     fixed
 }
 
-/// Everything that is neither a parameter nor part of the mechanism; the rest at its defaults.
+/// Reads everything that is neither a parameter nor part of the mechanism; the rest has its defaults.
 fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     let document = top.document;
     let text = |name: &str| top.get(name).map(|node| node.text()).transpose();
@@ -215,7 +215,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     })
 }
 
-/// Reads every parameter from the file, or takes its default; returns where each is given.
+/// Reads every parameter from the file, or takes its default; returns the nodes of those given.
 fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d>, SceneError> {
     let mut places = Places::new();
     let mut sections: BTreeMap<&str, Section<'d>> = BTreeMap::new();
@@ -255,7 +255,7 @@ fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> 
     }
 }
 
-/// Bodies, joints, ball joints, fixed shapes and what is reported.
+/// Reads bodies, joints, ball joints, fixed shapes, force elements and the output.
 fn read_mechanism<'d>(
     files: &[Section<'d>],
     patterns: &'d [Pattern<'d>],
@@ -337,7 +337,7 @@ fn read_mechanism<'d>(
             joint_names.taken(name, &node);
         }
     }
-    // After the chain: they may be attached to its links.
+    // Elements follow the chain, because they may be attached to its links.
     let by_name = indices_by_name(&scene.machine.bodies);
     let joints = scene.machine.kinematic_joints().zip(0..);
     let joints = joints.map(|(joint, index)| (joint.name.clone(), index));
@@ -387,10 +387,9 @@ fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> R
     Ok(())
 }
 
-/// Names seen so far, with their positions in the text: they must be unique.
+/// Names read so far, with their nodes: they must be unique.
 #[derive(Default)]
 struct Names<'d> {
-    /// Where each is.
     places: BTreeMap<String, Node<'d>>,
 }
 

@@ -10,7 +10,6 @@ use jointplay_physics::machine::Solid;
 use jointplay_physics::units::format_quantity_digits;
 use jointplay_physics::words::words;
 
-/// Forms of a shape.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Form {
     Capsule,
@@ -32,20 +31,20 @@ words!(Form {
     Mesh => "mesh",
 });
 
-/// Largest mass, kg, and inertia, kg m^2, that a file may give: anything beyond is a typing slip.
+/// Largest mass, kg, and inertia, kg m^2, allowed in a file: anything larger is a typing error.
 pub(super) const MAX_MASS: f64 = 1e9;
 const MAX_INERTIA: f64 = 1e12;
 
 /// Largest dimension of a shape, m.
 const LARGEST_SHAPE: f64 = 1000.0;
 
-/// Moments of inertia are often given to three digits: the triangle inequality gets this relative slack.
+/// Relative slack in the triangle inequality: moments of inertia are often given to three digits.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
 /// Largest density, kg/m^3: five times that of osmium.
 pub(super) const MAX_DENSITY: f64 = 1e5;
 
-/// One `[[body]]`.
+/// Reads a `[[body]]`.
 pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), SceneError> {
     let section = node.section_as(node.title("body"))?;
     let name_node = section.require("name")?;
@@ -57,7 +56,7 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
     Ok((read_rigid_body(&section, name)?, section))
 }
 
-/// Mass, centroid, inertia and shapes.
+/// Reads mass, centroid, inertia and shapes.
 pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Body, SceneError> {
     let shapes = match section.get("shapes") {
         Some(node) => node.entries()?.iter().map(|shape| read_shape(shape, false, None)).collect::<Result<_, _>>()?,
@@ -104,7 +103,7 @@ fn read_solid(section: &Section<'_>, node: &Node<'_>, name: String, shapes: Vec<
     let solid = Solid::of_shapes(&shapes);
     let (mass, inertia) = (density * solid.volume, solid.inertia() * density);
     let heaviest = inertia.amax() <= MAX_INERTIA && mass <= MAX_MASS;
-    // Rounding must not leave a body that no motion could turn.
+    // Rounding must not make the inertia matrix singular.
     if !(solid.volume > 0.0 && heaviest && inertia.symmetric_eigenvalues().min() > 0.0) {
         return Err(node.error(format!(
             "needs `shapes` with a volume that this program can weigh; these weigh {}, allowed above 0 up to {}",
@@ -146,7 +145,7 @@ fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
     Ok(inertia)
 }
 
-/// One shape; a `fixed` one may follow the slider plane of `spcmm`.
+/// Reads a shape; a `fixed` one may follow the slider plane of `spcmm`.
 pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) -> Result<Shape, SceneError> {
     let section = node.section()?;
     let role = section.get("role").map(|node| node.word()).transpose()?;
@@ -194,14 +193,14 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) ->
         Form::Mesh => read_mesh(&section, shift)?,
     };
     let mut shape = Shape { geometry, role, colour };
-    // A body's shapes move with it.
+    // Shapes of a body move with it.
     if let Some(copy) = node.document.copy.filter(|_| fixed) {
         place_shape(&mut shape, copy, &form_node)?;
     }
     Ok(shape)
 }
 
-/// Triangles of a file beside the scene.
+/// Reads a mesh from a file beside the scene.
 fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError> {
     let file = section.require("file")?;
     let name = file.text()?;
@@ -231,7 +230,7 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
     })
 }
 
-/// The error for what is wrong in the file `name` beside the scene in `document`.
+/// The error for a fault in the mesh file `name`.
 fn error_in(name: &str, text: Option<&str>, fault: Fault, document: &Document<'_>) -> SceneError {
     match (text, fault.at) {
         (Some(text), Some(at)) => {
@@ -263,7 +262,7 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
     let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6);
     let parts = [0, 2, 4].map(|at| {
         let digits = digits?.get(at..at + 2)?;
-        // A sign would be read, too.
+        // `from_str_radix` would also accept a sign.
         let plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
         u8::from_str_radix(digits, 16).ok().filter(|_| plain)
     });
@@ -274,7 +273,7 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
     }
 }
 
-/// By how much a fixed shape is moved with the slider plane of `spcmm`, m.
+/// Offset of a fixed shape that follows the slider plane of `spcmm`, m.
 fn read_shift(section: &Section<'_>, spcmm: Option<&Spcmm>) -> Result<Vec3, SceneError> {
     let Some(node) = section.get("at_slider_plane") else {
         return Ok(Vec3::zeros());
@@ -286,7 +285,7 @@ fn read_shift(section: &Section<'_>, spcmm: Option<&Spcmm>) -> Result<Vec3, Scen
     }
 }
 
-/// Moves a shape with a copy of a pattern.
+/// Transforms a fixed shape to a pattern copy.
 fn place_shape(shape: &mut Shape, copy: &PatternInstance, form: &Node<'_>) -> Result<(), SceneError> {
     match &mut shape.geometry {
         Geometry::Capsule { from, to, .. } | Geometry::Cylinder { from, to, .. } | Geometry::Cone { from, to, .. } => {

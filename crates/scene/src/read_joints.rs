@@ -1,4 +1,4 @@
-//! Tree joints, joints that close loops, and ball joints of a scene file, and the forest they make.
+//! Readers of tree joints, loop-closing joints and ball joints; sorting of bodies into a forest.
 
 use super::document::{Node, Section};
 use super::drives::{SLIDERS_ONLY, read_drive};
@@ -10,8 +10,7 @@ use super::*;
 use jointplay_physics::suggest::nearest;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Largest cosine of the angle between the axes of a universal joint that passes for a right one: what is written with few
-/// digits.
+/// Tolerance on the cosine of the angle between the axes of a universal joint: axes are typed with few digits.
 const SQUARE: f64 = 1e-4;
 
 /// A joint whose bodies are still indices in file order.
@@ -20,7 +19,7 @@ pub(super) struct JointText<'d> {
     pub section: Section<'d>,
     /// `parent` and `child` are body indices in file order.
     pub joint: Joint,
-    /// Its child hangs elsewhere.
+    /// Whether it closes a loop: its child hangs on another joint.
     pub closes_loop: bool,
 }
 
@@ -31,7 +30,7 @@ pub(super) struct BallJointText<'d> {
     pub places: BTreeMap<&'static str, Node<'d>>,
 }
 
-/// One `[[joint]]`; `bodies` are the names in file order, `places` the index of each.
+/// Reads a `[[joint]]`; `bodies` are the names in file order, `places` the index of each.
 pub(super) fn read_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
@@ -95,7 +94,7 @@ pub(super) fn read_joint<'d>(
     Ok(JointText { name, section, joint, closes_loop })
 }
 
-/// What a joint that closes a loop may be.
+/// Checks the keys of a loop-closing joint.
 fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError> {
     if joint.kind == JointKind::Free {
         let node = section.require("kind")?;
@@ -113,14 +112,14 @@ fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError>
     section.refuse("start", start)
 }
 
-/// Moves the child's side of a joint with a copy of a pattern to which its child does not belong.
+/// Transforms the child's side of a joint to a pattern copy, for a child outside the pattern.
 fn place_child_side(joint: &mut Joint, copy: &PatternInstance) {
     joint.child_point = copy.point(joint.child_point);
     joint.child_axis = copy.direction(joint.child_axis);
     joint.rotation *= copy.turn.inverse();
 }
 
-/// Moves the parent's side of a joint with a copy of a pattern to which its parent does not belong.
+/// Transforms the parent's side of a joint to a pattern copy, for a parent outside the pattern.
 fn place_parent_side(joint: &mut Joint, copy: &PatternInstance) {
     joint.parent_point = copy.point(joint.parent_point);
     joint.axis = copy.direction(joint.axis);
@@ -133,7 +132,7 @@ fn place_parent_side(joint: &mut Joint, copy: &PatternInstance) {
     }
 }
 
-/// A free body: its initial pose and velocity.
+/// Reads the initial pose and velocity of a free body.
 fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
     if joint.parent.is_some() {
         let node = section.require("parent")?;
@@ -142,7 +141,7 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
     let start = section.require("start")?.section()?;
     let rotation = read_rotation(start.get("rotation"))?;
     let angular_velocity = start.vector("angular_velocity")?;
-    // The file gives pose and velocity of the joint point; the model wants those of the frame's origin.
+    // The file gives pose and velocity of the joint point; the model needs those of the frame's origin.
     let arm = rotation * joint.child_point;
     joint.start = JointStart::Pose {
         position: start.vector("position")? - arm,
@@ -154,7 +153,7 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
     Ok(())
 }
 
-/// A slide or a hinge: axis, and either a drive or start values.
+/// Reads a slide or a hinge: axis, and either a drive or start values.
 fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
@@ -178,7 +177,7 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     Ok(())
 }
 
-/// A joint that slides and turns, or turns about two axes.
+/// Reads a cylindrical or universal joint.
 fn read_two_degrees(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
     let universal = joint.kind == JointKind::Universal;
     joint.axis = section.require("axis")?.direction()?;
@@ -228,8 +227,7 @@ fn read_two_degrees(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> 
     Ok(())
 }
 
-/// Bodies with parents first, otherwise in file order, and their joints in the same order with `parent` and `child`
-/// renumbered.
+/// Sorts bodies parents first, otherwise in file order, and joints in the same order with `parent` and `child` renumbered.
 pub(super) fn sort_forest(
     bodies: Vec<Body>,
     joints: Vec<JointText<'_>>,
@@ -289,8 +287,8 @@ pub(super) fn sort_forest(
     Ok((sorted_bodies.into_iter().map(|(_, body)| body).collect(), sorted_joints))
 }
 
-/// The coordinate that the keys `joint` and `coordinate` name, with its joint by its index among the kinematic joints of `scene`,
-/// which `joints` finds by name.
+/// Resolves the keys `joint` and `coordinate` to a joint's index among the kinematic joints of `scene` and its coordinate.
+/// `joints` maps names to these indices.
 pub(super) fn read_coordinate(
     section: &Section<'_>,
     scene: &Scene,
@@ -337,7 +335,7 @@ pub(super) fn read_coordinate(
     }
 }
 
-/// One `[[ball_joint]]`; `bodies` maps names to indices in the sorted scene.
+/// Reads a `[[ball_joint]]`; `bodies` maps names to indices in the sorted scene.
 pub(super) fn read_ball_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
@@ -360,7 +358,7 @@ pub(super) fn read_ball_joint<'d>(
     Ok(BallJointText { joint, section, places })
 }
 
-/// Applies the contact overrides of `section` to `joint`; returns where each is given, by parameter.
+/// Applies the contact overrides of `section` to `joint`; returns their nodes by parameter.
 ///
 /// # Errors
 /// A value that is invalid or out of range.

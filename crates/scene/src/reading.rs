@@ -1,4 +1,4 @@
-//! What is known of a scene while it is being read: changes, the scene's own parameters, the numbers so far.
+//! State of the reader: changes, user-defined parameters, and the numbers read so far.
 
 use std::borrow::Cow;
 use std::cell::{OnceCell, RefCell};
@@ -12,7 +12,7 @@ use super::quantity::{DimensionError, Quantity};
 use jointplay_physics::expression::{ExpressionError, Number as _, Program};
 use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start};
 
-/// Why a text is neither a quantity nor an expression that gives one.
+/// Why a text is not a valid quantity or expression.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(super) enum ReadingError {
     #[error(transparent)]
@@ -24,7 +24,7 @@ pub(super) enum ReadingError {
 }
 
 impl ReadingError {
-    /// Byte of the text at which it is wrong; 0 where all of it is.
+    /// Byte offset of the error in the text; 0 if it concerns the whole text.
     pub fn at(&self) -> usize {
         match self {
             Self::Expression(error) => error.at,
@@ -33,26 +33,26 @@ impl ReadingError {
     }
 }
 
-/// What is known of a scene while it is being read.
+/// State of the reader.
 #[derive(Default)]
 pub(super) struct Reading<'d> {
-    /// Changes that are not parameters of the table: they replace what the text gives.
+    /// Changes of keys outside the parameter table: they replace values in the text.
     changes: BTreeMap<&'d str, Spanned<DeValue<'d>>>,
-    /// The scene's own parameters.
+    /// User-defined parameters.
     own: RefCell<BTreeMap<String, Quantity>>,
     numbers: RefCell<BTreeMap<String, FileNumber>>,
-    /// The sizes of [`all_units`].
+    /// SI sizes of [`all_units`].
     units: OnceCell<Vec<Quantity>>,
 }
 
 impl<'d> Reading<'d> {
-    /// With these changes, of keys that are not parameters of the table.
+    /// A reader state with these `changes` of keys outside the parameter table.
     pub fn new(changes: impl Iterator<Item = &'d (String, String)>) -> Self {
         let value = |text: &'d str| Spanned::new(0..0, DeValue::String(text.trim().into()));
         Self { changes: changes.map(|(key, text)| (key.as_str(), value(text))).collect(), ..Self::default() }
     }
 
-    /// What `key` was changed to.
+    /// The changed value of `key`, if any.
     pub fn change(&'d self, key: &str) -> Option<&'d Spanned<DeValue<'d>>> {
         if self.changes.is_empty() {
             return None;
@@ -60,10 +60,10 @@ impl<'d> Reading<'d> {
         self.changes.get(key)
     }
 
-    /// The SI value of a quantity or an expression; `copy` is that of a pattern to which it belongs.
+    /// The SI value of a quantity or an expression; `copy` is the pattern copy it belongs to, if any.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Invalid syntax, unit or dimension.
     pub fn evaluate(
         &self,
         text: &str,
@@ -90,11 +90,11 @@ impl<'d> Reading<'d> {
             Ok(program) => {
                 let uses_own = (0..first_unit).any(|own| program.uses(own));
                 if !uses_own && !operates(&plain) {
-                    // A number with its unit: what is wrong with it, the first error knows better.
+                    // A number with its unit: the first error is more specific.
                     return Err(error.into());
                 }
                 let value = program.eval(&values);
-                // A parameter alone is a quantity like any other, and no product in which radians come and go.
+                // A lone parameter must match exactly: only in products are radians optional.
                 Ok(value.of(dimension, uses_own && program.length() == 1)?)
             }
             Err(wrong) if may_be_meant && !names.is_empty() => Err(wrong.into()),
@@ -102,12 +102,12 @@ impl<'d> Reading<'d> {
         }
     }
 
-    /// The expression `text` of the time t, s, with the scene's own parameters as they are now, and whether it is one of
-    /// quantities: if a parameter in it has a unit, or a number, then t is a time, and its value has this `dimension`.
-    /// Otherwise all are pure numbers.
+    /// Compiles `text` as a function of the time t, s, with the current values of user-defined parameters. The flag says
+    /// whether it has units: if a parameter or number in it has a unit, t is a time and the value must have `dimension`.
+    /// Otherwise all numbers are pure.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Invalid syntax, unit or dimension.
     pub fn formula(
         &self,
         text: &str,
@@ -139,12 +139,12 @@ impl<'d> Reading<'d> {
                 program.eval(&values).of(dimension, false)?;
                 Ok((program.bound(&numbers), true))
             }
-            // Without units in it, the first error knows better.
+            // The error of the parse without units is more specific.
             Err(wrong) => Err(bare.err().unwrap_or(wrong).into()),
         }
     }
 
-    /// The sizes of [`all_units`].
+    /// SI sizes of [`all_units`].
     fn units(&self) -> &[Quantity] {
         self.units.get_or_init(|| {
             let unit = |(_, of, size)| Quantity::new(size, of);
@@ -152,24 +152,23 @@ impl<'d> Reading<'d> {
         })
     }
 
-    /// Adds the scene's own parameter `name`, for expressions that follow.
+    /// Defines the user parameter `name` for later expressions.
     pub fn own(&self, name: &str, value: f64, dimension: Dimension) {
         let value = Quantity::new(value, dimension);
         self.own.borrow_mut().insert(name.to_owned(), value);
     }
 
-    /// Keeps a number under its key.
     pub fn record(&self, key: &str, number: FileNumber) {
         self.numbers.borrow_mut().insert(key.to_owned(), number);
     }
 
-    /// The numbers so far.
+    /// Takes the numbers recorded so far.
     pub fn numbers(&self) -> BTreeMap<String, FileNumber> {
         self.numbers.take()
     }
 }
 
-/// Names and values that expressions may use: the scene's own parameters, and the number of a pattern's copy.
+/// Names and values for expressions: user-defined parameters, and the number `i` of a pattern copy.
 fn named<'a>(own: &'a BTreeMap<String, Quantity>, copy: Option<&PatternInstance>) -> (Vec<&'a str>, Vec<Quantity>) {
     let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
     let mut values: Vec<Quantity> = own.values().copied().collect();
@@ -180,16 +179,16 @@ fn named<'a>(own: &'a BTreeMap<String, Quantity>, copy: Option<&PatternInstance>
     (names, values)
 }
 
-/// Whether a text is more than a number with its unit.
+/// Whether a text has operators beyond those of a number with its unit.
 fn operates(text: &str) -> bool {
     let rest = split_unit(text);
-    // A unit has letters after its stroke: `m/s`.
+    // In a unit, letters follow the slash: `m/s`.
     let number = |part: &str| part.trim_start().starts_with(|c: char| c.is_ascii_digit());
     let divides = rest.split('/').skip(1).any(number);
     divides || rest.starts_with(['/', '^']) || rest.contains(['*', '+', '-', '('])
 }
 
-/// The text with the signs that only units may have spelt out.
+/// The text with unit symbols such as `µ`, `²` and `°` in ASCII.
 fn plain(text: &str) -> Cow<'_, str> {
     if text.is_ascii() {
         return Cow::Borrowed(text);

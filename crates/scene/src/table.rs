@@ -9,7 +9,7 @@ use jointplay_physics::words::Words;
 
 const DEFAULT: contact::Parameters = contact::Parameters::DEFAULT;
 
-/// Every parameter, in the order in which the interface lists them.
+/// All parameters, in the order of the interface.
 pub fn table() -> &'static [Parameter] {
     &TABLE
 }

@@ -41,7 +41,7 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
         assert_eq!(scene.name, name);
         assert!(!scene.machine.ball_joints.is_empty(), "{name}");
         if scene.machine.start == StartRule::Ideal {
-            // Put together when it starts: `tests/physics/machines.rs`.
+            // Assembled at the start: see `tests/physics/machines.rs`.
             continue;
         }
         let poses = start_poses(&scene);
@@ -133,7 +133,7 @@ fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
     let scene = changed("spcmm", &[("contact.friction", "0.2"), ("contact.friction", "0.3")]);
     assert_eq!(scene.machine.contact.friction, 0.3);
     assert_eq!(scene.changes, [("contact.friction".to_owned(), "0.3".to_owned())]);
-    // A gap wider than the file's ball is fine with the larger ball that comes with it.
+    // A gap wider than the file's ball is valid with the larger ball set by the same changes.
     let scene = changed("spcmm", &[("contact.clearance", "12 mm"), ("contact.ball_radius", "20 mm")]);
     assert_eq!(scene.machine.ball_joints[2].contact.clearance, 0.012);
 }
@@ -151,7 +151,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
     let text = |solver: &str| format!("{}\n{solver}", built_in_text("pendulum").unwrap());
     let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
     assert_eq!(Scene::parse(&file, None, &[]).unwrap().machine.solver.tolerance, 1e-5);
-    // Nor does a preset requested later replace what the file gives by name.
+    // A preset requested later does not replace explicit settings of the file either.
     let ask = [("solver.preset".to_owned(), "reference".to_owned())];
     let solver = Scene::parse(&file, None, &ask).unwrap().machine.solver;
     assert_eq!(solver.tolerance, 1e-5);
@@ -326,7 +326,7 @@ fn all_forms_of_a_rotation_agree() {
     assert!((r[(1, 1)] - libm::cos(10.0_f64.to_radians()) * libm::cos(20.0_f64.to_radians())).abs() < 1e-15);
 }
 
-/// A rod on a slide, with a parameter of its own.
+/// A rod on a slide, with a user-defined parameter.
 const OWN: &str = "
 [[parameter]]
 name = \"stroke\"
@@ -377,7 +377,7 @@ fn every_number_of_a_file_is_a_key() {
     assert_eq!(joint(&changed), (Vec3::new(0.001, 0.0, -0.05), start(0.02, 0.005)));
     assert_eq!((changed.machine.bodies[0].mass, changed.machine.bodies[0].centre.y), (3.0, 0.007));
     assert_eq!(changed.get("parameter.speed"), Ok(Value::Number(0.08)));
-    // Written to the places where the text has them, and nowhere else.
+    // Changed values are replaced in place; nothing else changes.
     let text = changed.to_toml().expect("has its places");
     for line in [
         "value = \"40 mm\"",
@@ -403,7 +403,7 @@ fn a_parameter_of_the_file_is_a_row_like_the_others() {
     assert_eq!((row.label, row.display_unit(), row.at_reset), ("Stroke", "mm", true));
     assert_eq!(row.range(), "10 mm to 50 mm");
     let speed = scene.parameter("parameter.speed").expect("known");
-    // What follows from others is a number like any other.
+    // A parameter computed from others is an ordinary number.
     assert_eq!((speed.label, speed.display_unit()), ("parameter.speed", "m/s"));
 }
 
@@ -531,7 +531,7 @@ role = \"frame\"
         };
         near(centre, place);
     }
-    // One copy alone can be changed, but not written back.
+    // A change of a single copy is possible but cannot be written back.
     let mut changed = scene.clone();
     changed.set("body.rod2.mass", "9 kg").expect("a key");
     assert_eq!(changed.machine.bodies[2].mass, 9.0);
@@ -592,7 +592,7 @@ ball = { body = \"leg\" }
     let mut scene = with(leg, text, &[("body.leg.mass", "3 kg")]).expect("reads");
     assert_eq!(scene.machine.bodies[0].mass, 3.0);
     assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.03);
-    // Read again from what was read before.
+    // A rebuild uses the file contents read before.
     scene.set("parameter.reach", "40 mm").expect("a key");
     assert_eq!(scene.machine.ball_joints[0].socket.point.x, 0.04);
     assert_eq!(scene.machine.bodies[0].mass, 3.0);
@@ -701,7 +701,7 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
     let scene = read("", "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"").expect("reads");
     assert!((scene.machine.contact.clearance - 0.21e-3).abs() < 1e-18);
     assert_eq!(scene.machine.contact.friction, 1.0 / 3.0);
-    // A power at a unit is one of the unit.
+    // An exponent after a unit applies to the unit.
     let scene = read("", "clearance = \"3 mm^2 / (2 mm)^2 * 0.4 mm\"").expect("reads");
     assert!((scene.machine.contact.clearance - 0.3e-3).abs() < 1e-18);
     for inertia in ["0.3 kg * 1.0001 m^2 / 12", "0.3 kg * 1.0001 m² / 12", "0.3 kg * (1 m)^2 * 1.0001 / 12"] {
@@ -724,7 +724,7 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
             "",
             "`*` where an operator other than a power should stand",
         ),
-        // Of a unit with a stroke it could be meant for either part.
+        // After a unit with a slash, the exponent would be ambiguous.
         (String::new(), "clearance = \"3 m/s^3 * radius\"", "`^` where an operator other than a power should stand"),
         (String::new(), "clearance = \"radius * 3 mm ^2\"", "`^` where an operator other than a power should stand"),
         (String::new(), "clearance = \"radius * 3 mm^2.5\"", "`^` where an operator other than a power should stand"),

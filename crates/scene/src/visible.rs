@@ -1,5 +1,5 @@
-//! Makes foreign text (scene files, links, command lines) safe to show: what would control a terminal, forge a line or
-//! reorder its surroundings becomes visible.
+//! Makes untrusted text (scene files, links, command lines) safe to display: characters that would control a terminal,
+//! forge a line or reorder nearby text are escaped.
 
 use std::borrow::Cow;
 
@@ -18,7 +18,7 @@ fn escaped(text: &str, hide: impl Fn(char) -> bool) -> Cow<'_, str> {
     let mut out = String::with_capacity(text.len() + 16);
     for c in text.chars() {
         if hide(c) {
-            // The JSON escape, too. Writing to a String cannot fail.
+            // This is also the JSON escape. Writing to a String cannot fail.
             let _ = write!(out, "\\u{:04x}", u32::from(c));
         } else {
             out.push(c);
@@ -32,7 +32,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     escaped(text, |c| is_control_or_bidi(c) && !matches!(c, '\n' | '\t'))
 }
 
-/// As [`visible`], on one line.
+/// Like [`visible`], but on one line.
 pub fn visible_line(text: &str) -> Cow<'_, str> {
     escaped(text, is_control_or_bidi)
 }

@@ -1,4 +1,4 @@
-//! A scene back to TOML: its source text with the changed values in place; comments and order are kept.
+//! Writes a scene back to TOML: its source text with changed values replaced; comments and order are preserved.
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value};
 
@@ -8,11 +8,11 @@ use super::given::{FileNumber, Place};
 use super::{Kind, Scene, SceneError, Value};
 use jointplay_physics::units::exact_quantity;
 
-/// Most numbers in one vector.
+/// Maximum number of components in a vector.
 const MOST_PARTS: usize = 4;
 
 impl Scene {
-    /// The text of a scene file that reads back to this scene, changes included.
+    /// Text of a scene file that reads back to this scene, including its changes.
     ///
     /// # Errors
     /// A change that the format cannot express.
@@ -40,7 +40,7 @@ impl Scene {
         Ok(text)
     }
 
-    /// The scene's text with the changed numbers in the places of the old ones.
+    /// The scene's text with changed numbers replaced.
     fn numbers_in_place(&self) -> Result<String, SceneError> {
         let numbers = &self.source.numbers;
         let mut edits: BTreeMap<usize, (usize, String)> = BTreeMap::new();
@@ -66,7 +66,7 @@ impl Scene {
                     return Err(refuse("the text does not give it; write it there first"));
                 }
                 Place::Value(span) if same.len() == 1 => (span, text(number)),
-                // In the order of their keys, x, y, z.
+                // Components are in the order of their keys: x, y, z.
                 Place::Part(span) if same.len() <= MOST_PARTS => {
                     let parts: Vec<String> = same.into_iter().map(text).collect();
                     (span, format!("[{}]", parts.join(", ")))
@@ -112,7 +112,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Current value of `key` as a file gives it: pure numbers and counts bare, everything else as text.
+    /// Current value of `key` as TOML: pure numbers and counts bare, everything else as a string.
     fn item(&self, key: &str) -> Result<Item, SceneError> {
         let parameter = self.parameter(key)?;
         let now = self.get(key)?;
@@ -197,7 +197,7 @@ fn place(section: &mut Item, name: &str, item: Item) {
     }
 }
 
-/// Writes `item` to `table`; comments above and after the old value are kept.
+/// Writes `item` to `table`; comments above and after the old value are preserved.
 fn put(table: &mut Table, name: &str, mut item: Item) {
     let Some(old) = table.get_mut(name) else {
         table.insert(name, item);
@@ -226,7 +226,7 @@ mod tests {
         Scene::load(name, &changes).expect("in range")
     }
 
-    /// Everything that the simulation reads.
+    /// All data that the simulation reads.
     fn bits(scene: &Scene) -> String {
         let mut plain = scene.clone();
         plain.changes.clear();
@@ -249,7 +249,7 @@ mod tests {
     fn every_parameter_is_written_so_that_it_reads_back_to_the_same_scene() {
         for (turn, name) in BUILT_IN.into_iter().enumerate() {
             let plain = scene(name, &[]);
-            // Those that every scene has take turns.
+            // Common parameters are shared out among the scenes.
             let rows = plain.parameters().into_iter().enumerate();
             for (_, parameter) in rows.filter(|(place, row)| row.scope == Scope::Own || (place + turn) % 3 == 0) {
                 let other = match parameter.kind {
@@ -271,7 +271,7 @@ mod tests {
                     }
                     let text = match changed.to_toml() {
                         Ok(text) => text,
-                        // The text has no place for the joint of one copy alone.
+                        // The text cannot express a change of a single copy.
                         Err(error) if error.message.contains("every copy of a pattern") => {
                             assert!(key.starts_with("joint.") && key.contains("1."), "{key}");
                             assert!(plain.source.text.contains("[[pattern]]"), "{name}");

@@ -1,12 +1,12 @@
-//! What the bench asks of the run.
+//! Requests of the bench to the run.
 
 use crate::analysis::ready::ReadySweep;
 use crate::app::load::Load;
 
-/// What the user wants of the run.
+/// A request of the user to the run.
 pub enum Asked {
-    /// To be at a section of a sweep.
+    /// Run to a section of a sweep.
     Section(Load),
-    /// A ready sweep, over its scene.
+    /// Start a ready sweep with its scene.
     Ready(&'static ReadySweep),
 }

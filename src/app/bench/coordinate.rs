@@ -1,4 +1,4 @@
-//! The coordinate of the output body that the bench shows.
+//! The coordinate of the output body shown in the bench.
 
 use eframe::egui::{ComboBox, Ui};
 
@@ -10,9 +10,9 @@ use crate::simulate::Quantity;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coordinate(usize);
 
-/// Their names.
+/// Names of the coordinates.
 const NAMES: [&str; 6] = ["x", "y", "z", "α", "β", "γ"];
-/// Those of the paper come first.
+/// Order in the list: the paper's coordinates first.
 const ORDER: [usize; 6] = [0, 4, 1, 2, 3, 5];
 
 impl Default for Coordinate {
@@ -42,7 +42,7 @@ impl Coordinate {
         AxisLabel::new(name, self.quantities()[1].unit().0)
     }
 
-    /// A coordinate, SI, in the unit of [`Self::axis`].
+    /// Converts an SI value to the unit of [`Self::axis`].
     pub fn shown(self, si: f64) -> f64 {
         si / self.quantities()[0].unit().1
     }
@@ -53,7 +53,7 @@ impl Coordinate {
         [self.shown(state[self.0]), state[6 + self.0] / rate]
     }
 
-    /// Lets the user choose it.
+    /// Combo box for the coordinate.
     pub fn ui(&mut self, ui: &mut Ui) {
         ComboBox::from_id_salt("coordinate")
             .width(64.0)

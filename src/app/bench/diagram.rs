@@ -1,4 +1,4 @@
-//! The bifurcation diagram of a sweep and its other results at each value; a click picks a section.
+//! Bifurcation diagram of a sweep and its other results over the varied parameter; a click selects a section.
 
 use eframe::egui::{ComboBox, Grid, Pos2, Rect, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
@@ -14,10 +14,10 @@ use crate::simulate::Doubt;
 use crate::units::to_display;
 
 const HEIGHT: f32 = 230.0;
-/// How near a click must come to a point, points.
+/// Largest distance of a click from a point, points.
 const NEAR: f32 = 16.0;
 
-/// What is plotted over the varied parameter.
+/// Quantity plotted over the varied parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Ordinate {
     #[default]
@@ -49,7 +49,7 @@ impl Ordinate {
     }
 }
 
-/// The kinds of motion, each with its index in the colour series.
+/// The kinds of motion with their series colour indices.
 const REGIMES: [(Regime, usize); 5] = [
     (Regime::Periodic(1), 0),
     (Regime::QuasiPeriodic, 2),
@@ -65,18 +65,18 @@ type Mark = (PlotPoint, usize, usize);
 #[derive(Default)]
 pub struct Diagram {
     ordinate: Ordinate,
-    /// What the marks were made for; `None` if they must be rebuilt.
+    /// The settings of the present marks; `None` if they must be rebuilt.
     made: Option<(Ordinate, Coordinate)>,
     marks: [Vec<PlotPoint>; REGIMES.len()],
     all: Vec<Mark>,
-    /// Of points that are not to be trusted.
+    /// Marks of unreliable points.
     doubtful: Vec<PlotPoint>,
     diverged: Vec<f64>,
     transform: Option<PlotTransform>,
-    /// Where it was last drawn, points of the screen, and what share of that was in sight.
+    /// Position of the last drawing, points of the screen, and its visible fraction.
     plane: Option<Rect>,
     seen: f32,
-    /// The latest pick.
+    /// The latest selection.
     picked: Option<(usize, usize)>,
 }
 
@@ -86,29 +86,29 @@ impl Diagram {
         (self.made, self.picked, self.transform) = (None, None, None);
     }
 
-    /// Has the marks rebuilt: a point has arrived.
+    /// Invalidates the marks after a point has arrived.
     pub fn renew(&mut self) {
         self.made = None;
     }
 
-    /// Where a section was last drawn, points of the screen.
+    /// Position of a section in the last drawing, points of the screen.
     pub fn place(&self, index: usize, section: usize) -> Option<Pos2> {
         let is = |mark: &&Mark| (mark.1, mark.2) == (index, section);
         let (point, ..) = self.all.iter().find(is)?;
         Some(self.transform.as_ref()?.position_from_point(point))
     }
 
-    /// Where it was last drawn, without its head and key, points of the screen.
+    /// Plot area of the last drawing, without heading and key, points of the screen.
     pub fn plane(&self) -> Option<Rect> {
         self.plane
     }
 
-    /// What share of that was in sight.
+    /// Visible fraction of that area.
     pub fn seen(&self) -> f32 {
         self.seen
     }
 
-    /// The diagram of `swept`; returns the point and its kept section that were clicked.
+    /// The diagram of `swept`; returns the clicked point and its retained section.
     pub fn ui(&mut self, ui: &mut Ui, swept: &Swept, coordinate: Coordinate) -> Option<(usize, usize)> {
         let parameter = swept.parameter();
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
@@ -194,7 +194,7 @@ impl Diagram {
         });
     }
 
-    /// What the colours mean, and for how many values each kind was found.
+    /// Legend of the colours with the number of values of each kind.
     fn key(&self, ui: &mut Ui, swept: &Swept, dark: bool) {
         let weak = ui.visuals().weak_text_color();
         let mut entries: Vec<_> = REGIMES
@@ -220,7 +220,7 @@ impl Diagram {
         let warn = ui.visuals().warn_fg_color;
         entries.push((doubtful.count(), "doubtful", warn, &help));
         ui.scope(|ui| {
-            // No controls: they need no height for fingers.
+            // These rows are not controls and need no touch height.
             ui.spacing_mut().interact_size.y = 0.0;
             Grid::new("regimes").num_columns(3).show(ui, |ui| {
                 for (index, (count, word, colour, help)) in entries.into_iter().enumerate() {

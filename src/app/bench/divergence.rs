@@ -62,7 +62,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
     });
 }
 
-/// The plot of its distance, `height` points high.
+/// Plot of the twin's distance, `height` points high.
 pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
     let dark = ui.visuals().dark_mode;
     // The twin has reached the end of the latest step; the displayed instant lies within it.
@@ -98,7 +98,7 @@ pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
     named(&shown, "the distance to the twin", &across, &up);
 }
 
-/// Marks at whole powers of ten, spaced so that there are few.
+/// Grid marks at whole powers of ten, at most a few.
 fn decades((least, greatest): (f64, f64)) -> Vec<GridMark> {
     let step = ((greatest - least) / 5.0).ceil().clamp(1.0, 100.0);
     let (first, last) = ((least / step).ceil() as i64, (greatest / step).floor() as i64);

@@ -1,4 +1,4 @@
-//! A plot of one quantity over another in the bench: no legend, no dragging, units on the axes.
+//! A bench plot of one quantity against another: no legend, no dragging, units on the axes.
 
 use eframe::egui::{self, Rangef, Role, Sense, Ui, Vec2b, WidgetInfo};
 use egui_plot::{AxisHints, GridMark, HoverPosition, Plot, PlotResponse};
@@ -9,9 +9,9 @@ use crate::app::{spoken, value};
 /// Name and unit of an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisLabel {
-    /// What it shows.
+    /// Name of the quantity.
     pub name: String,
-    /// Unit; "" for a pure number.
+    /// Unit; "" for a dimensionless quantity.
     pub unit: String,
 }
 
@@ -32,13 +32,13 @@ fn with_unit(text: &str, unit: &str, between: &str) -> String {
     if unit.is_empty() { text.to_owned() } else { format!("{text}{between}{unit}") }
 }
 
-/// The number at a mark.
+/// The tick label of a mark.
 fn word(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
     let most = range.start().abs().max(range.end().abs());
     tick(mark.value, mark.step_size, most)
 }
 
-/// Calls `shown`, a plot of `up` over `across`, a plot of `what` for screen readers, and says which ranges are in sight.
+/// Labels the plot `shown` of `up` over `across` as `what` for screen readers, with the visible ranges.
 pub fn named<R>(shown: &PlotResponse<R>, what: &str, across: &AxisLabel, up: &AxisLabel) {
     let bounds = shown.transform.bounds();
     let range = |axis: &AxisLabel, d: usize| {
@@ -50,7 +50,7 @@ pub fn named<R>(shown: &PlotResponse<R>, what: &str, across: &AxisLabel, up: &Ax
     spoken::value(&shown.response, &format!("{} over {}", range(up, 1), range(across, 0)));
 }
 
-/// A plot of `up` over `across`, `height` points high and as wide as there is room.
+/// A plot of `up` over `across`, `height` points high, over the full available width.
 pub fn plane<'a>(ui: &Ui, id: &'static str, across: &AxisLabel, up: &AxisLabel, height: f32) -> Plot<'a> {
     let faint = ui.visuals().weak_text_color();
     let font = egui::TextStyle::Small.resolve(ui.style());
@@ -64,7 +64,7 @@ pub fn plane<'a>(ui: &Ui, id: &'static str, across: &AxisLabel, up: &AxisLabel, 
     Plot::new(id)
         .width(ui.available_width() - 12.0)
         .height(height)
-        // A finger that moves over it scrolls.
+        // Dragging a finger over the plot scrolls the panel.
         .sense(Sense::hover())
         .allow_drag(false)
         .allow_zoom(false)

@@ -15,7 +15,7 @@ use crate::app::{keys, spoken, theme, value};
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
 
-/// Buffers kept between frames and refilled in each.
+/// Buffers reused in every frame.
 #[derive(Default)]
 pub struct Portrait {
     orbit: Vec<PlotPoint>,
@@ -23,7 +23,7 @@ pub struct Portrait {
 }
 
 impl Portrait {
-    /// Rate over coordinate: the orbit of the last periods and the sections.
+    /// Phase portrait (rate over coordinate): the orbit of the last periods and the sections.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, coordinate: Coordinate) {
         self.read(player, coordinate);
         let (across, up) = (coordinate.axis(), coordinate.rate_axis());
@@ -114,7 +114,7 @@ impl Portrait {
         };
         self.orbit.clear();
         self.orbit.extend(watch.orbit().map(point));
-        // The orbit skips instants close to one another; the displayed one is its end.
+        // The orbit skips closely spaced instants, so the displayed one is appended.
         let frame = player.frame();
         self.orbit.push(point(&(frame.time, observed(&frame.pose))));
         self.sections.clear();

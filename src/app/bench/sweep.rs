@@ -1,4 +1,4 @@
-//! A background sweep: its settings, its progress, and the points so far.
+//! Background sweep: settings, progress, and the points so far.
 
 use eframe::egui::{Align, Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui, vec2};
 
@@ -23,15 +23,15 @@ use crate::scene::{Kind, Parameter, Scene, Value};
 /// Parameter varied by default, and its range.
 const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 
-/// Width of the button that starts and ends a sweep, points; fixed, so that it does not move.
+/// Width of the start/stop button, points; fixed, so that it does not move.
 const GO: f32 = 120.0;
 
-/// No estimate is made of what a sweep does in less time, s.
+/// Elapsed time below which no remaining time is estimated, s.
 const SOON: f64 = 1.0;
 
 /// Settings of the next sweep.
 struct Settings {
-    /// Scene that they were made for.
+    /// Name of the scene they belong to.
     scene: String,
     key: &'static str,
     from: String,
@@ -43,19 +43,19 @@ struct Settings {
     exponent: bool,
 }
 
-/// A sweep under way, shared by several computers.
+/// A running sweep, shared by several workers.
 struct Sweeping {
     task: SweepTask,
     shares: Vec<Sharing>,
-    /// Its ranges are known.
+    /// Whether its ranges are known.
     begun: bool,
     throttle: Throttle,
-    /// When it was first seen, s, and the latest instant.
+    /// Time of the first frame since the start, and of the latest frame, s.
     since: Option<f64>,
     now: f64,
 }
 
-/// One of them, and what fraction of the whole it has done.
+/// A worker, and its completed fraction of the whole sweep.
 struct Sharing {
     running: Box<dyn Running>,
     done: f64,
@@ -71,7 +71,7 @@ pub struct SweepPanel {
     swept: Option<Swept>,
     problem: Option<String>,
     diagram: Diagram,
-    /// The diagram is to be scrolled into sight.
+    /// Whether to scroll to the diagram.
     reveal: bool,
 }
 
@@ -127,7 +127,7 @@ impl SweepPanel {
         self.running.is_some()
     }
 
-    /// Takes a frame at `now`, s, so that a running sweep leaves the picture its time; `moves`: whether it moves by itself.
+    /// Reports a frame at `now`, s, so that a running sweep yields time to the picture; `moves`: whether the picture is animated.
     pub fn seen(&mut self, now: f64, moves: bool) {
         let Some(sweeping) = &mut self.running else {
             return;
@@ -156,21 +156,21 @@ impl SweepPanel {
         &self.diagram
     }
 
-    /// Starts a ready sweep over its scene, `scene`, in place of any that runs.
+    /// Starts a ready sweep over its `scene`, replacing any running sweep.
     pub fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
         self.settings = Some(Settings::of(ready));
         self.asked = Some(ready.task(scene));
         self.reveal = true;
     }
 
-    /// Ready sweeps, settings, progress and diagram; returns what was asked of the run.
+    /// Ready sweeps, settings, progress and diagram; returns the user's request to the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Asked> {
         let ready = ready_ui(ui).map(Asked::Ready);
         let load = self.sweep_ui(ui, player, coordinate);
         ready.or(load.map(Asked::Section))
     }
 
-    /// Whether the diagram is that of the sweep that was asked for, or none will come.
+    /// Whether the diagram belongs to the requested sweep, or no other is to come.
     fn has_diagram(&self) -> bool {
         self.asked.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.begun)
     }
@@ -197,7 +197,7 @@ impl SweepPanel {
             self.reveal = !self.has_diagram();
             let room = ui.clip_rect().height();
             let all = ui.min_rect().with_min_y(progress);
-            // With its progress and with what stands above and below it, where there is room for that.
+            // Includes the progress, and the items above and below it if they fit.
             let mut shown = vec![all, all.with_min_y(diagram)];
             shown.extend(self.diagram.plane());
             let fits = shown.iter().find(|rect| rect.height() <= room);
@@ -209,7 +209,7 @@ impl SweepPanel {
         load
     }
 
-    /// The diagram; returns the section of it that was clicked.
+    /// The diagram; returns the clicked section.
     fn swept_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
         let swept = self.swept.as_ref()?;
         reserved(ui, "sweep of", 3, |ui| {
@@ -225,7 +225,7 @@ impl SweepPanel {
         )
     }
 
-    /// What went wrong, or whether the diagram belongs to the displayed scene.
+    /// The error message, or whether the diagram belongs to the displayed scene.
     fn state_ui(&self, ui: &mut Ui, player: &Player) {
         let small = |words: &str| RichText::new(words).small();
         if let Some(problem) = &self.problem {
@@ -390,7 +390,7 @@ impl SweepPanel {
 }
 
 impl Sweeping {
-    /// Has `task` computed by as many as `host` offers; `None` if that is not possible.
+    /// Starts `task` on all workers of `host`; `None` if that is impossible.
     fn start(task: SweepTask, host: &mut dyn Host) -> Option<Self> {
         let of = host.workers().max(1);
         let share = |index| {
@@ -401,12 +401,12 @@ impl Sweeping {
         Some(Self { shares: shares?, task, begun: false, throttle: Throttle::default(), since: None, now: 0.0 })
     }
 
-    /// Fraction of the points that are done, 0 to 1.
+    /// Completed fraction of the points, 0 to 1.
     fn done(&self) -> f64 {
         self.shares.iter().map(|sharing| sharing.done).sum()
     }
 
-    /// How long the rest takes if it goes on as it has gone so far; `None` while too little is known.
+    /// Estimated remaining time at the average speed so far; `None` while too little is known.
     fn time_left(&self) -> Option<String> {
         let (spent, done) = (self.now - self.since?, self.done());
         (spent >= SOON && done > 0.0).then(|| in_time(spent * (1.0 - done).max(0.0) / done))
@@ -446,7 +446,7 @@ impl Settings {
         Some(settings)
     }
 
-    /// Selects another parameter, over the range of its slider.
+    /// Selects another parameter, with the range of its slider.
     fn vary(&mut self, parameter: &'static Parameter) {
         self.key = parameter.key;
         (self.from, self.to) = match parameter.kind {
@@ -461,7 +461,7 @@ impl Settings {
     }
 }
 
-/// A time to go, s, in words.
+/// Formats a remaining time, s.
 fn in_time(left: f64) -> String {
     match left {
         _ if left < 10.0 => "a few seconds left".to_owned(),
@@ -471,7 +471,7 @@ fn in_time(left: f64) -> String {
     }
 }
 
-/// The ready sweeps, each with what it will show; returns the one that was clicked.
+/// Buttons of the ready sweeps with descriptions; returns the clicked one.
 fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
     let mut chosen = None;
     for ready in &READY {
@@ -487,7 +487,7 @@ fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
     chosen
 }
 
-/// Whether the scene has `parameter` as a number that affects its motion.
+/// Whether the scene has `parameter` as a number that affects the motion.
 fn varies(player: &Player, parameter: &Parameter) -> bool {
     let value = player.pending().get(parameter.key);
     matches!(value, Ok(Value::Number(_) | Value::Count(_)))
@@ -495,7 +495,7 @@ fn varies(player: &Player, parameter: &Parameter) -> bool {
         && !parameter.key.starts_with("solver.")
 }
 
-/// An integer field with its label.
+/// A labelled integer field.
 fn number(ui: &mut Ui, name: &str, value: &mut usize, range: std::ops::RangeInclusive<usize>, help: &str) {
     ui.label(name);
     ui.add(DragValue::new(value).range(range)).on_hover_text(help).accessible_name(name);

@@ -6,25 +6,25 @@ use crate::app::player::Player;
 use crate::app::value;
 use crate::scene::{Kind, Parameter, Scene, Value};
 
-/// A sweep that was started, and its results so far.
+/// A started sweep and its results so far.
 pub struct Swept {
     /// The requested task.
     pub task: SweepTask,
     /// The varied parameter.
     pub range: Range,
-    /// Points by number; `None` for those still to come.
+    /// Points by number; `None` for pending points.
     pub points: Vec<Option<SweptPoint>>,
     /// The swept scene, without the varied parameter.
     pub(super) scene: Option<Scene>,
 }
 
 impl Swept {
-    /// The varied parameter, as the swept scene has it.
+    /// The varied parameter as defined in the swept scene.
     pub(super) fn parameter(&self) -> Option<&'static Parameter> {
         self.scene.as_ref()?.parameter(&self.range.key).ok()
     }
 
-    /// What was swept: scene, changed parameters, range, periods.
+    /// Description of the sweep: scene, changed parameters, range, periods.
     pub(super) fn caption(&self) -> String {
         let Self { task, range, .. } = self;
         let varied = [range.key.clone()];
@@ -48,7 +48,7 @@ impl Swept {
         )
     }
 
-    /// How it differs from the displayed scene, one phrase each.
+    /// Differences from the displayed scene, one phrase each.
     pub(super) fn differences(&self, player: &Player) -> Vec<String> {
         let varied = [self.range.key.clone()];
         let scene = self.scene.as_ref();

@@ -1,39 +1,40 @@
-//! How much of a machine a sweep takes while the picture moves: where drawing is the processor's work, too, it gives some back.
+//! Share of the processor used by a sweep while the picture moves: it yields time if the processor also draws.
 
-/// Frames a second that the picture keeps if it has them without a sweep, and how many more are aimed at, as a count over a second is
-/// a whole number; with so many a sweep may take more again.
+/// Minimum frame rate beside a sweep, 1/s, for a picture that reaches it without one; margin of the target, because a count over
+/// one second is an integer; rate above which the sweep may use more time again.
 const LEAST: f64 = 20.0;
 const MARGIN: f64 = 0.5;
 const AMPLE: f64 = 30.0;
-/// Frames are counted for so long, s; a gap of that between two says that nothing moved.
+/// Averaging time of the frame rate, s; a gap of this length between two frames means that nothing moved.
 const SPAN: f64 = 1.0;
-/// Shortest and longest rest of a sweep, as multiples of the time that it computes; it is doubled and halved.
+/// Shortest and longest rest of a sweep, as multiples of its computing time; the rest is doubled or halved.
 const SHORTEST: f64 = 1.0;
 const LONGEST: f64 = 8.0;
-/// A picture that has fewer frames a second beside the longest rest, so many counts in succession, is slow by itself.
+/// Frame rate below which a picture is slow by itself if it occurs at the longest rest, and the required number of counts in
+/// succession.
 const HOPELESS: (f64, u32) = (16.0, 3);
 
-/// Finds how long the computers of a sweep rest.
+/// Determines the rest of the sweep's threads.
 #[derive(Debug, Default)]
 pub struct Throttle {
     rest: f64,
-    /// Counts in succession beside the longest rest that were hopeless, since the picture began to move.
+    /// Consecutive hopeless counts at the longest rest since the picture began to move.
     hopeless: u32,
-    /// The latest frame, and the first of those that are counted, s; how many followed it.
+    /// The latest frame, s; start of the count, s; frames since then.
     latest: Option<f64>,
     since: f64,
     frames: u32,
 }
 
 impl Throttle {
-    /// Takes a frame at `now`, s; `moves`: whether the picture moves by itself. Returns the rest, as a multiple of the time
-    /// computed, where it changes.
+    /// Takes a frame at `now`, s; `moves`: whether the picture is animated. Returns the new rest, as a multiple of the computing
+    /// time, if it changes.
     pub fn frame(&mut self, now: f64, moves: bool) -> Option<f64> {
         let before = self.rest;
         let latest = self.latest.replace(now).filter(|_| moves);
         match latest.filter(|latest| now - latest < SPAN) {
             None => {
-                // At rest, or just begun: nothing is known yet.
+                // At rest or just started: the frame rate is unknown.
                 (self.since, self.frames) = (now, 0);
                 if !moves {
                     (self.rest, self.hopeless) = (0.0, 0);
@@ -51,7 +52,7 @@ impl Throttle {
         (self.rest != before).then_some(self.rest)
     }
 
-    /// Takes the number of frames in a second.
+    /// Adjusts the rest to a frame rate, 1/s.
     fn judge(&mut self, rate: f64) {
         let (hopeless, patience) = HOPELESS;
         if self.hopeless >= patience {
@@ -75,7 +76,7 @@ impl Throttle {
 mod tests {
     use super::*;
 
-    /// A page that draws `free` frames a second alone, and `busy` beside a sweep that never rests.
+    /// A page that draws `free` frames per second alone, and `busy` beside a sweep that never rests.
     struct Page {
         free: f64,
         busy: f64,
@@ -89,7 +90,7 @@ mod tests {
             Self { free, busy, throttle: Throttle::default(), rest: 0.0, now: 0.0 }
         }
 
-        /// Draws for `seconds`; returns frames a second.
+        /// Draws for `seconds`; returns the frame rate, 1/s.
         fn draw(&mut self, seconds: f64) -> f64 {
             let (start, mut frames) = (self.now, 0);
             while self.now < start + seconds {
@@ -105,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_picture_that_was_fast_enough_stays_so_and_the_sweep_goes_on() {
-        // With the rest that this takes: the least power of two r for which (busy + r free) / (1 + r) is enough.
+        // Expected rest: the smallest power of two r for which (busy + r free) / (1 + r) suffices.
         for (free, busy, most) in [(23.0, 15.0, 4.0), (40.0, 5.0, 1.0), (60.0, 19.0, 1.0), (21.5, 15.0, 8.0)] {
             let mut page = Page::new(free, busy);
             page.draw(7.0);
@@ -134,7 +135,7 @@ mod tests {
         page.draw(10.0);
         assert!(page.rest > 0.0);
         assert_eq!(page.throttle.frame(page.now + 0.1, false), Some(0.0));
-        // A long pause is no slow frame.
+        // A long pause is not a slow frame.
         assert_eq!(page.throttle.frame(page.now + 20.0, true), None);
         assert_eq!(page.throttle.frame(page.now + 20.04, true), None);
     }

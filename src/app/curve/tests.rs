@@ -1,4 +1,4 @@
-//! What is drawn, in pixels.
+//! Pixel tests of drawn curves.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -16,12 +16,13 @@ mod pixels;
 use pixels::{Picture, top};
 
 const COLOURS: [[u8; 3]; 3] = [[255, 0, 0], [0, 160, 0], [0, 0, 255]];
-/// Largest difference of a pixel that is mostly of a colour.
+/// Largest channel difference of a pixel that is mostly of a given colour.
 const MOSTLY: u8 = 150;
-/// Sizes in points and pixels in a point.
+/// Sizes in points, and pixels per point.
 const SIZES: [([f32; 2], f32); 3] = [([330.0, 130.0], 1.0), ([700.0, 240.0], 1.0), ([520.0, 300.0], 2.0)];
 
-/// Plots of the record's first three channels over `length` seconds and -50 to 750; the picture and the way to its pixels.
+/// Plots the record's first three channels over `length` seconds and -50 to 750. Returns the picture and the map from plot
+/// coordinates to pixels.
 fn drawn(
     history: &History,
     length: f64,
@@ -42,7 +43,7 @@ fn drawn(
     let mut harness =
         Harness::builder().with_size(size).with_pixels_per_point(scale).with_theme(Theme::Light).wgpu().build_ui(
             move |ui| {
-                // Its texts have a face from the second pass on.
+                // Text has a font from the second pass on.
                 if ui.ctx().cumulative_pass_nr() == 0 {
                     ui.ctx().set_fonts(theme::fonts());
                     return ui.ctx().request_repaint();
@@ -65,7 +66,7 @@ fn drawn(
     (Picture::new(image.width(), image.into_raw()), place)
 }
 
-/// 0.1 s by 0.1 ms; `value` at each instant for each channel.
+/// Record of 0.1 s in steps of 0.1 ms; `value` gives each channel at each instant.
 fn record(value: impl Fn(u32, usize) -> f64) -> History {
     let mut history = History::new(3, 2e-6);
     for n in 0..=1000 {
@@ -85,7 +86,7 @@ fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
         let found = spikes.iter().find(|spike| (spike.0, spike.1) == (n, channel));
         found.map_or(0.0, |spike| spike.2)
     });
-    // The newest at the right edge, and in the middle.
+    // The newest instant at the right edge, then in the middle.
     for ((size, scale), length) in SIZES.into_iter().zip([0.102, 0.2].into_iter().cycle()) {
         let (picture, place) = drawn(&history, length, size, scale);
         for (n, channel, force) in spikes.into_iter().filter(|spike| spike.2 != 101.0) {
@@ -105,7 +106,7 @@ fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
         let [x, _] = place(0.05, 0.0);
         for (height, colour) in heights.into_iter().zip(COLOURS) {
             let [_, y] = place(0.05, height);
-            // Spikes show above the level that all have in common, and that is shared as well.
+            // Spikes rise above the level shared by all channels; that level is checked too.
             let area = match height {
                 0.0 => {
                     let ends = (place(0.0, 9.0), place(0.1, -9.0));
@@ -125,7 +126,7 @@ fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
 
 #[test]
 fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
-    // Slow, fast, and jumping between two values, coarser than pixels and finer.
+    // Slow, fast, and jumping between two values, sampled coarser and finer than pixels.
     let value = |n: u32, channel| match channel {
         0 => 350.0 + 300.0 * libm::sin(f64::from(n) * 0.01),
         1 => 350.0 + 300.0 * libm::sin(f64::from(n) * 2.5),
@@ -143,7 +144,7 @@ fn a_curve_is_whole_and_stays_in_the_range_of_its_values() {
             let (left, right) = (corners.0[0] as usize + 1, corners.1[0] as usize - 1);
             let frame = [left, corners.0[1] as usize, right, corners.1[1] as usize];
             let found = picture.coloured(frame, COLOURS[channel], 110);
-            // Half the width of the curve where it runs level.
+            // Half the width of a level curve.
             let half = f64::from(0.5 * WIDTH * scale) + 0.5;
             let (top, bottom) = (place(0.0, high)[1] - half, place(0.0, low)[1] + half);
             assert!(found.iter().all(|(_, y)| (top..bottom).contains(&(*y as f64 + 0.5))));

@@ -1,4 +1,4 @@
-//! The link to the present state with the address that it needs, and as a QR code, for the cameras of the phones in the room.
+//! The link to the present state, its page address, and a QR code of it for phones in the room.
 
 use eframe::egui::{
     self, Color32, Direction, Label, Layout, Mesh, Rect, Role, Sense, Shape, TextEdit, Ui, UiBuilder, Vec2, WidgetInfo,
@@ -10,23 +10,23 @@ use super::Dialog;
 use crate::app::App;
 use crate::session::link::{NO_PAGE, is_page};
 
-/// Light modules around a code, which a reader needs.
+/// Quiet zone around a code, modules.
 const QUIET: i32 = 4;
-/// Largest code, 117 modules at a side: of a larger one on a screen a camera does not tell them apart.
+/// Largest version, 117 modules a side; cameras cannot resolve larger codes on a screen.
 const LARGEST: u8 = 25;
-/// Characters that fit into it.
+/// Largest number of characters in a code of that version.
 const MOST: usize = 1273;
 
 /// A QR code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Code {
-    /// Modules at a side.
+    /// Modules per side.
     size: i32,
-    /// Column and row of each dark one.
+    /// Column and row of each dark module.
     dark: Vec<[i32; 2]>,
 }
 
-/// Whether other devices find the page at `address`: not if that is this machine's own.
+/// Whether other devices can reach the page at `address`, i.e. it is not a local address.
 fn is_found_by_others(address: &str) -> bool {
     let Some((scheme, rest)) = address.split_once("://") else {
         return false;
@@ -40,10 +40,10 @@ fn is_found_by_others(address: &str) -> bool {
     matches!(scheme, "http" | "https") && !own && !name.starts_with("127.")
 }
 
-/// `link` as a code.
+/// Encodes `link` as a QR code.
 ///
 /// # Errors
-/// It is too long, in words.
+/// The link is too long, as a message.
 fn encode(link: &str) -> Result<Code, String> {
     let segments = [QrSegment::make_bytes(link.as_bytes())];
     let (low, any, largest) = (QrCodeEcc::Low, Version::MIN, Version::new(LARGEST));
@@ -61,16 +61,16 @@ fn encode(link: &str) -> Result<Code, String> {
     Ok(Code { size, dark })
 }
 
-/// A link to pass on.
+/// A link to share.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SharedLink {
-    /// What follows the address and its `#`.
+    /// Fragment of the link, without the `#`.
     fragment: String,
     /// Address of the page; "" for none.
     page: String,
-    /// Whether the user may type another one.
+    /// Whether the user may edit the address.
     typed: bool,
-    /// Its code, or why it has none.
+    /// QR code of the link, or why there is none.
     code: Result<Code, String>,
 }
 
@@ -92,12 +92,12 @@ impl SharedLink {
         self.page.trim()
     }
 
-    /// Whether its address is one that the user could type.
+    /// Whether the user can edit the address.
     pub fn is_typed(&self) -> bool {
         self.typed
     }
 
-    /// Whether its address is one, or none.
+    /// Whether the address is valid or empty.
     pub fn can_be_copied(&self) -> bool {
         !self.typed || self.page().is_empty() || is_page(self.page())
     }
@@ -114,7 +114,7 @@ impl SharedLink {
 }
 
 impl App {
-    /// The entry of the menu.
+    /// Menu entry for the link dialog.
     pub(in crate::app) fn code_button(&mut self, ui: &mut Ui) {
         let help = "The link to this scene in this state and view, to be photographed by a phone";
         if ui.button("QR code").on_hover_text(help).clicked() {
@@ -123,7 +123,7 @@ impl App {
         }
     }
 
-    /// Shows the link to the present state, and asks for an address where other devices do not find the page.
+    /// Shows the link to the present state, and asks for an address if other devices cannot reach the page.
     pub(in crate::app) fn show_link_dialog(&mut self) {
         match self.link().format_short(self.player.pending()) {
             Ok((fragment, note)) => {
@@ -135,7 +135,7 @@ impl App {
     }
 }
 
-/// The address and the code, which is as large as `most` allows, points; returns whether Enter was pressed.
+/// Address and QR code within a height of `most`, points; returns whether Enter was pressed.
 pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
     let top = ui.cursor().top();
     let mut entered = false;
@@ -152,7 +152,7 @@ pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
         }
     }
     let line = ui.text_style_height(&egui::TextStyle::Body) + 2.0 * ui.spacing().item_spacing.y;
-    // As large before it is drawn as afterwards.
+    // Reserves the same size before and after drawing.
     let side = (most - (ui.cursor().top() - top) - line).min(ui.available_width()).max(1.0);
     match &shared.code {
         Ok(code) => draw(ui, code, side),
@@ -171,7 +171,7 @@ pub(super) fn ui(ui: &mut Ui, shared: &mut SharedLink, most: f32) -> bool {
     entered
 }
 
-/// Dark on light whatever the theme, each module of whole pixels, at most `side` points large.
+/// Draws dark on light in every theme, with whole pixels per module, at most `side` points large.
 fn draw(ui: &mut Ui, code: &Code, side: f32) {
     let pixels = ui.pixels_per_point();
     let across = code.size + 2 * QUIET;

@@ -1,4 +1,4 @@
-//! The window as it was before a lesson: it comes back when the lesson ends.
+//! Snapshot of the window before a lesson, restored when the lesson ends.
 
 use super::Lesson;
 use crate::app::bench::Bench;
@@ -11,7 +11,7 @@ use crate::app::undo::Undo;
 use crate::app::{App, CameraPose};
 use crate::view::{Picked, ViewOptions};
 
-/// Everything that a lesson changes.
+/// All settings that a lesson changes.
 pub struct WindowBefore {
     /// Whether controls, plots and bench were shown.
     panels: [bool; 3],
@@ -26,15 +26,15 @@ pub struct WindowBefore {
     microscope: (bool, usize),
     ideal: bool,
     scale: f64,
-    /// Runs kept from before a change, and what can be undone.
+    /// Runs from before a change, and the undo history.
     comparison: Comparison,
     undo: Undo,
-    /// The run and its file, once a scene of the lesson has replaced them.
+    /// The run and its file, once a lesson scene has replaced them.
     run: Option<(Player, SceneFile)>,
 }
 
 impl App {
-    /// Remembers the window, unless a lesson under way has done so.
+    /// Takes the snapshot, unless the current lesson has already done so.
     pub(in crate::app) fn remember_window(&mut self) {
         if self.before_lesson.is_some() {
             return;
@@ -43,7 +43,7 @@ impl App {
             panels: [self.show_controls, self.show_plots, self.show_bench],
             sheet: self.sheet,
             plots: self.plots.choice(),
-            // A lesson begins with an empty one.
+            // A lesson starts with an empty bench.
             bench: std::mem::take(&mut self.bench),
             options: self.viewport.options.clone(),
             pose: self.viewport.pose(),
@@ -58,7 +58,7 @@ impl App {
         }));
     }
 
-    /// Takes the run that a scene of the lesson has just replaced: the first one is that of the window before.
+    /// Stores the run just replaced by a lesson scene; only the first such run belongs to the snapshot.
     pub(in crate::app) fn remember_run(&mut self, player: Player, file: SceneFile) {
         if let Some(before) = &mut self.before_lesson
             && before.run.is_none()
@@ -67,7 +67,7 @@ impl App {
         }
     }
 
-    /// Gives back the window before `lesson`. A machine that was opened meanwhile, and is none of the lesson's, stays.
+    /// Restores the window from before `lesson`. A machine opened meanwhile that does not belong to the lesson stays.
     pub(super) fn give_back_window(&mut self, lesson: &Lesson) {
         let Some(before) = self.before_lesson.take() else {
             return;
@@ -85,7 +85,7 @@ impl App {
         (self.replay, self.load, self.verdict, self.problem, self.film_wanted) = (None, None, None, None, None);
         let thickness = self.viewport.options.arrows.thickness;
         self.viewport.options = before.options;
-        // A presentation may go on.
+        // A presentation may still be active.
         self.viewport.options.arrows.thickness = thickness;
         if let Some((player, file)) = before.run {
             (self.player, self.scene_file) = (player, file);

@@ -1,4 +1,4 @@
-//! The lessons that the program carries.
+//! The built-in lessons.
 
 use std::sync::{Arc, LazyLock};
 
@@ -8,14 +8,14 @@ use super::format::Lesson;
 use crate::scene::{SceneError, visible_line};
 use crate::suggest::nearest;
 
-/// Name and text, in the order of a lecture.
+/// Names and texts in the order of a lecture.
 macro_rules! lessons {
     ($($name:literal),+ $(,)?) => {
         [$(($name, include_str!(concat!("../../../assets/lessons/", $name, ".toml")))),+]
     };
 }
 
-/// Name and text of each, in the order of a lecture.
+/// Name and text of each lesson, in the order of a lecture.
 pub const BUILT_IN_LESSONS: [(&str, &str); 10] = lessons![
     "rattle",
     "first-impact",
@@ -29,13 +29,13 @@ pub const BUILT_IN_LESSONS: [(&str, &str); 10] = lessons![
     "to-the-class",
 ];
 
-/// What the menu needs of a lesson.
+/// The part of a lesson shown in the menu.
 #[derive(Deserialize)]
 struct Head {
     title: String,
 }
 
-/// Name and title of each.
+/// Name and title of each lesson.
 pub fn lesson_titles() -> &'static [(&'static str, String)] {
     static TITLES: LazyLock<Vec<(&str, String)>> = LazyLock::new(|| {
         let title = |text: &str| toml::from_str::<Head>(text).map_or(String::new(), |h| h.title);
@@ -49,7 +49,7 @@ impl Lesson {
     /// A built-in lesson by its name.
     ///
     /// # Errors
-    /// There is none of this name; lists those there are.
+    /// No lesson has this name; the error lists the existing names.
     pub fn built_in(name: &str) -> Result<Arc<Self>, SceneError> {
         let names = BUILT_IN_LESSONS.map(|(name, _)| name);
         let Some((name, text)) = BUILT_IN_LESSONS.iter().find(|(own, _)| *own == name) else {
@@ -64,10 +64,10 @@ impl Lesson {
         Self::parse(name, text, None).map(Arc::new)
     }
 
-    /// A built-in lesson by its name, or a file (contains `/` or ends in `.toml`).
+    /// A built-in lesson by name, or a lesson file (the argument contains `/` or ends in `.toml`).
     ///
     /// # Errors
-    /// As [`Self::built_in`] and [`Self::read`].
+    /// Those of [`Self::built_in`] and [`Self::read`].
     pub fn load(argument: &str) -> Result<Arc<Self>, SceneError> {
         if argument.contains('/') || argument.ends_with(".toml") {
             Self::read(argument).map(Arc::new)

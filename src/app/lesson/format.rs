@@ -1,4 +1,4 @@
-//! The file of a lesson: `docs/lessons.md` says what may stand in it.
+//! File format of lessons, documented in `docs/lessons.md`.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
@@ -15,51 +15,51 @@ use crate::suggest::nearest;
 use crate::units::Dimension;
 use crate::view::Preset;
 
-/// Most steps of a lesson, measures, and choices of a question.
+/// Limits on steps, measures, and choices of a question.
 const MOST_STEPS: usize = 40;
 const MOST_MEASURES: usize = 100;
 const MOST_CHOICES: usize = 6;
 
-/// Where the measures of a run end if nothing else is said.
+/// Default end and start of the measures of a run.
 const END: &str = "120 s";
 const START: &str = "0 s";
 
-/// A lesson as it was read.
+/// A parsed lesson.
 #[derive(Clone, Debug)]
 pub struct Lesson {
-    /// Name of a built-in one, or the file.
+    /// Name of a built-in lesson, or path of the file.
     pub name: String,
     /// Title, in sentence case.
     pub title: String,
-    /// The runs that its steps begin.
+    /// The runs started by its steps.
     pub runs: Vec<Run>,
-    /// What is measured in them.
+    /// The measures taken in them.
     pub measures: Vec<Measure>,
-    /// In order.
+    /// Steps in order.
     pub steps: Vec<Step>,
 }
 
-/// A run that a step begins.
+/// A run started by a step.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Name of the step.
     pub name: String,
-    /// Scene with the values that it begins with.
+    /// Scene with its initial values.
     pub scene: Scene,
     /// Live changes: time, s, key and value.
     pub changes: Vec<(f64, String, String)>,
 }
 
-/// What is read from a run.
+/// A quantity computed from a run.
 #[derive(Clone, Debug)]
 pub struct Measure {
-    /// By this name expressions use it.
+    /// Name used in expressions.
     pub name: String,
     /// Index of its run.
     pub run: usize,
-    /// What it is.
+    /// Kind of the measure.
     pub kind: Kind,
-    /// Expressions of the instants from and up to which it is taken.
+    /// Expressions for the start and end of the measured interval.
     pub times: [String; 2],
 }
 
@@ -68,36 +68,36 @@ pub struct Measure {
 pub enum Kind {
     /// A parameter of the scene, by its key.
     Parameter(String),
-    /// An instant that texts and other measures name.
+    /// An instant named by texts and other measures.
     Instant,
-    /// Something of one impact of a ball joint, counted from 1.
+    /// A property of an impact of a ball joint.
     Impact {
-        /// Its name, or `any`.
+        /// Name of the joint, or `any`.
         of: String,
-        /// Which one.
+        /// Number of the impact, from 1.
         number: usize,
-        /// What of it.
+        /// The property.
         its: Its,
     },
-    /// Number of finished impacts of a ball joint, or of `any`.
+    /// Number of finished impacts of a ball joint, or of all joints for `any`.
     Count {
-        /// Its name.
+        /// Name of the joint, or `any`.
         of: String,
     },
     /// Largest value of a channel.
     Peak(String),
-    /// Smallest one.
+    /// Smallest value of a channel.
     Least(String),
-    /// Its mean over time.
+    /// Time average of a channel.
     Mean(String),
-    /// Its value at an instant.
+    /// Value of a channel at an instant.
     At(String),
     /// Distance of a twin run, in scales of the state.
     Apart,
 }
 
 impl Kind {
-    /// Its dimension; of a channel none, that is known from the scene in motion.
+    /// Dimension of the measure; none for a channel, whose dimension is known only from the running scene.
     pub fn dimension(&self) -> Dimension {
         match self {
             Self::Impact { its, .. } => match its {
@@ -111,7 +111,7 @@ impl Kind {
         }
     }
 
-    /// The ball joint that it is about.
+    /// The ball joint of the measure.
     pub fn joint(&self) -> Option<&str> {
         match self {
             Self::Impact { of, .. } | Self::Count { of } => Some(of),
@@ -119,7 +119,7 @@ impl Kind {
         }
     }
 
-    /// The channel that it reads.
+    /// The channel of the measure.
     pub fn channel(&self) -> Option<&str> {
         match self {
             Self::Peak(name) | Self::Least(name) | Self::Mean(name) | Self::At(name) => Some(name),
@@ -128,7 +128,7 @@ impl Kind {
     }
 }
 
-/// What can be asked of an impact.
+/// Properties of an impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[allow(missing_docs)]
@@ -142,43 +142,43 @@ pub enum Its {
     Depth,
 }
 
-/// A step.
+/// A step of a lesson.
 #[derive(Clone, Debug)]
 pub struct Step {
     /// Title, in sentence case.
     pub title: String,
     /// Markdown with placeholders.
     pub text: String,
-    /// Index of the run that it is about.
+    /// Index of its run.
     pub run: usize,
-    /// Whether it begins that run anew, and at which instant it begins.
+    /// Whether it restarts that run, and at which instant.
     pub begins: bool,
-    /// What else its state says.
+    /// Its other settings, as a link.
     pub link: Link,
-    /// What the camera looks at.
+    /// Camera target.
     pub view: Option<Look>,
-    /// Panels that are open; `None`: those that are.
+    /// Open panels; `None` leaves them unchanged.
     pub open: Option<Vec<PanelName>>,
-    /// Whether a twin run begins with it.
+    /// Whether a twin run starts with the step.
     pub twin: bool,
-    /// Labels of controls, and ball joints.
+    /// Labels of controls, and names of ball joints.
     pub highlight: Vec<String>,
-    /// Expression of the instant to which the machine is to run.
+    /// Expression of the instant at which the step ends.
     pub until: Option<String>,
-    /// What the class predicts.
+    /// Question whose answer the class predicts.
     pub question: Option<Question>,
-    /// What it should have seen by then.
+    /// Explanation of what was visible.
     pub seen: String,
-    /// Conditions that hold.
+    /// Conditions that must hold.
     pub claims: Vec<String>,
 }
 
-/// What a step's camera looks at.
+/// Camera target of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Look {
-    /// Everything, from there.
+    /// The whole scene from a point of view.
     From(Preset),
-    /// A ball joint from close up, by its index.
+    /// A close-up of a ball joint, by its index.
     At(usize),
 }
 
@@ -192,7 +192,7 @@ pub enum PanelName {
     Bench,
 }
 
-/// A question that the run answers.
+/// A question answered by the run.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Question {
@@ -206,9 +206,9 @@ pub struct Question {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Choice {
-    /// What it says.
+    /// Text of the choice.
     pub text: String,
-    /// Condition under which it is right.
+    /// Condition under which the choice is correct.
     pub when: String,
 }
 
@@ -263,14 +263,14 @@ struct StepRow {
     claims: Vec<Spanned<String>>,
 }
 
-/// A text of a lesson and where it comes from.
+/// The text of a lesson with its origin.
 struct Source<'t> {
     file: Option<&'t str>,
     text: &'t str,
 }
 
 impl Source<'_> {
-    /// An error at `span`; `key` if it is known.
+    /// An error at `span`, with the `key` if known.
     fn error(&self, span: Range<usize>, key: &str, message: impl Into<String>) -> SceneError {
         let value = self.text.get(span.clone()).unwrap_or_default();
         let value = value.lines().next().filter(|line| *line == value && line.len() < 60);
@@ -285,7 +285,7 @@ impl Source<'_> {
     }
 }
 
-/// The key of the line in which `at` stands, for errors that do not know it.
+/// The key on the line of offset `at`, for errors without one.
 fn key_at(text: &str, at: usize) -> Option<&str> {
     let begin = text.get(..at)?.rfind('\n').map_or(0, |line| line + 1);
     let (key, _) = text.get(begin..)?.lines().next()?.split_once('=')?;
@@ -293,10 +293,10 @@ fn key_at(text: &str, at: usize) -> Option<&str> {
 }
 
 impl Lesson {
-    /// A file by its path.
+    /// Reads a file.
     ///
     /// # Errors
-    /// A file that cannot be read, and as [`Self::parse`].
+    /// The file cannot be read, or any error of [`Self::parse`].
     pub fn read(path: &str) -> Result<Self, SceneError> {
         let wrong = |message: String| SceneError {
             file: Some(path.to_owned()),
@@ -305,7 +305,7 @@ impl Lesson {
             ..SceneError::default()
         };
         let mut text = String::new();
-        // One byte more than allowed: a pipe does not report its size.
+        // One byte above the limit: a pipe does not report its size.
         std::fs::File::open(path)
             .and_then(|file| file.take(LARGEST_FILE + 1).read_to_string(&mut text))
             .map_err(|why| wrong(format!("cannot read this lesson: {why}")))?;
@@ -315,10 +315,10 @@ impl Lesson {
         Self::parse(path, &text, Some(path))
     }
 
-    /// Reads a lesson called `name`.
+    /// Parses a lesson called `name`.
     ///
     /// # Errors
-    /// Whatever is wrong with it: file, line, column, key, and what is allowed.
+    /// Any fault, with file, line, column, key, and allowed values.
     pub fn parse(name: &str, text: &str, file: Option<&str>) -> Result<Self, SceneError> {
         let source = Source { file, text };
         let rows: File = toml::from_str(text).map_err(|error| {
@@ -355,14 +355,14 @@ impl Lesson {
         Ok(lesson)
     }
 
-    /// Its measures, none of which is known yet.
+    /// The names of its measures, all pending.
     pub fn names(&self) -> Names<'_> {
         let one = |measure: &Measure| Quantity::new(1.0, measure.kind.dimension());
         let all = self.measures.iter();
         Names::to_come(all.map(|measure| (measure.name.as_str(), one(measure))).collect())
     }
 
-    /// The last step up to `step` that begins a run: there the machine is set for it.
+    /// The last step up to `step` that starts a run; the machine is set for it.
     pub fn beginning(&self, step: usize) -> usize {
         let before = self.steps[..=step].iter();
         before.rev().position(|step| step.begins).map_or(0, |back| step - back)
@@ -410,7 +410,7 @@ impl Lesson {
                 base => Scene::load(&argument, base).map_err(|error| wrong(error.to_string()))?,
             };
             link.time.get_or_insert(0.0);
-            // As long as the machine is being set, a link copied is this one.
+            // A link copied while the machine is being set uses this scene.
             link.scene = SceneText::of(&loaded);
             let name = row.name.clone().unwrap_or_default();
             let same = |run: &Run| !name.is_empty() && run.name == name;
@@ -555,7 +555,7 @@ impl Lesson {
         })
     }
 
-    /// Checks every expression: it may name measures and nothing else.
+    /// Checks that every expression refers only to measures.
     fn check(&self, source: &Source<'_>, rows: &File) -> Result<(), SceneError> {
         let names = self.names();
         for (measure, row) in self.measures.iter().zip(rows.measure.values()) {
@@ -605,18 +605,18 @@ impl Lesson {
     }
 }
 
-/// A scene file that a lesson names stands beside it.
+/// Resolves a scene file relative to the lesson file.
 fn beside(scene: &str, file: Option<&str>) -> String {
     let is_file = scene.contains('/') || scene.ends_with(".toml");
     let folder = file.and_then(|file| std::path::Path::new(file).parent());
     match folder.filter(|_| is_file) {
-        // With its `/` it is a file, whatever its name.
+        // A path with `/` is always a file.
         Some(folder) => folder.join(scene).to_string_lossy().into_owned(),
         None => scene.to_owned(),
     }
 }
 
-/// What the camera looks at.
+/// Parses a camera target.
 fn look(word: &str, scene: &Scene) -> Result<Look, String> {
     let joints = || scene.machine.ball_joints.iter().map(|joint| &*joint.name);
     if let Some(joint) = joints().position(|name| name == word) {

@@ -1,4 +1,4 @@
-//! What a lesson measures: the runs of its steps, taken once in the background, and what is read from them.
+//! Measures of a lesson: the runs of its steps are computed once in the background and evaluated.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use crate::scene::{Quantity, Scene};
 use crate::simulate::{Frame, Impact, Peak, Reading, channels_of, chosen_columns};
 use crate::units::Dimension;
 
-/// Latest instant that is measured, s.
+/// Latest measurable instant, s.
 const FARTHEST: f64 = 120.0;
-/// An impact that begins before another may end this much later, s.
+/// An impact that begins before another may end at most this much later, s.
 const OVERLAP: f64 = 5e-3;
-/// Intervals in which a step is sampled.
+/// Sampling intervals per step.
 const SAMPLES: u32 = 4;
 
-/// The measures of a lesson, computed piece by piece.
+/// The measures of a lesson, computed incrementally.
 pub struct Measured {
     lesson: Arc<Lesson>,
     values: Vec<Option<Quantity>>,
@@ -26,12 +26,12 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Nothing is computed yet.
+    /// Starts with no values.
     pub fn new(lesson: Arc<Lesson>) -> Self {
         Self { values: vec![None; lesson.measures.len()], lesson, pass: None, fault: None }
     }
 
-    /// What is known so far.
+    /// The measures known so far.
     pub fn names(&self) -> Names<'_> {
         let measures = &self.lesson.measures;
         let known = measures.iter().zip(&self.values);
@@ -40,12 +40,12 @@ impl Measured {
         names
     }
 
-    /// Why something cannot be computed.
+    /// Why the computation failed.
     pub fn fault(&self) -> Option<&str> {
         self.fault.as_deref()
     }
 
-    /// Continues while `may_step`; whether everything is known, or cannot be.
+    /// Continues while `may_step`; returns whether all measures are known or have failed.
     pub fn advance(&mut self, mut may_step: impl FnMut() -> bool) -> bool {
         while self.fault.is_none() {
             let Some(pass) = &mut self.pass else {
@@ -70,7 +70,7 @@ impl Measured {
         true
     }
 
-    /// The next run to take: that of the first measure not known yet, for all measures of it whose instants are known.
+    /// The next run: that of the first pending measure, with all measures of that run whose instants are known.
     fn next_pass(&self) -> Result<Option<Pass>, String> {
         let measures = self.lesson.measures.iter().enumerate();
         let open = measures.filter(|(index, _)| self.values[*index].is_none());
@@ -94,7 +94,7 @@ impl Measured {
                 none => none.insert(Pass::new(&self.lesson.runs[own]).map_err(wrong)?),
             };
             let gauge = pass.gauge(measure, from, to).map_err(wrong)?;
-            // A run has one twin at a time: one that begins at another instant is for a later pass.
+            // A run has one twin at a time; a twin with another start waits for a later pass.
             let of_other_twin = |(_, other): &(usize, Gauge)| other.is_apart() && other.from != from;
             if gauge.is_apart() && pass.gauges.iter().any(of_other_twin) {
                 continue;
@@ -108,7 +108,7 @@ impl Measured {
     }
 }
 
-/// A run being taken.
+/// A run in progress.
 struct Pass {
     simulation: LiveScene,
     changes: Vec<(f64, String, String)>,
@@ -120,7 +120,7 @@ struct Pass {
     twin: Option<Twin>,
 }
 
-/// One measure being taken.
+/// A measure in progress.
 struct Gauge {
     kind: Kind,
     joint: Option<usize>,
@@ -128,13 +128,13 @@ struct Gauge {
     dimension: Dimension,
     from: f64,
     to: f64,
-    /// Extreme, integral or value so far.
+    /// Extremum, integral or value so far.
     so_far: f64,
     value: Option<Quantity>,
 }
 
 impl Gauge {
-    /// Whether it takes the distance of a twin run.
+    /// Whether it measures the distance of a twin run.
     fn is_apart(&self) -> bool {
         matches!(self.kind, Kind::Apart)
     }
@@ -184,7 +184,7 @@ impl Pass {
             let pattern = [channel.to_owned()];
             let (columns, readings) =
                 chosen_columns(&self.scene.machine, &first, &pattern).map_err(|error| error.to_string())?;
-            // The first is the time.
+            // The first column is the time.
             let (columns, readings) = (&columns[1..], &readings[1..]);
             let listed = channels_of(&self.scene.machine, &first);
             let listed: Vec<_> = listed.iter().filter(|c| columns.contains(&c.column)).collect();
@@ -197,7 +197,7 @@ impl Pass {
                 ));
             }
             gauge.dimension = dimension_of(listed[0].unit);
-            // The size of a normal force is known in continuous time.
+            // Normal force magnitudes are available in continuous time.
             gauge.joint = channel.strip_suffix(".normal").and_then(|name| self.joint(name).ok());
             readings.iter().for_each(|reading| reading.ask(&mut self.frame));
             gauge.readings = readings.to_vec();
@@ -223,7 +223,7 @@ impl Pass {
         })
     }
 
-    /// Whether all of its measures are known.
+    /// Advances the run; returns whether all its measures are known.
     fn advance(&mut self, may_step: &mut impl FnMut() -> bool) -> Result<bool, String> {
         while self.gauges.iter().any(|(_, gauge)| gauge.value.is_none()) {
             if !may_step() {
@@ -263,7 +263,7 @@ impl Pass {
 }
 
 impl Gauge {
-    /// Takes what the latest step adds.
+    /// Evaluates the latest step.
     fn step(
         &mut self,
         simulation: &mut LiveScene,
@@ -304,7 +304,7 @@ impl Gauge {
                 let part = (to - from) / f64::from(SAMPLES);
                 for k in 0..=SAMPLES {
                     let value = self.sample(simulation, frame, from + part * f64::from(k));
-                    // Trapezia: the ends count half.
+                    // Trapezoidal rule: the ends have half weight.
                     let weight = if k == 0 || k == SAMPLES { 0.5 } else { 1.0 };
                     self.so_far = match self.kind {
                         Kind::Peak(_) => self.so_far.max(value),
@@ -334,7 +334,7 @@ impl Gauge {
         self.value = Some(Quantity::new(value, self.dimension));
     }
 
-    /// The channel at `time`, s, of the latest step; of a vector its size.
+    /// Value of the channel at `time`, s, in the latest step; the magnitude for a vector.
     fn sample(&self, simulation: &mut LiveScene, frame: &mut Frame, time: f64) -> f64 {
         simulation.sample(time, frame);
         let value = |reading: &Reading| reading.read(frame).unwrap_or(f64::NAN);
@@ -359,7 +359,7 @@ impl Its {
     }
 }
 
-/// Dimension of a channel's unit.
+/// Dimension of the unit of a channel.
 fn dimension_of(unit: &str) -> Dimension {
     match unit {
         "s" => Dimension::Time,

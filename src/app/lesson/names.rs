@@ -5,25 +5,25 @@ use crate::scene::{Kind, Quantity, Scene, Value, evaluate};
 use crate::suggest::nearest;
 use crate::units::Dimension;
 
-/// The measures of a lesson by name, as far as they are known.
+/// The measures of a lesson by name, known or pending.
 pub struct Names<'l> {
-    /// Those that are known.
+    /// The known measures.
     pub known: Vec<(&'l str, Quantity)>,
-    /// All of them, each as 1 of its dimension where that is known beforehand.
+    /// All measures, each with value 1 and its dimension where that is known in advance.
     all: Vec<(&'l str, Quantity)>,
 }
 
 impl<'l> Names<'l> {
-    /// None of `all` is known yet; each is 1 of its dimension, where that is known beforehand.
+    /// Starts with no measure known; `all` holds 1 of each dimension where that is known in advance.
     pub fn to_come(all: Vec<(&'l str, Quantity)>) -> Self {
         let known = Vec::new();
         Self { known, all }
     }
 
-    /// Whether `expression` can be computed once all of them are known.
+    /// Checks that `expression` can be evaluated once all measures are known.
     ///
     /// # Errors
-    /// Where it is wrong, and why.
+    /// Position and cause of the fault.
     pub fn check(&self, expression: &str) -> Result<(), String> {
         let Err(error) = evaluate(expression, &self.all) else {
             return Ok(());
@@ -37,19 +37,19 @@ impl<'l> Names<'l> {
         Err(format!("no measure `{name}`{near}; allowed: {}", known.join(", ")))
     }
 
-    /// The instant that `expression` gives, s; `None` if it is still to come or is no time.
+    /// The instant given by `expression`, s; `None` if it is pending or not a time.
     pub fn time(&self, expression: &str) -> Option<f64> {
         let quantity = evaluate(expression, &self.known).ok()?;
         quantity.of(Dimension::Time, false).ok()
     }
 
-    /// Whether `condition` holds; `None` if that is still to come or it compares what cannot be compared.
+    /// Whether `condition` holds; `None` if it is pending or compares different dimensions.
     pub fn holds(&self, condition: &str) -> Option<bool> {
         let mut all = true;
         for (left, sign, right) in comparisons(condition)? {
             let left = evaluate(left, &self.known).ok()?;
             let right = evaluate(right, &self.known).ok()?;
-            // A pure 0 stands for 0 of any dimension.
+            // A plain 0 is compatible with any dimension.
             let same = left.powers()? == right.powers()? || right.value() == 0.0;
             all &= match sign {
                 _ if !same => return None,
@@ -62,7 +62,7 @@ impl<'l> Names<'l> {
     }
 }
 
-/// The comparisons of `condition`, a chain such as `1.8 < b / a < 2.2`, or several joined by `and`; `None` if there is none.
+/// The comparisons of `condition`: a chain such as `1.8 < b / a < 2.2`, or several joined by `and`; `None` if there is none.
 pub fn comparisons(condition: &str) -> Option<Vec<(&str, char, &str)>> {
     let mut out = Vec::new();
     for part in condition.split(" and ") {
@@ -86,7 +86,7 @@ pub fn comparisons(condition: &str) -> Option<Vec<(&str, char, &str)>> {
     Some(out)
 }
 
-/// The number that `scene` gives a parameter.
+/// The value of a parameter of `scene`.
 pub fn parameter(scene: &Scene, key: &str) -> Result<Quantity, String> {
     let value = scene.get(key).map_err(|error| error.to_string())?;
     let dimension = match scene.parameter(key).map(|parameter| parameter.kind) {

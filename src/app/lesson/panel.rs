@@ -1,4 +1,4 @@
-//! The panel of a lesson: its text, its question, and the buttons that turn its pages.
+//! The lesson panel: text, question, and navigation buttons.
 
 use eframe::egui::{
     self, Button, FontFamily, Layout, Panel, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui,
@@ -12,14 +12,14 @@ use super::{Course, lesson_titles};
 use crate::app::bench::Bench;
 use crate::app::{App, layout, spoken, theme};
 
-/// Height of a choice where only the mouse reaches it, points.
+/// Height of a choice for mouse input, points.
 const LOW: f32 = 24.0;
-/// A page that goes on below what is in sight by more than this has a button for it, points.
+/// Hidden height of a page above which a button to scroll appears, points.
 const MORE: f32 = 8.0;
-/// Where there is less beside the buttons that turn pages, points, the steps are counted in fewer words.
+/// Width beside the navigation buttons below which the step counter is abbreviated, points.
 const ROOM: f32 = 200.0;
 
-/// What the buttons of the panel ask for.
+/// A request from the panel's buttons.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Asked {
     Nothing,
@@ -30,7 +30,7 @@ enum Asked {
 }
 
 impl App {
-    /// The menu of the built-in lessons.
+    /// Menu of the built-in lessons.
     pub(in crate::app) fn lesson_menu(&mut self, ui: &mut Ui) {
         for (name, title) in lesson_titles() {
             if ui.button(title).on_hover_text(format!("Lesson {name}")).clicked() {
@@ -48,7 +48,7 @@ impl App {
         };
         spoken::landmark(ui, "Lesson");
         let own = course.sets || course.is_own(&self.player);
-        // In a presentation the screen is low in points, but nobody's finger is on it.
+        // A presentation screen is low in points but not operated by touch.
         let low = self.presentation.is_some() && !self.touched;
         let backwards = Layout::bottom_up(egui::Align::Min);
         let asked = ui
@@ -58,14 +58,14 @@ impl App {
                     let id = (course.lesson.name.clone(), course.step);
                     let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
                     let set = page.show(ui, |ui| {
-                        // Room for the scroll bar.
+                        // Space for the scroll bar.
                         ui.set_max_width(ui.available_width() - 10.0);
                         if low {
                             ui.spacing_mut().interact_size.y = LOW;
                             ui.spacing_mut().icon_width = LOW - 8.0;
                         }
                         if asked == Asked::More {
-                            // The last line of a page is the first of the next.
+                            // The last line of a page is repeated at the top of the next.
                             ui.scroll_with_delta(egui::vec2(0.0, 40.0 - ui.clip_rect().height()));
                         }
                         let set = course.page(ui, own);
@@ -94,7 +94,7 @@ impl App {
 }
 
 impl App {
-    /// The distance of the twin under the picture of a presentation, where the lesson speaks of the bench.
+    /// The twin's distance under the picture of a presentation, if the lesson uses the bench.
     pub(in crate::app) fn lesson_twin(&mut self, ui: &mut Ui, bar: egui::Frame) {
         if self.course().is_none() || !self.show_bench || self.player.twin().is_none() {
             return;
@@ -107,7 +107,7 @@ impl App {
             .show(ui, |ui| Bench::twin_ui(ui, &self.player));
     }
 
-    /// What the step points at but the presentation does not show.
+    /// The item the step refers to that the presentation does not show.
     fn only_in_window(&self, ctx: &egui::Context) -> Option<String> {
         self.presentation.as_ref()?;
         let labels = self.pointed_controls();
@@ -118,7 +118,7 @@ impl App {
     }
 }
 
-/// Back, Next, how far, and Leave, in places of their own whatever the page says.
+/// Back, Next, progress, and Leave, at positions independent of the page.
 fn buttons(ui: &mut Ui, course: &Course) -> Asked {
     let mut asked = Asked::Nothing;
     let last = course.lesson.steps.len() - 1;
@@ -149,7 +149,7 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
 }
 
 impl Course {
-    /// Title, text, question and answer of the step; whether the machine is to be set anew. `own`: it runs as the step set it.
+    /// Title, text, question and answer of the step; returns whether to reset the machine. `own`: it runs as set by the step.
     fn page(&mut self, ui: &mut Ui, own: bool) -> bool {
         let lesson = self.lesson.clone();
         let step = &lesson.steps[self.step];
@@ -182,7 +182,7 @@ impl Course {
                 let help = "Your prediction; the run shows whether it is right";
                 let radio = ui
                     .scope(|ui| {
-                        // The right one shall not fade with the others.
+                        // The correct choice must not fade with the others.
                         ui.visuals_mut().disabled_alpha = 1.0;
                         ui.add_enabled(!self.reached, RadioButton::new(chosen, words))
                     })
@@ -221,19 +221,19 @@ impl Course {
             prose(ui, &step.seen, &self.measured.names());
         }
         if std::mem::take(&mut self.fresh) {
-            // The answer may stand below what fits.
+            // The answer may lie below the visible part.
             ui.scroll_to_cursor(Some(egui::Align::BOTTOM));
         }
         set
     }
 }
 
-/// `text` with its values; what is wrong in it instead, if it cannot be filled in.
+/// `text` with its values filled in, or the error message if that fails.
 fn filled(text: &str, names: &Names<'_>) -> String {
     text::fill(text, names).unwrap_or_else(|why| why)
 }
 
-/// Markdown with its values.
+/// Renders Markdown with values filled in.
 fn prose(ui: &mut Ui, markdown: &str, names: &Names<'_>) {
     for block in text::blocks(&filled(markdown, names)) {
         if block.entry {

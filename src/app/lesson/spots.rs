@@ -1,11 +1,11 @@
-//! Where controls stand, by the names that they have for screen readers: what a lesson points at needs no other name.
+//! Positions of controls by their accessible names, so that a lesson needs no other identifiers.
 
 use std::sync::Arc;
 
 use eframe::egui::accesskit::{Node, Role, TreeUpdate};
 use eframe::egui::{self, Rect, pos2};
 
-/// Keeps where the controls of these names were drawn last.
+/// Records where the controls with these names were last drawn.
 #[derive(Default)]
 pub struct Spots {
     wanted: Arc<[String]>,
@@ -28,7 +28,8 @@ impl egui::Plugin for Spots {
 }
 
 impl Spots {
-    /// Where controls called one of `wanted` stood in the frame before; the parts of one, such as slider and field, together.
+    /// Rectangles of the controls named in `wanted` in the previous frame; parts of one control, such as slider and field, are
+    /// merged.
     pub fn places(ctx: &egui::Context, wanted: &[String]) -> Vec<(String, Rect)> {
         let spots = ctx.plugin_or_default::<Self>();
         let mut spots = spots.lock();
@@ -48,7 +49,7 @@ impl Spots {
             let all = || tree.nodes.iter().filter(|(_, node)| named(node, name));
             let is_text =
                 |node: &Node| matches!(node.role(), Role::Label | Role::TextRun | Role::Heading | Role::Region);
-            // A text of that name counts only where no control has it.
+            // A text counts only if no control has its name.
             let controls = all().any(|(_, node)| !is_text(node));
             let rects = all()
                 .filter(|(_, node)| !controls || !is_text(node))

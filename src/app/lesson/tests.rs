@@ -1,7 +1,7 @@
 use super::*;
 use crate::units::unit_names;
 
-/// All texts of a step.
+/// All texts of a lesson step.
 fn texts(step: &Step) -> Vec<&str> {
     let mut all: Vec<&str> = vec![&step.title, &step.text, &step.seen];
     if let Some(question) = &step.question {
@@ -11,7 +11,7 @@ fn texts(step: &Step) -> Vec<&str> {
     all
 }
 
-/// A number with a unit that is written in `text`, outside its placeholders.
+/// A number with a unit in `text`, outside its placeholders.
 fn written_number(text: &str) -> Option<&str> {
     let units: Vec<&str> = [
         crate::units::Dimension::Length,
@@ -66,7 +66,7 @@ fn every_lesson_holds_what_it_says() {
     assert_eq!(written_number("S1 may {first + 1 ms} be 1 of 3"), None);
 }
 
-/// The example of the page for teachers.
+/// The example lesson of `docs/lessons.md`.
 fn example() -> &'static str {
     let page = include_str!("../../../docs/lessons.md");
     let (_, block) = page.split_once("```toml\n").expect("an example");
@@ -84,7 +84,7 @@ fn the_example_of_the_page_holds_and_is_printed_with_its_values() {
     assert!(!printed.contains(['{', '…']), "{printed}");
 }
 
-/// The error of the example with `new` in place of `old`.
+/// The error message of the example with `old` replaced by `new`.
 fn fault(old: &str, new: &str) -> String {
     assert!(example().contains(old), "{old}");
     let text = example().replacen(old, new, 1);

@@ -1,21 +1,21 @@
-//! Texts of lessons: a little Markdown, and placeholders such as `{first in us}` whose values are computed.
+//! Lesson texts: a Markdown subset, and placeholders such as `{first in us}` for computed values.
 
 use super::names::Names;
 use crate::app::value;
 use crate::scene::{Quantity, evaluate};
 
-/// What stands for a value that is not computed yet.
+/// Placeholder for a pending value.
 const TO_COME: &str = "…";
 
-/// Digits of a value.
+/// Significant digits of a value.
 const DIGITS: usize = 3;
 
-/// Units of one dimension, the largest first; a value is written in the first one of which it is at least 1.
+/// Units of one dimension in descending order; a value is written in the first unit in which it is at least 1.
 type Units = ([i8; 4], &'static [(&'static str, f64)]);
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// By powers of kg, m, s and rad.
+/// Units by powers of kg, m, s and rad.
 const UNITS: [Units; 11] = [
     ([0, 0, 1, 0], &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)]),
     ([0, 1, 0, 0], &[("m", 1.0), ("mm", 1e-3), ("um", 1e-6)]),
@@ -30,16 +30,16 @@ const UNITS: [Units; 11] = [
     ([0, 0, 0, 0], &[("", 1.0)]),
 ];
 
-/// A run of letters in one face.
+/// A run of text in one style.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// The letters.
+    /// The text.
     pub text: String,
-    /// Their face.
+    /// Its style.
     pub face: Face,
 }
 
-/// How letters look.
+/// Text style.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Face {
@@ -50,16 +50,16 @@ pub enum Face {
     Code,
 }
 
-/// A paragraph, or an entry of a list.
+/// A paragraph or a list item.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Block {
-    /// Whether it is an entry of a list.
+    /// Whether it is a list item.
     pub entry: bool,
-    /// What it says.
+    /// Its text.
     pub pieces: Vec<Piece>,
 }
 
-/// Paragraphs, and entries of lists (lines that begin with `- `), with `*emphasis*`, `**strong**` and `` `code` ``.
+/// Parses paragraphs and list items (lines that begin with `- `), with `*emphasis*`, `**strong**` and `` `code` ``.
 pub fn blocks(markdown: &str) -> Vec<Block> {
     let (mut blocks, mut lines) = (Vec::new(), Vec::new());
     let mut entry = false;
@@ -84,7 +84,7 @@ fn pieces(line: &str) -> Vec<Piece> {
             pieces.push(Piece { text, face });
         }
     };
-    // A mark without a second one stands for itself.
+    // An unpaired mark is literal.
     let mut from = 0;
     while let Some(at) = rest[from..].find(['*', '`']).map(|at| from + at) {
         let marked = MARKS.iter().find_map(|(mark, face)| {
@@ -105,10 +105,10 @@ fn pieces(line: &str) -> Vec<Piece> {
     pieces
 }
 
-/// Calls `take` with the inside of every placeholder of `text`, and gives the text with what that gives in their places.
+/// Calls `take` with the content of each placeholder in `text`, and returns the text with the results inserted.
 ///
 /// # Errors
-/// The first error of `take`, or a brace without a second one.
+/// The first error of `take`, or an unmatched brace.
 fn replace<E: From<String>>(text: &str, mut take: impl FnMut(&str) -> Result<String, E>) -> Result<String, E> {
     let (mut out, mut rest) = (String::new(), text);
     while let Some((before, behind)) = rest.split_once('{') {
@@ -122,10 +122,10 @@ fn replace<E: From<String>>(text: &str, mut take: impl FnMut(&str) -> Result<Str
     Ok(out + rest)
 }
 
-/// `text` with values in place of its placeholders; what is not in `names` is still to come.
+/// Fills the placeholders of `text`; values missing in `names` are pending.
 ///
 /// # Errors
-/// A placeholder that cannot be computed, and why.
+/// A placeholder cannot be computed; the message gives the cause.
 pub fn fill(text: &str, names: &Names<'_>) -> Result<String, String> {
     replace(text, |inside| {
         let (expression, unit) = split(inside);
@@ -138,7 +138,7 @@ pub fn fill(text: &str, names: &Names<'_>) -> Result<String, String> {
     })
 }
 
-/// The expression of a placeholder, and the unit that it asks for.
+/// The expression of a placeholder, and its requested unit.
 fn split(inside: &str) -> (&str, Option<&str>) {
     match inside.rsplit_once(" in ") {
         Some((expression, unit)) => (expression.trim(), Some(unit.trim())),
@@ -146,10 +146,10 @@ fn split(inside: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// A value with its unit: the one asked for, or one that suits its size.
+/// Formats a value with the requested unit, or one that suits its magnitude.
 ///
 /// # Errors
-/// A unit of another dimension, or a value without a unit.
+/// The unit has another dimension, or the value has no unit.
 pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
     let powers = quantity.powers().ok_or("adds or compares quantities of different dimensions")?;
     let (_, units) = UNITS
@@ -163,7 +163,7 @@ pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
     let chosen = match unit {
         Some(asked) => units.iter().find(|(unit, _)| *unit == asked),
         None if value == 0.0 => units.first(),
-        // Rounded, so that 999.9 µm is 1 mm.
+        // Rounding makes 999.9 µm 1 mm.
         None => units.iter().find(|(_, size)| value.abs() * 1.000_6 >= *size).or(units.last()),
     };
     let Some((unit, size)) = chosen else {

@@ -1,4 +1,4 @@
-//! The pictures of the microscope: the clearance sphere in a plane, and the contact in section.
+//! Pictures of the microscope: plane view of the clearance sphere, and section of the contact.
 
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::Vec3;
@@ -18,16 +18,16 @@ const CENTRE: f32 = 4.5;
 const ARROW: f32 = 40.0;
 /// Path points closer than this on the screen are merged, points.
 const APART: f32 = 0.8;
-/// Least scale of the section, m: penetrations of some micrometres are usual.
+/// Least scale of the section, m; typical penetrations are some micrometres.
 const SHALLOWEST: f64 = 0.5e-6;
 
-/// The plane that the picture shows.
+/// Projection plane of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Plane {
-    /// That of the screen.
+    /// The screen plane.
     #[default]
     View,
-    /// Of two world axes.
+    /// The plane of two world axes.
     Xy,
     /// See [`Self::Xy`].
     Yz,
@@ -47,8 +47,8 @@ impl Plane {
         }
     }
 
-    /// World vectors to the right and up in the picture; `view`: those of the 3D view. Down in the scene is down in the picture
-    /// where that is possible.
+    /// World vectors to the right and up in the picture; `view`: those of the 3D view. Gravity points down in the picture if
+    /// possible.
     pub fn axes(self, down: SignedAxis, view: [Vec3; 2]) -> [Vec3; 2] {
         let [first, second] = match self {
             Self::View => return view,
@@ -67,7 +67,7 @@ impl Plane {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, at most `value` > 0.
+/// Largest 1, 2 or 5 times a power of ten not above `value` > 0.
 fn round_down(value: f64) -> f64 {
     let power = 10_f64.powf(value.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|step| step * power);
@@ -75,7 +75,7 @@ fn round_down(value: f64) -> f64 {
     fits.unwrap_or(power)
 }
 
-/// The same, at least `value`.
+/// Smallest such number not below `value`.
 pub fn round_up(value: f64) -> f64 {
     let below = round_down(value);
     let leading = (below / 10_f64.powf(below.log10().floor())).round();
@@ -86,13 +86,13 @@ pub fn round_up(value: f64) -> f64 {
     }
 }
 
-/// A length as shown to the user.
+/// Formats a length.
 pub fn length(si: f64, digits: usize) -> String {
     let unit = if si.abs() < 9.9995e-6 { "um" } else { "mm" };
     value::quantity(si, unit, digits)
 }
 
-/// Where a picture is, and its colours.
+/// Area of a picture, and its colours.
 pub struct Sheet<'a> {
     painter: Painter,
     rect: Rect,
@@ -124,7 +124,7 @@ impl<'a> Sheet<'a> {
         text(&self.painter, at, anchor, words, 11.0, ink, self.ground)
     }
 
-    /// A scale bar with its length, its right end at `end`.
+    /// A scale bar with its length; the right end is at `end`.
     fn bar(&self, end: Pos2, points: f32, words: &str) {
         let stroke = Stroke::new(1.5, self.ink);
         let start = end - vec2(points, 0.0);
@@ -141,14 +141,14 @@ impl<'a> Sheet<'a> {
 /// Centre and radius of the circle, points of the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circle {
-    /// Where the socket's centre is.
+    /// Position of the socket's centre.
     pub centre: Pos2,
     /// Radius of the clearance.
     pub radius: f32,
 }
 
-/// The clearance sphere along the line of sight of a plane: path and centre of the ball, contact, velocity, scale. `axes` point
-/// to the right and up; `speed` is the reference speed of the velocity arrow, m/s.
+/// The clearance sphere seen normal to a plane: path and centre of the ball, contact, velocity, scale. `axes` point to the right
+/// and up; `speed` is the reference speed of the velocity arrow, m/s.
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
     let Sheet { painter, rect, palette, sight, .. } = sheet;
     let report = &sight.report;
@@ -196,7 +196,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let touches = sight.sliding.is_some();
     let contact = colour(palette.normal);
     if let (true, Some(normal)) = (touches, sight.normal) {
-        // For the ball's centre the wall is the clearance sphere: contact is there, and the normal starts there.
+        // The clearance sphere bounds the ball's centre, so contact and normal are drawn there.
         let normal = to_f32(&normal);
         let foot = place(normal * clearance);
         let out = flat(normal);
@@ -230,7 +230,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     circle
 }
 
-/// The world axes as seen in the picture, in its lower left corner.
+/// The world axes in the lower left corner of the picture.
 fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
     const LENGTH: f32 = 22.0;
     let origin = pos2(sheet.rect.left() + 34.0, sheet.rect.bottom() - 34.0);
@@ -246,8 +246,8 @@ fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
     }
 }
 
-/// Section of ball and wall around the contact point, both undeformed: what lies below the wall line is the elastic penetration
-/// over the contact patch. Depths are exaggerated relative to widths, by the factor shown.
+/// Section of the undeformed ball and wall around the contact point: the part below the wall line is the elastic penetration over
+/// the contact patch. Depths are exaggerated relative to widths by the displayed factor.
 pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     let Sheet { painter, rect, palette, .. } = sheet;
     let depth = round_up(1.1 * patch.penetration.max(patch.deepest).max(SHALLOWEST));
@@ -288,7 +288,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     sheet.words(below, Align2::LEFT_TOP, "wall", blue);
     let times = value::number(deep / wide, 2);
     let words = format!("depths ×{times}");
-    // In the ball while it presses into the wall; beside its lowest point while it does not.
+    // Inside the ball during penetration; otherwise beside its lowest point.
     if patch.penetration > 0.0 {
         sheet.words(above + vec2(0.0, 14.0), Align2::CENTER_TOP, &words, sheet.faint);
     } else {
@@ -298,7 +298,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     let bar = round_down(0.5 * half);
     let end = pos2(rect.right() - 10.0, rect.bottom() - 8.0);
     sheet.bar(end, (bar * wide) as f32, &length(bar, 3));
-    // Vertical, at the left edge, from the wall line down.
+    // Vertical, at the left edge, downward from the wall line.
     let down = round_down(depth);
     let stroke = Stroke::new(1.5, sheet.ink);
     let top = pos2(rect.left() + 48.0, wall);
@@ -312,7 +312,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     sheet.words(beside, Align2::LEFT_CENTER, &words, sheet.ink);
 }
 
-/// Words in the middle of an empty picture.
+/// Text in the middle of an empty picture.
 pub fn empty(ui: &Ui, rect: Rect, words: &str) {
     ui.painter().rect_filled(rect, 4.0, ui.visuals().extreme_bg_color);
     let font = FontId::proportional(12.0);
@@ -323,7 +323,7 @@ pub fn empty(ui: &Ui, rect: Rect, words: &str) {
     ui.painter().galley(at.min, galley, ink);
 }
 
-/// Side of the picture in a given space: as large as possible with `below` points left for what is under it.
+/// Side of the picture in a given space: as large as possible with `below` points left under it.
 pub fn side(space: Vec2, below: f32) -> f32 {
     space.x.min((space.y - below).max(0.55 * space.y)).max(96.0)
 }

@@ -1,5 +1,4 @@
-//! What the microscope shows of one ball joint: read from the displayed instant and the record, without computing any force
-//! itself.
+//! State of one ball joint for the microscope, read from the displayed instant and the record. No force is computed here.
 
 use crate::app::paths::axes_of;
 use crate::app::player::Player;
@@ -7,12 +6,12 @@ use crate::contact::Coefficients;
 use crate::machine::{Attachment, Mat3, Vec3};
 use crate::simulate::{ContactState, Frame, Impact, JointReport};
 
-/// Number of impacts that the path reaches back.
+/// Number of impacts covered by the path.
 pub const IMPACTS: usize = 6;
 
 /// One ball joint at the displayed instant. SI units, world axes.
 pub struct Sight {
-    /// What the step reported.
+    /// Joint report of the step.
     pub report: JointReport,
     /// Axes of the socket's body as columns.
     pub carrier: Mat3,
@@ -30,12 +29,12 @@ pub struct Sight {
     pub since: f64,
 }
 
-/// Ball and wall near the point of contact: a gap that grows as x²/(2 R) from there, R the effective radius.
+/// Ball and wall near the contact point: the gap grows as x²/(2 R) from there, where R is the effective radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
     /// R = (r + c) r / c, m: 1/R is the difference of both curvatures.
     pub effective_radius: f64,
-    /// delta, m; below zero a gap.
+    /// Penetration delta, m; negative for a gap.
     pub penetration: f64,
     /// Deepest penetration of the latest impact, m; 0 without one.
     pub deepest: f64,
@@ -59,7 +58,7 @@ fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
 }
 
 impl Sight {
-    /// Of ball joint `joint`; `None` if the scene has no such joint.
+    /// State of ball joint `joint`; `None` if the scene has no such joint.
     pub fn of(player: &Player, joint: usize) -> Option<Self> {
         let (frame, shown) = (player.frame(), player.pacer.shown());
         let spec = player.running().machine.ball_joints.get(joint)?;
@@ -123,14 +122,14 @@ mod tests {
                 let rate = sight.normal.map_or(0.0, |normal| normal.dot(&sight.velocity));
                 let reported = sight.report.penetration_rate;
                 assert!((rate - reported).abs() < 1e-12 + 1e-9 * sight.velocity.norm());
-                // The friction law reads none where the normal force is cut off at zero.
+                // The friction law has no sliding velocity where the normal force is clipped to zero.
                 let presses = sight.report.normal_force.norm() > 0.0;
                 let Some(sliding) = sight.sliding.filter(|_| presses) else {
                     continue;
                 };
                 let read = sight.report.slip_speed;
                 assert!((sliding.norm() - read).abs() < 1e-12 + 1e-9 * read, "{velocity}: {sliding} {read}");
-                // Friction pushes the ball against it; near the speed below which there is none, its law is continued.
+                // Friction opposes sliding; near the threshold speed below which it vanishes, its law is extrapolated.
                 let friction = sight.report.friction_force;
                 assert!(read < 1e-5 || friction.dot(&sliding) < 0.0);
                 compared += 1;
@@ -157,7 +156,7 @@ mod tests {
         assert!((ends[0].approach_speed - 0.076_909).abs() < 1e-4);
         let given = ends[0].separation_speed / ends[0].approach_speed;
         assert!((ends[0].achieved() - given).abs() < 1e-15 && ends[0].asked == 0.9);
-        // Going back into an impact shows what became of it.
+        // Going back into an impact shows its recorded outcome.
         player.step_back();
         assert_eq!(Sight::of(&player, 0).expect("has a joint").impact, Some(ends[2]));
         while player.pacer.shown() >= ends[2].start {

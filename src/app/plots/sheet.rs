@@ -1,4 +1,4 @@
-//! The chosen plots as charts, for a file that is printed or drawn on.
+//! The visible plots as charts in a file for print or editing.
 
 use eframe::egui::Ui;
 
@@ -9,26 +9,26 @@ use crate::app::{App, layout};
 use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
 use crate::simulate::{Bin, PlotKind};
 
-/// Size of a chart, and the most instants in one, pixels: what is finer would not be seen.
+/// Size of a chart, pixels, and its maximum number of instants; more would not be visible.
 const CHART: (u32, u32) = (520, 320);
 const INSTANTS: usize = 1000;
 /// Charts side by side.
 const COLUMNS: usize = 2;
-/// Room for the legend and the line below the charts, pixels.
+/// Space for the legend and the line below the charts, pixels.
 const REST: u32 = 60;
-/// Colour of clearances.
+/// Colour of clearance lines.
 const LEVEL: Colour = (150, 150, 150);
-/// Pixels of a PNG to a pixel of the sheet.
+/// PNG pixels per sheet pixel.
 const SHARP: f32 = 2.0;
 
-/// A format in which plots are saved.
+/// File format of saved plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlotFormat {
-    /// A page for print.
+    /// PDF, for print.
     Pdf,
-    /// A drawing to work on.
+    /// SVG, for editing.
     Svg,
-    /// A picture of pixels.
+    /// PNG.
     Png,
 }
 
@@ -41,7 +41,7 @@ impl PlotFormat {
 }
 
 impl App {
-    /// A button for each format in which the plots on show can be saved.
+    /// A button for each file format of the visible plots.
     pub(in crate::app) fn plots_menu(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             ui.label("Plots");
@@ -55,7 +55,7 @@ impl App {
         });
     }
 
-    /// Saves the plots on show.
+    /// Saves the visible plots.
     pub fn save_plots(&mut self, format: PlotFormat) {
         let Some(sheet) = self.plots.sheet(&self.player, self.describe()) else {
             self.problem = Some("No plot is chosen".to_owned());
@@ -76,7 +76,7 @@ impl App {
 }
 
 impl Plots {
-    /// The plots on show with their time range, and `note` below; `None` if there are none.
+    /// The visible plots with their time range, and `note` below; `None` without plots.
     pub fn sheet(&self, player: &Player, note: String) -> Option<Sheet> {
         let of_quantity = |quantity: &_| Panel::of_quantity(*quantity, player);
         let mut panels: Vec<Panel<'_>> = self.chosen.iter().filter_map(of_quantity).collect();
@@ -129,7 +129,7 @@ impl Plots {
         }
         for (index, (channel, member)) in panel.members.iter().enumerate() {
             if !self.hidden.contains(channel) {
-                // The first colour is for a reference.
+                // The first colour is reserved for a reference.
                 let colour = PALETTE[1 + index % (PALETTE.len() - 1)];
                 series.push(Series::line(member, points(*channel), colour));
             }

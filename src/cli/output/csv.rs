@@ -1,4 +1,4 @@
-//! Rows as text: a header line, then nothing but data, so that every reader takes it unmodified.
+//! Rows as text: a header line followed only by data, so that any reader accepts it.
 
 use std::io::{self, Write};
 
@@ -21,20 +21,20 @@ pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
     })
 }
 
-/// Passes bytes on and computes their CRC-32, which tells a reader whether rows and metadata belong together.
+/// Forwards bytes and computes their CRC-32, which tells a reader whether rows and metadata belong together.
 pub(super) struct ChecksumWriter<W> {
     inner: W,
     checksum: crc32fast::Hasher,
 }
 
 impl<W: Write> ChecksumWriter<W> {
-    /// A writer that has passed nothing yet.
+    /// A writer that has forwarded nothing yet.
     pub fn new(inner: W) -> Self {
         let checksum = crc32fast::Hasher::new();
         Self { inner, checksum }
     }
 
-    /// Eight hexadecimal digits.
+    /// The CRC-32 as eight hexadecimal digits.
     pub fn checksum(self) -> String {
         format!("{:08x}", self.checksum.finalize())
     }

@@ -8,7 +8,7 @@ use super::Table;
 
 /// Writes `meta` and the columns.
 pub(super) fn write(out: &mut impl Write, table: &Table, meta: &Map<String, Json>) -> io::Result<()> {
-    // By hand around serde's numbers: a tree of all values would take several times the memory of the table.
+    // Written by hand around serde's numbers: a tree of all values would take several times the memory of the table.
     let meta = serde_json::to_string(meta)?;
     write!(out, "{{\"meta\": {meta},\n\"columns\": {{")?;
     for (column, name) in table.names().iter().enumerate() {

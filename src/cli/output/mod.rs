@@ -1,4 +1,4 @@
-//! Output files: their names, their formats, and that they appear whole.
+//! Names and formats of output files, which appear complete or not at all.
 
 mod csv;
 mod json;
@@ -52,11 +52,11 @@ impl Format {
     }
 }
 
-/// Where the rows of a run go: claimed, and known to be writable, before the run starts.
+/// Output file for the rows of a run, claimed and known to be writable before the run starts.
 pub struct RowsFile {
     format: Format,
     rows: OutputFile,
-    /// Metadata of a CSV file, which has no place for it: a plain reader takes every line after the header for data.
+    /// Metadata of a CSV file, which cannot hold any: a plain reader takes every line after the header for data.
     beside: Option<OutputFile>,
 }
 
@@ -90,10 +90,10 @@ impl RowsFile {
         &self.rows
     }
 
-    /// Writes everything; nothing has its final name yet.
+    /// Writes rows and metadata under temporary names.
     ///
     /// # Errors
-    /// Whatever the file system reports.
+    /// A file system error.
     pub fn fill(self, table: &Table, mut meta: Map<String, Json>) -> Result<Vec<PendingFile>, Failure> {
         let mut checksum = String::new();
         let rows = self.rows.fill(|file| match self.format {
@@ -111,12 +111,12 @@ impl RowsFile {
         };
         meta.insert("rows_crc32".into(), checksum.into());
         let account = beside.fill(|file| json::write_meta(file, &meta))?;
-        // In this order a kill between the two leaves no rows without their metadata.
+        // In this order, a kill between the two renames never leaves rows without metadata.
         Ok(vec![account, rows])
     }
 }
 
-/// Checks that the metadata beside the file `path`, which holds none itself, can be written: `run.csv` has `run.csv.meta.json`.
+/// Checks that the metadata file beside `path` can be written: `run.csv` has `run.csv.meta.json`.
 ///
 /// # Errors
 /// It exists without `force`, or its folder is unwritable.
@@ -139,7 +139,7 @@ fn is_account(path: &Path) -> bool {
     meta["program"] == crate::files::PROGRAM && (checked("rows_crc32") || checked("film_crc32"))
 }
 
-/// Refuses a command if two of its outputs, or an output and its input, are one file; each comes with its description.
+/// Rejects a command whose outputs, or an output and its input, are one file; each path comes with its description.
 ///
 /// # Errors
 /// Usage, with the two.
@@ -157,7 +157,7 @@ pub fn check_distinct(named: &[(String, PathBuf)]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a run whose rows would fill a disk.
+/// Rejects a run whose rows would fill a disk.
 ///
 /// # Errors
 /// Usage, with the numbers.

@@ -26,7 +26,7 @@ pub(super) fn write(out: &mut Content, table: &Table, meta: &Map<String, Json>) 
     })
 }
 
-/// An archive's error, as that of the file.
+/// Converts an archive error to an I/O error.
 pub fn as_io(error: WriteNpzError) -> io::Error {
     match error {
         WriteNpzError::Zip(zip) => zip.into(),
@@ -35,10 +35,10 @@ pub fn as_io(error: WriteNpzError) -> io::Error {
     }
 }
 
-/// Writes the archive that `fill` fills to `file`.
+/// Writes an archive to `file`; `fill` adds the arrays.
 ///
 /// # Errors
-/// The first failure of the file; otherwise that of `fill`.
+/// The first error of the file, otherwise the error of `fill`.
 pub fn write_archive<W: Write + Seek>(
     file: W,
     fill: impl FnOnce(&mut NpzWriter<&mut BufWriter<Sink<W>>>) -> io::Result<()>,
@@ -51,8 +51,8 @@ pub fn write_archive<W: Write + Seek>(
     out.get_mut().failure.take().map_or(outcome, Err)
 }
 
-/// Takes the bytes of an archive. After its first failure it accepts everything and writes nothing: an archive always ends
-/// itself in good order, and complains to standard error where it cannot.
+/// Sink for the bytes of an archive. After its first failure it accepts everything and writes nothing: the archive writer
+/// always writes its end, and would report a failure there on standard error.
 #[derive(Debug)]
 pub struct Sink<W> {
     file: W,

@@ -1,4 +1,4 @@
-//! Rows of equal width, as many as fit on the disk: full blocks in memory are moved to a nameless file.
+//! Rows of equal width, limited by disk space: full blocks move from memory to an unnamed file.
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
@@ -20,12 +20,12 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// No rows yet, of `width` values each.
+    /// An empty store for rows of `width` values.
     pub fn new(width: usize) -> Self {
         Self { width, rows_per_block: (BLOCK / width).max(1), block: Vec::new(), spool: None, spooled: 0 }
     }
 
-    /// From now on full blocks go to `spool`; without it all rows stay in memory.
+    /// Moves full blocks to `spool` from now on; without a spool all rows stay in memory.
     pub fn spool_to(&mut self, spool: File) {
         self.spool = Some(spool);
     }
@@ -63,7 +63,7 @@ impl Rows {
     /// Calls `each` with every row, in order.
     ///
     /// # Errors
-    /// A disk error, or that of `each`.
+    /// A disk error, or an error of `each`.
     pub fn each(&self, mut each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
         let n = self.rows_per_block;
         let mut row = vec![0.0; self.width];
@@ -81,7 +81,7 @@ impl Rows {
     /// Calls `each` with every value of a column, in order.
     ///
     /// # Errors
-    /// A disk error, or that of `each`.
+    /// A disk error, or an error of `each`.
     pub fn column(&self, column: usize, mut each: impl FnMut(f64) -> io::Result<()>) -> io::Result<()> {
         let n = self.rows_per_block;
         for block in 0..self.spooled {
@@ -92,7 +92,7 @@ impl Rows {
         rows.map(|row| row[column]).try_for_each(each)
     }
 
-    /// Reads `count` values of a spooled block, starting at its value `from`.
+    /// Reads `count` values of a spooled block, starting at value `from`.
     fn read(&self, block: usize, from: usize, count: usize) -> io::Result<Vec<f64>> {
         let mut bytes = vec![0; 8 * count];
         let at = 8 * (block * self.rows_per_block * self.width + from) as u64;

@@ -18,10 +18,10 @@ pub struct Table {
     values: Vec<f64>,
 }
 
-/// Why a row is not in the table.
+/// Why a row was rejected.
 #[derive(Debug, thiserror::Error)]
 pub enum RowError {
-    /// A value that is not a number.
+    /// A value that is not finite.
     #[error("{column} is {value} at t = {time:.6e} s")]
     NotFinite {
         /// Column.
@@ -69,7 +69,7 @@ impl Table {
         table
     }
 
-    /// Keeps only the latest rows in memory, and the others beside `target`.
+    /// Holds only the latest rows in memory and spools the others to a file beside `target`.
     ///
     /// # Errors
     /// Input/output.
@@ -78,7 +78,7 @@ impl Table {
         Ok(())
     }
 
-    /// Lets `frame` ask for what its columns are read from.
+    /// Makes `frame` request the quantities that the columns need.
     pub fn ask(&self, frame: &mut Frame) {
         self.readings.iter().for_each(|reading| reading.ask(frame));
     }
@@ -101,7 +101,7 @@ impl Table {
     /// Calls `each` with every row in order, each as long as [`Self::names`].
     ///
     /// # Errors
-    /// A disk error, or that of `each`.
+    /// A disk error, or an error of `each`.
     pub fn rows(&self, each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
         self.rows.each(each)
     }
@@ -109,7 +109,7 @@ impl Table {
     /// Calls `each` with every value of one column, in order of time.
     ///
     /// # Errors
-    /// A disk error, or that of `each`.
+    /// A disk error, or an error of `each`.
     pub fn column(&self, column: usize, each: impl FnMut(f64) -> io::Result<()>) -> io::Result<()> {
         self.rows.column(column, each)
     }
@@ -125,7 +125,7 @@ impl Table {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
                 return Err(RowError::NotFinite { column: column.clone(), value, time: frame.time });
             }
-            // After the ideal mechanism has come to its end there is no tip error.
+            // There is no tip error after the ideal mechanism has stopped.
             self.values.push(value.unwrap_or(f64::NAN));
         }
         Ok(self.rows.push(&self.values)?)

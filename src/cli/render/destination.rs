@@ -13,11 +13,11 @@ use crate::files::{Folder, MANIFEST, OutputFile, publish};
 use crate::film::{Film, FilmError, Format};
 use crate::render::Image;
 
-/// What takes the frames. Until [`Destination::finish`] nothing of it has its final name.
+/// Destination of the frames. Nothing has its final name before [`Destination::finish`].
 pub(in crate::cli) enum Destination {
     /// `frame_00000.png`, …, and a manifest.
     Pictures(Folder),
-    /// One file, with what a manifest says beside it.
+    /// One file, with its metadata beside it.
     Film {
         /// The frames so far.
         film: Box<Film>,
@@ -29,10 +29,10 @@ pub(in crate::cli) enum Destination {
 }
 
 impl Destination {
-    /// What `arguments` name.
+    /// The destination named by `arguments`.
     ///
     /// # Errors
-    /// Names that cannot be written, and films that no format holds.
+    /// A path that cannot be written, or a film that its format cannot hold.
     pub fn claim(arguments: &RenderArguments) -> Result<Self, Failure> {
         let Some(path) = &arguments.film else {
             let folder = arguments.out.as_deref().unwrap_or(Path::new(""));
@@ -53,7 +53,7 @@ impl Destination {
         Ok(Self::Film { film: Box::new(film), file, account })
     }
 
-    /// Takes frame `number`, and returns what is said of it. `meta` is the provenance of all.
+    /// Adds frame `number` and returns its description for the manifest. `meta` is the provenance of all frames.
     ///
     /// # Errors
     /// Input/output, or a film that becomes too large.
@@ -75,7 +75,7 @@ impl Destination {
             }
             Self::Film { film, .. } => {
                 film.add(&image.rgba).map_err(unfilmable)?;
-                // Of the pixels before they are encoded, as a PNG has them.
+                // Checksum of the pixels before encoding, as in a PNG.
                 let checksum = format!("{:08x}", crc32fast::hash(&image.rgba));
                 told.insert("pixels_crc32".into(), json!(checksum));
             }

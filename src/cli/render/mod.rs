@@ -1,4 +1,4 @@
-//! `render`: frames without a window, drawn by the same code as those in it.
+//! `render`: frames without a window, drawn by the window's own code.
 
 mod destination;
 mod options;
@@ -37,7 +37,7 @@ impl Times {
         options::positive("--fps", fps, 10_000.0)?;
         options::positive("--slow", arguments.slow, 1e9)?;
         let rate = fps * arguments.slow;
-        // Both ends count; a whole number of frames stays whole however the product rounds.
+        // Both ends count; the factor keeps a whole number of frames whole despite rounding.
         let last = (duration * rate * (1.0 + 1e-9)).floor();
         if last >= MOST_FRAMES {
             return Err(Failure::usage(format!(
@@ -151,7 +151,7 @@ fn common_reference(
     for number in times.in_order() {
         let instant = times.instants[number];
         while simulation.time() < instant {
-            // The frames themselves report why they end early.
+            // Drawing the frames will report the reason.
             if interrupt::asked() || simulation.step().is_err() {
                 return Ok(Some(marks.reference(arrows)));
             }
@@ -159,13 +159,13 @@ fn common_reference(
         simulation.sample(instant, &mut frame);
         simulation.take_peaks(&mut peaks);
         let since: &[Peak] = if times.time_scale.is_some() && arrows.peaks { &peaks } else { &[] };
-        // Nothing fades: the largest forces stay.
+        // Without fading, the largest forces remain.
         marks.update(&frame, since, f64::INFINITY);
     }
     Ok(Some(marks.reference(arrows)))
 }
 
-/// Provenance of a picture, as texts inside it: a frame that has lost its manifest still carries it.
+/// Provenance of a picture as text entries inside it, which survive the loss of the manifest.
 fn labels(meta: &Map<String, Json>) -> Vec<(&'static str, String)> {
     vec![("Software", format!("jointplay {}", crate::VERSION)), ("Description", Json::Object(meta.clone()).to_string())]
 }

@@ -97,7 +97,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
         joint_names: shown(Hideable::Names),
         hinges: shown(Hideable::Hinges),
         sockets: shown(Hideable::Sockets),
-        // The same bytes each time.
+        // Fixed, so that the output is reproducible.
         quality: Quality::FULL,
         trail: shown(Hideable::Trail),
         wear: match arguments.wear {
@@ -108,7 +108,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
     })
 }
 
-/// Refuses a value outside 0 < `value` <= `most`.
+/// Rejects a value outside 0 < `value` <= `most`.
 ///
 /// # Errors
 /// Usage.

@@ -1,19 +1,20 @@
-//! What draws the pictures: the scene alone, or the whole application.
+//! Renderers of the pictures: the scene alone, or the whole application.
 
 use std::sync::Arc;
 
 use super::options;
-use crate::app::{App, AppOptions, Headless, Overlay, force_notes};
+use crate::app::{App, AppOptions, Headless, Link, Overlay, force_notes};
 use crate::cli::args::{RenderArguments, ThemeChoice};
-use crate::cli::{Failure, interrupt, start};
+use crate::cli::{Failure, interrupt, link, start};
 use crate::machine::Vec3;
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::LiveScene;
 use crate::scene::Scene;
+use crate::session::log::Log;
 use crate::simulate::{Frame, Peak};
 use crate::view::{Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, WearMap, to_f32};
 
-/// A simulation and what draws it.
+/// A simulation with its renderer.
 pub trait Studio {
     /// Steps until `instant` lies in the latest step; a frame never shortens a step.
     ///
@@ -21,11 +22,11 @@ pub trait Studio {
     /// The divergence guard, Ctrl-C.
     fn go_to(&mut self, instant: f64) -> Result<(), Failure>;
 
-    /// Draws `instant`, which lies in the latest step; in a film, which shows `time_scale` simulated seconds per second,
-    /// with the events since the previous frame.
+    /// Draws `instant`, which lies in the latest step. In a film, which shows `time_scale` simulated seconds per second, it
+    /// also draws the events since the previous frame.
     ///
     /// # Errors
-    /// A failing graphics adapter.
+    /// A graphics adapter failure.
     fn draw(&mut self, instant: f64, time_scale: Option<f64>) -> Result<Image, Failure>;
 
     /// Fixes the force of the reference arrow, N, for all frames.
@@ -38,7 +39,7 @@ pub trait Studio {
     fn adapter(&self) -> String;
 }
 
-/// What the picture is drawn on.
+/// Target of the drawing.
 enum Screen {
     /// The scene alone.
     Plain(Box<Offscreen>),
@@ -200,6 +201,11 @@ impl ApplicationStudio {
         let headless = Headless::new().map_err(|error| no_adapter(&error))?;
         let mut begin = AppOptions::new(scene.clone());
         begin.playing = false;
+        // Plots, camera and instruments of the link; `--at` and `--duration` name the instants.
+        begin.link = arguments.scene.link.as_deref().map(link::parse).transpose()?.map(|link| {
+            let log = Log { base: link.log.base, ..Log::default() };
+            Link { log, time: None, steps: None, hash: None, playing: Some(false), ..link }
+        });
         begin.view =
             ViewOptions { magnification: arguments.magnification.unwrap_or(begin.view.magnification), ..options };
         begin.theme = match arguments.theme {

@@ -24,7 +24,7 @@ impl Kept {
     /// # Errors
     /// As [`Partial::open`].
     pub(super) fn open(out: &Path, work: &Agenda) -> Result<Self, Failure> {
-        // By components, which drops a trailing slash.
+        // Going through components drops a trailing slash.
         let mut name = out.components().as_path().as_os_str().to_owned();
         name.push(".partial");
         let folder = PathBuf::from(name);
@@ -42,14 +42,14 @@ impl Kept {
         self.parts.iter().any(Partial::is_begun).then_some(&self.folder)
     }
 
-    /// The error of a report that Ctrl-C broke off.
+    /// The error of a report interrupted by Ctrl-C.
     pub(super) fn interrupted(&self) -> Failure {
         let folder = self.folder.display();
         let words = format!("interrupted; no report was written, and the same command resumes from {folder}");
         Failure::new(Failure::INTERRUPTED, words)
     }
 
-    /// Removes the folder: its content is in the report.
+    /// Removes the folder once the report has its content.
     pub(super) fn remove(self) {
         self.parts.into_iter().for_each(Partial::remove);
         if let Err(error) = remove_dir(&self.folder) {
@@ -61,7 +61,7 @@ impl Kept {
 /// Runs the jobs of `work` that `kept` lacks; their outcomes depend neither on the number of threads nor on interruptions.
 ///
 /// # Errors
-/// Ctrl-C; the file system; a run that fails: of those begun, the first in job order.
+/// Ctrl-C; the file system; the first failed run in job order, among those started.
 pub(super) fn compute(work: Agenda, kept: &mut Kept, threads: usize, bar: &ProgressBar) -> Result<Report, Failure> {
     let mut outcomes: Vec<Option<Outcome>> = (0..work.jobs()).map(|_| None).collect();
     let mut blocks = kept.parts.iter().map(Partial::blocks).collect::<Result<Vec<_>, _>>()?;

@@ -63,7 +63,7 @@ fn numbers(found: &Findings) -> Table {
     Table::new(heads, found.comparisons().iter().map(row))
 }
 
-/// A run at the paper's output step, which the last column marks.
+/// A run at the paper's output step, without the last column, which marks these rows.
 fn samples(run: &RecordedRun) -> Table {
     let columns = COLUMNS.len() - 1;
     let rows = run.samples().into_iter().map(|row| row[..columns].iter().map(|v| number(*v)).collect());

@@ -10,7 +10,7 @@ use crate::cli::tables::typeset;
 /// Width of a sheet and height of a row of charts, pixels.
 const WIDTH: u32 = 1120;
 const ROW: u32 = 290;
-/// First part of a run, in which the balls bounce, s; and that of the comparison of formulations.
+/// Length of the initial part of a run, in which the balls bounce, and of the comparison of formulations, s.
 const EARLY: f64 = 0.15;
 const EARLIEST: f64 = 0.1;
 
@@ -64,7 +64,7 @@ fn over_time(title: &str, to: f64, y: Axis, series: Vec<Curve>) -> Chart {
     Chart::new(title, time, y, series)
 }
 
-/// A column of each run over the first `to` seconds, each in its colour.
+/// One column of each run over the first `to` seconds, one colour per run.
 fn columns(runs: &[(String, &RecordedRun, usize)], to: f64, title: &str, colour: usize) -> Chart {
     let series = runs.iter().enumerate().map(|(n, (name, run, column))| {
         let early = run.curve(*column).take_while(|(time, _)| *time <= to);
@@ -77,7 +77,7 @@ fn of_series(found: &Findings, series: Series, column: usize) -> [(String, &Reco
     series.cases().map(|case| (series.run_name(case), found.run(case), column))
 }
 
-/// The whole run above, its beginning below.
+/// The whole run in the upper row, its initial part in the lower.
 fn response(found: &Findings, to: Series, whole: &[String], early: &[String]) -> Vec<Chart> {
     let row = |names: &[String], end: f64, title: &str| -> Vec<Chart> {
         let runs = names.iter().map(|name| of_series(found, to, column_of(name)));
@@ -98,7 +98,7 @@ fn verification(found: &Findings, names: &[String]) -> Vec<Chart> {
         ("lagrange formulation", found.lagrange()),
     ];
     let of = |name: &String| runs.map(|(label, run)| (label.to_owned(), run, column_of(name)));
-    // The ideal motion, with which the others are compared, has the first colour.
+    // The ideal motion is the reference and has the first colour.
     names.iter().map(|name| columns(&of(name), EARLIEST, "", 0)).collect()
 }
 
@@ -125,7 +125,7 @@ fn phases(coordinate: Coordinate, title: &str, series: impl Iterator<Item = Curv
     Chart::new(title, x, y, series.collect())
 }
 
-/// Points of values in thousandths of SI units.
+/// Points (value, rate), with the values in thousandths of SI units.
 fn pairs<'a>(values: impl IntoIterator<Item = &'a f64>, rates: impl IntoIterator<Item = &'a f64>) -> Vec<(f64, f64)> {
     values.into_iter().zip(rates).map(|(value, rate)| (value * 1e3, *rate)).collect()
 }
@@ -167,7 +167,7 @@ fn sections(found: &Findings, series: Series) -> Vec<Chart> {
     charts.to_vec()
 }
 
-/// Points that a picture can resolve, once each.
+/// Removes points that a picture cannot tell apart.
 fn seen(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let mut cells = std::collections::HashSet::new();
     points.into_iter().filter(|(x, y)| cells.insert(format!("{x:.6} {y:.6}"))).collect()
@@ -175,7 +175,7 @@ fn seen(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
 
 fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
     let all = found.branches(series);
-    // Each start is drawn over the previous one, and smaller, so that all of them show.
+    // Each start is drawn on top of the previous one and smaller, so that all remain visible.
     let looks = [
         ("cold start", PALETTE[0], Marker::Disc),
         ("followed upward", PALETTE[5], Marker::Point),
@@ -211,7 +211,7 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
     [diagrams, differences].concat()
 }
 
-/// Lower exponents are left out of the picture, 1/s: the smallest clearances would squeeze all others against 0.
+/// Smallest exponent plotted, 1/s: the smallest clearances would squeeze all others against 0.
 const LEAST_EXPONENT: f64 = -10.0;
 
 fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
@@ -258,7 +258,7 @@ fn map(found: &Findings) -> Vec<Chart> {
     let joints = &found.runs[0].response.joints;
     let peaks: Vec<Vec<f64>> = joints.iter().map(|j| data.values(&format!("{j}_peak_N"))).collect();
     let hardest = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max)).collect();
-    // Grey where disturbances grow.
+    // NaN, drawn in grey, where disturbances grow.
     let memory = data.values("exponent_per_s").into_iter().map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN });
     vec![
         heat("Regime", regimes, Axis::default(), names),

@@ -1,12 +1,13 @@
-//! Tables of the page and of the data files: the paper's numbers and statements beside this program's, and what belongs to a figure.
+//! Tables of the page and of the data files: the paper's numbers and statements beside this program's, and the tables of each
+//! figure.
 
 use crate::analysis::paper::{Agreement, Case, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows};
 use crate::analysis::reproduction::{Findings, RecordedRun, Report, SettledPoint, Statement, exponents, regime_counts};
 use crate::cli::output::significant;
 use crate::cli::tables::{Table, yes};
 
-/// How many of the paper's numbers a model agrees with, is near to, and differs from; how many statements it confirms, and of how
-/// many.
+/// Counts of the paper's numbers that a model agrees with, is near to and differs from, of the statements it confirms, and of
+/// all statements.
 pub(super) fn score(found: &Findings) -> [usize; 5] {
     let (compared, statements) = (found.comparisons(), found.statements());
     let [agree, near, differ] =
@@ -14,23 +15,23 @@ pub(super) fn score(found: &Findings) -> [usize; 5] {
     [agree, near, differ, statements.iter().filter(|s| s.confirmed).count(), statements.len()]
 }
 
-/// Four digits, as many as a reader takes in; a dash if there is no number.
+/// Four digits for readability; a dash if there is no number.
 fn shown(value: impl Into<Option<f64>>) -> String {
     let value = value.into().filter(|value| !value.is_nan());
     value.map_or_else(|| "\u{2013}".to_owned(), |value| significant(value, 4))
 }
 
-/// A distance in micrometres or microradians.
+/// A distance, m or rad, in micrometres or microradians.
 fn micro(value: f64) -> String {
     shown(value * 1e6)
 }
 
-/// Two decimals, or two digits of a small number.
+/// Two decimals, or two significant digits below 0.1.
 fn ratio(value: f64) -> String {
     if value < 0.1 { significant(value, 2) } else { format!("{value:.2}") }
 }
 
-/// Clearance and friction of the run, as tables name it.
+/// Clearance and friction of a run, its label in tables.
 fn run_of(comparison: &Comparison) -> String {
     let Case { clearance, friction } = comparison.published.case;
     format!("{clearance} mm, {friction}")
@@ -68,7 +69,7 @@ fn numbers(rows: &[&Comparison]) -> Table {
     Table::new(heads, rows.iter().map(row))
 }
 
-/// The largest force of any joint, which depends less on which joint happens to be hit first.
+/// The largest force over all joints, which depends less on which joint is hit first.
 fn strongest(comparisons: &[Comparison], figures: &[String]) -> Table {
     let row = |figure: &String| {
         let own = comparisons.iter().filter(|c| c.published.figure == *figure);
@@ -124,7 +125,7 @@ fn sections(found: &Findings, series: Series) -> Table {
     Table::new(heads, found.sections(series).iter().map(row))
 }
 
-/// How far the branches that follow the motion are from the cold starts, at most.
+/// Largest distance of each followed branch from the cold starts.
 fn branches(found: &Findings, series: Series) -> Table {
     let [cold, up, down] = found.branches(series);
     let row = |name: &str, other: &[SettledPoint]| {
@@ -167,7 +168,7 @@ fn verdict(statement: &Statement) -> String {
     if statement.confirmed { "confirmed" } else { "not confirmed" }.to_owned()
 }
 
-/// What the paper says in words, with the criterion and the numbers behind the verdict, under `heads`.
+/// The paper's verbal statements with the criterion, the verdict and its numbers, under the headings `heads`.
 pub(super) fn statements(heads: &str, found: &Findings) -> Table {
     let row = |s: &Statement| {
         vec![s.claim.place.clone(), s.claim.says.clone(), s.criterion.to_owned(), verdict(s), evidence(s)]
@@ -191,7 +192,7 @@ const MEAN_X: f64 = 0.203;
 /// Largest ratio to the paper's settling and rates that counts as near.
 const NEAR: f64 = 1.25;
 
-/// What is compared by clearance: a heading, the value for a run and its sections, and the paper's quantity if it prints one.
+/// A quantity compared by clearance: heading, value for a run and its sections, and the paper's quantity if it prints one.
 type Measure = (&'static str, fn(&RecordedRun, &SettledPoint) -> f64, Option<FigureValue>);
 
 const MEASURES: [Measure; 6] = {
@@ -266,7 +267,7 @@ pub(super) fn models(report: &Report) -> Table {
     };
     let before = apart(&report.models[0]);
     let row = |(n, found): (usize, &Findings)| {
-        // Combinations lack the runs of most numbers and statements.
+        // Combinations lack the runs behind most numbers and statements.
         let score = if n < 2 { score(found).map(|count| count.to_string()) } else { [const { String::new() }; 5] };
         let off = |measure: &Measure| {
             let ratios = measured(found, measure).into_iter().zip(printed(measure)?).map(|(own, paper)| own / paper);

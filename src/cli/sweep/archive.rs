@@ -37,7 +37,7 @@ pub struct Archive {
 /// Key in `meta` that only shards have.
 pub const SHARD: &str = "shard";
 
-/// Refuses a name that readers would not recognise as a NumPy archive.
+/// Rejects a name that readers would not recognise as a NumPy archive.
 ///
 /// # Errors
 /// Usage.
@@ -126,7 +126,7 @@ impl Archive {
     /// Writes the file, one array in memory at a time.
     ///
     /// # Errors
-    /// Whatever the file system reports; the final name is then as it was.
+    /// A file system error; an existing file is then unchanged.
     pub fn write(&self, target: OutputFile, source: &mut impl Source) -> Result<(), Failure> {
         let mut failure = None;
         let written = target.write(|file| {

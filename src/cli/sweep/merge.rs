@@ -19,7 +19,7 @@ struct OpenShard {
     path: PathBuf,
     reader: NpzReader<BufReader<File>>,
     meta: Map<String, Json>,
-    /// `3/16`.
+    /// Part and number of parts, e.g. `3/16`.
     shard: String,
     points: Vec<usize>,
 }
@@ -89,7 +89,7 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     if missing == 0 {
         return Ok(());
     }
-    // They can be named if all shards are parts of the same number.
+    // Missing shards can be named only if all given ones have the same number of parts.
     let numbers: Vec<_> = parts.iter().filter_map(|p| options::shard(&p.shard).ok()).collect();
     let of = numbers[0].of;
     let names: Vec<String> = if numbers.iter().all(|shard| shard.of == of) {

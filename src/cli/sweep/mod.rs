@@ -37,7 +37,7 @@ const STEPS_BETWEEN_LOOKS: u32 = 4096;
 /// Runs `sweep`.
 ///
 /// # Errors
-/// Any: bad input before it starts; Ctrl-C and the file system afterwards.
+/// Bad input, before the sweep starts; later Ctrl-C or the file system.
 pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     archive::check_ending(&arguments.out)?;
     let target = OutputFile::claim(&arguments.out, arguments.force)?;
@@ -120,7 +120,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
             "count": axis.count(),
         })
     });
-    // Any parameter that changes it does so from one end of its range to the other.
+    // A parameter that changes the period gives different periods at the ends of its range.
     let [period, other] = [0, grid.points() - 1].map(|point| {
         let scene = grid.scene(scene, point).ok()?;
         drive_period(&scene).ok()
@@ -154,17 +154,17 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     meta
 }
 
-/// Largest number of points examined for warnings, spread over the ranges: it must not take long.
+/// Largest number of points examined for warnings, spread over the ranges, so that the check stays fast.
 const MOST_WARNED: usize = 64;
 
-/// Kind of a warning: a second one of the same kind says nothing new.
+/// Kind of a warning; each kind is reported once.
 #[derive(PartialEq, Eq, Hash)]
 enum Kind {
     Scene(WarningKind),
     Singular(std::mem::Discriminant<NearSingular>),
 }
 
-/// Warnings about the scene along the ranges, each kind with the first point that has it, and about the sweep itself.
+/// Warnings about the scene along the ranges, each kind with its first point, and about the sweep itself.
 fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
     let mut kinds = HashSet::new();
@@ -264,7 +264,7 @@ fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, 
     Ok(summary)
 }
 
-/// Prints what was written.
+/// Prints the summary of the written file.
 fn report(
     archive: &Archive,
     summary: &Map<String, Json>,
@@ -311,7 +311,7 @@ fn report(
 }
 
 impl Shard {
-    /// Whether block `b` belongs to it: blocks are dealt out in turn, so that all shards have about the same work.
+    /// Whether block `b` belongs to this shard. Blocks are assigned round-robin to balance the work.
     fn has(&self, b: usize) -> bool {
         b % self.of == self.number - 1
     }

@@ -1,4 +1,4 @@
-//! What the options of a sweep mean: `--shard 3/16`, `--phase 90deg`.
+//! Parsers for options of a sweep: `--shard 3/16`, `--phase 90deg`.
 
 use crate::cli::Failure;
 use crate::units::{Dimension, parse_quantity};
@@ -6,9 +6,9 @@ use crate::units::{Dimension, parse_quantity};
 /// Part `number` of `of`, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which part.
+    /// Number of the part.
     pub number: usize,
-    /// Of how many.
+    /// Number of parts.
     pub of: usize,
 }
 

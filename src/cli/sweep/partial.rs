@@ -1,10 +1,10 @@
-//! The file beside a sweep's output that holds the finished blocks, so that an interrupted sweep resumes where it
-//! stopped. Removed once the output is written.
+//! File beside a sweep's output with the finished blocks, from which an interrupted sweep resumes. It is removed once the
+//! output is written.
 //!
-//! Magic number with the format version; the settings as JSON, preceded by their length and followed by their CRC-32;
-//! then for each block its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all
-//! these. A block is appended by one write: if that is cut short, only this block is lost. Any other inconsistency
-//! rejects the whole file: a half-read result would look like a whole one.
+//! Layout: magic number with the format version; the settings as JSON, preceded by their length and followed by their CRC-32;
+//! then for each block its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all these.
+//! A block is appended by one write; if that is cut short, only this block is lost. Any other inconsistency rejects the whole
+//! file, because a partly read result would look complete.
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
@@ -20,7 +20,7 @@ use crate::files::{open_or_create, remove_file};
 
 /// Magic number; its last character is the format version.
 const MAGIC: &[u8; 8] = b"JPSWEEP1";
-/// Longer settings are rejected as damaged.
+/// Size limit of the settings, bytes; longer ones are rejected as damaged.
 const LONGEST_SETTINGS: u64 = 1 << 20;
 
 /// The finished blocks of a sweep.
@@ -34,7 +34,7 @@ pub struct Partial {
     points: Vec<std::ops::Range<usize>>,
     done: Vec<bool>,
     record: usize,
-    /// Position of each point among those of the output.
+    /// Index of each point in the output; `usize::MAX` for a point of another shard.
     place: Vec<usize>,
 }
 
@@ -44,7 +44,7 @@ impl Partial {
         out.with_added_extension("partial")
     }
 
-    /// Opens or creates the file beside `out`; `blocks` are those of the output.
+    /// Opens or creates the file beside `out`, which has the blocks `blocks`.
     ///
     /// # Errors
     /// Input/output: unreadable, damaged, in use; usage: begun with other settings.
@@ -57,7 +57,7 @@ impl Partial {
             Err(TryLockError::WouldBlock) => {
                 return Err(Failure::io(format!("{} is in use: another run writes the same output", path.display())));
             }
-            // A file system without locks: avoiding two runs of one output is then up to the user.
+            // On a file system without locks, the user must avoid two runs with the same output.
             Err(TryLockError::Error(error)) => log::warn!("no lock: {error}"),
         }
         let grid = sweep.grid();
@@ -83,7 +83,7 @@ impl Partial {
         Ok(partial)
     }
 
-    /// Its name.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -123,7 +123,7 @@ impl Partial {
     /// Appends the records of block `b`.
     ///
     /// # Errors
-    /// Whatever the file system reports; the file is then as it was.
+    /// A file system error; the file is then unchanged.
     pub fn append(&mut self, b: usize, records: &[f64]) -> Result<(), Failure> {
         let mut bytes = Vec::with_capacity(20 + 8 * records.len());
         bytes.extend((b as u64).to_le_bytes());
@@ -134,7 +134,7 @@ impl Partial {
         file.seek(SeekFrom::Start(self.end)).map_err(self.failed())?;
         let written = file.write_all(&bytes).and_then(|()| file.sync_all());
         if let Err(error) = written {
-            // Best effort: a torn block is recognised as such.
+            // Best effort: a torn block is detected when the file is read.
             let _ = self.file.set_len(self.end);
             return Err(self.failed()(error));
         }
@@ -143,7 +143,7 @@ impl Partial {
         Ok(())
     }
 
-    /// Removes the file: its content is in the output.
+    /// Removes the file once the output has its content.
     pub fn remove(self) {
         if let Err(error) = remove_file(&self.path) {
             warn(&format!("{} is no longer needed and could not be removed: {error}", self.path.display()));
@@ -212,14 +212,14 @@ impl Partial {
             }
         }
         if cut {
-            // The remains would stand before the next block.
+            // Otherwise the torn block would precede the next one.
             self.file.set_len(end).map_err(self.failed())?;
         }
         (self.start, self.end, self.done) = (start, end, done);
         Ok(())
     }
 
-    /// Number and records of the next block, which must be whole.
+    /// Number and records of the next block, which must be complete.
     fn read_block(&self, reader: &mut impl Read, records: &mut Vec<f64>) -> Result<usize, Failure> {
         let b = self.next_block(reader, records)?;
         b.ok_or_else(|| self.damaged("it is cut short"))
@@ -228,7 +228,7 @@ impl Partial {
     /// Number and records of the next block; `None` if the file ends first.
     fn next_block(&self, reader: &mut impl Read, records: &mut Vec<f64>) -> Result<Option<usize>, Failure> {
         let foreign = || self.damaged("a block does not belong to this sweep");
-        // Each number must be valid as far as it is there: foreign data is not taken for a torn block.
+        // Every number that is present must be valid, so that foreign data does not pass for a torn block.
         let Some(b) = self.number(reader)? else {
             return Ok(None);
         };
@@ -355,7 +355,7 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         let block = 20 + 8 * length;
         assert_eq!(whole.len(), begin + 3 * block);
-        // The step meets every position within the eight-byte numbers; the ends are those of whole blocks.
+        // Steps of 29 cover every offset within the eight-byte numbers; `ends` are the boundaries of whole blocks.
         let ends = (0..=3).map(|blocks| begin + blocks * block);
         for cut in (begin..whole.len()).step_by(29).chain(ends) {
             std::fs::write(&path, &whole[..cut]).unwrap();

@@ -13,7 +13,7 @@ use crate::scene::Scene;
 /// PNG pixels per diagram pixel.
 const PNG_SCALE: f32 = 2.0;
 
-/// Columns of the CSV file of one phase, each after its name.
+/// CSV columns of one phase, prefixed with its name.
 const OF_PHASE: [&str; 8] = ["end", "simulated_s", "wall_s", "ratio", "steps", "evaluations", "rejected", "front"];
 
 /// Writes all files into `folder`; returns their provenance.

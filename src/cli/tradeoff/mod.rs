@@ -21,7 +21,7 @@ use crate::scene::{BUILT_IN, Scene};
 /// Runs `tradeoff`.
 ///
 /// # Errors
-/// Bad input before it starts; a scene without a reference, Ctrl-C and the file system afterwards.
+/// Bad input, before measuring starts; later a scene without a reference, Ctrl-C or the file system.
 pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
     let budget = if arguments.quick { WorkBudget::QUICK } else { WorkBudget::FULL };
     match (&arguments.scene, &arguments.write) {
@@ -59,7 +59,7 @@ fn measure(scene: &Scene, budget: &WorkBudget, quiet: bool) -> Result<WorkPrecis
     measuring::measure(quiet, Some(scene), |context| work_precision(scene, budget, context))
 }
 
-/// Measures everything that the documentation states, and writes it in one go at the end.
+/// Measures everything that the documentation states, and writes it all at the end.
 fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
     let files = page::claim(root)?;
     let mut found = Vec::with_capacity(BUILT_IN.len());

@@ -14,13 +14,13 @@ use crate::machine::Preset;
 
 /// Scenes whose diagrams the page shows: the default one, and one in which the methods differ most.
 const DRAWN: [&str; 2] = ["spcmm", "chain"];
-/// The files under the source folder: the diagrams of these, the page, and the record.
+/// Files written under the source folder: the diagrams of these scenes, the page, and the record of the presets.
 const FILES: [&str; 4] =
     ["docs/tradeoff-spcmm.svg", "docs/tradeoff-chain.svg", "docs/tradeoff.md", "assets/presets.json"];
-/// What the tables of points say of each.
+/// Headings common to all tables of points.
 const OF_POINT: &str = "Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error";
 
-/// Claims all files, before the measuring begins.
+/// Claims all files before measuring starts.
 ///
 /// # Errors
 /// A folder that is not the program's source, or cannot be written.
@@ -28,7 +28,7 @@ pub(super) fn claim(root: &Path) -> Result<Vec<OutputFile>, Failure> {
     FILES.iter().map(|name| Ok(OutputFile::claim(&root.join(name), true)?)).collect()
 }
 
-/// Writes everything; all texts are made before the first file changes.
+/// Writes all files; every text is composed before the first file changes.
 pub(super) fn write(
     files: Vec<OutputFile>,
     found: &[WorkPrecision],
@@ -101,7 +101,7 @@ fn page(machine: &str, found: &[WorkPrecision], paces: &[(&str, f64)], scenes: S
     fill(include_str!("page.md"), &gaps)
 }
 
-/// Section of a scene: its reference, its diagram if it is among those drawn, what is fastest, and the points worth naming.
+/// Section of a scene: reference, diagram if the scene is among `DRAWN`, fastest settings, and named points.
 fn section(name: &str, found: Option<&WorkPrecision>) -> String {
     let facts = found.into_iter().flat_map(facts).map(|(label, value)| format!("- {label}: {value}\n"));
     let picture = if DRAWN.contains(&name) {
@@ -121,7 +121,7 @@ fn section(name: &str, found: Option<&WorkPrecision>) -> String {
     )
 }
 
-/// The fastest setting for each limit of an error.
+/// The fastest setting for each error limit.
 fn fastest(found: &WorkPrecision) -> Vec<Vec<String>> {
     let row = |of: &str, limit: f64, point: Option<&Point>, ratio: Option<f64>| {
         let setting = point.map(|point| format!("{} {}", point.setting.method, value(&point.setting)));
@@ -136,7 +136,7 @@ fn fastest(found: &WorkPrecision) -> Vec<Vec<String>> {
     [&mut rows[..], &mut [row("settled forces", 0.01, settled, ratio)]].concat()
 }
 
-/// Whether it is on a front, a preset, or the baseline.
+/// Whether a point is on a front, a preset, or the baseline.
 fn is_named(point: &Point) -> bool {
     on_fronts(point) != [false; 2] || point.preset.is_some() || is_baseline(point)
 }

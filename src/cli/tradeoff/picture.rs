@@ -19,12 +19,12 @@ const MARKERS: [Marker; 8] = [
     Marker::Plus,
     Marker::Disc,
 ];
-/// Larger errors are wrong altogether: their size means nothing.
+/// Largest error plotted; larger ones are meaningless.
 const WORST: f64 = 1.0;
 const FRONT: &str = "On the front: nothing is both faster and more accurate";
 
-/// Error against time, both phases side by side. `relative`: times relative to Runge-Kutta 4 at 10 microseconds, which
-/// also mean something on other machines.
+/// Error against time, both phases side by side. `relative`: times relative to Runge-Kutta 4 at 10 microseconds, which carry
+/// over to other machines.
 pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
     let floor = &found.reference.floor;
     let impacts = if found.reference.impacts == 0 { "Reactions" } else { "First impacts" };
@@ -50,13 +50,13 @@ fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view
     let place = |point: &Point| {
         let (phase, error) = view(point)?;
         let cost = if relative { 1.0 / phase.ratio? } else { phase.cost()? };
-        // Errors below the floor cannot be resolved: the point lies on it.
+        // Errors below the floor cannot be resolved, so the point is drawn on it.
         let error = error.max(floor.unwrap_or(0.0));
         (error <= WORST).then_some((cost, error))
     };
     let series = Method::ALL.into_iter().enumerate().map(|(n, method)| {
         let own = found.points.iter().filter(|p| p.setting.method == method);
-        // A gap where a point has no place: the line does not cross it.
+        // A point without a position leaves a gap in the line.
         let points = own.map(|p| place(p).unwrap_or((f64::NAN, f64::NAN))).collect();
         let line = Series::line(method.word(), points, PALETTE[n % PALETTE.len()]);
         line.marked(MARKERS[n % MARKERS.len()])
@@ -80,7 +80,7 @@ fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view
     }
 }
 
-/// Whether it is Runge-Kutta 4 at 10 microseconds.
+/// Whether a point is Runge-Kutta 4 at 10 microseconds.
 pub(super) fn is_baseline(point: &Point) -> bool {
     point.setting.method == Method::RungeKutta4 && point.setting.step_s == 10e-6
 }

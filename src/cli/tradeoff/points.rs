@@ -1,4 +1,4 @@
-//! What was measured, as tables and lines for terminal and page.
+//! Measurements as tables and lines, for terminal and page.
 
 use crate::analysis::{CaseCost, End, Phase, Point, ReferenceSolution, Setting, WorkPrecision};
 use crate::cli::machine;
@@ -30,7 +30,7 @@ pub(super) fn error(value: Option<f64>, floor: Option<f64>) -> String {
     }
 }
 
-/// Two digits: `4.3e-5`, `0.031`, `2.1`; rounding alone is `0`.
+/// Formats an error with two digits: `4.3e-5`, `0.031`, `2.1`; exactly 0 is `0`.
 fn exponent(value: f64) -> String {
     if value == 0.0 {
         "0".to_owned()
@@ -50,7 +50,7 @@ pub(super) fn end(phase: &Phase) -> &'static str {
     }
 }
 
-/// The reference, and what did not run, a line each.
+/// Lines about the reference and about settings that failed.
 pub(super) fn facts(found: &WorkPrecision) -> Vec<(&'static str, String)> {
     let ms = |time: f64| format!("{} ms", significant(1e3 * time, 5));
     let ReferenceSolution { setting, floor, slots, impacts, span, instant, instant_impact, settled, .. } =
@@ -109,7 +109,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     out + "\n"
 }
 
-/// Errors of a point: of peaks, position, energy and settled forces.
+/// Errors of a point in peaks, position, energy and settled forces.
 pub(super) fn errors(found: &WorkPrecision, point: &Point) -> [String; 4] {
     let (errors, floor) = (&point.errors, &found.reference.floor);
     [
@@ -120,7 +120,7 @@ pub(super) fn errors(found: &WorkPrecision, point: &Point) -> [String; 4] {
     ]
 }
 
-/// The points in one phase: settings, speeds, work, those of the errors that belong to it, and how it ended.
+/// The points in one phase: settings, speeds, work, errors of that phase, and how it ended.
 fn phase_table(
     found: &WorkPrecision,
     phase: fn(&Point) -> Option<&Phase>,

@@ -1,4 +1,4 @@
-//! `validate`: the cases whose answers are known from outside the program, and its page.
+//! `validate`: cases with independently known answers, and the page about them.
 
 use std::io::Write as _;
 
@@ -26,7 +26,7 @@ pub fn validate(arguments: &ValidateArguments) -> Result<(), Failure> {
     Err(Failure::new(Failure::MISSED, format!("not within their bounds: {}", missed.join("; "))))
 }
 
-/// The page, and which quantities are not within their bounds.
+/// The page, and the quantities outside their bounds.
 ///
 /// # Errors
 /// A case that does not run to its end.
@@ -55,7 +55,7 @@ fn row(case: &Case, check: &Check, comparison: &Comparison) -> Vec<String> {
         Right::Formula(text) => format!("`{text}`"),
     };
     let difference = comparison.difference();
-    // What is small against the bound may change with the compiler.
+    // Differences far below the bound may change with the compiler.
     let least = bound / 100.0;
     let difference =
         if difference.abs() < least { format!("below {}", significant(least, 1)) } else { significant(difference, 2) };
@@ -71,7 +71,7 @@ fn row(case: &Case, check: &Check, comparison: &Comparison) -> Vec<String> {
     ]
 }
 
-/// `value` down to a hundredth of `bound`.
+/// `value` rounded to a hundredth of `bound`.
 fn resolved(value: f64, bound: f64) -> String {
     let least = bound.log10().floor() as i32 - 2;
     let digits = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 - least + 1 };

@@ -1,19 +1,19 @@
-//! What a page keeps in its tab where no address holds it: links of any length, with the files that their scenes name.
+//! Links too long for an address, with the files that their scenes reference: a page stores them in its tab.
 
 use serde_json::{Value, json};
 
 use super::{LONGEST_LINK, Link, LinkError, fault, pack, unpack_within};
 use crate::scene::Texts;
 
-/// Before what is kept.
+/// Prefix of a stored link.
 pub(super) const PREFIX: &str = "kept:";
-/// Most bytes that it may unpack to: scene and files are limited one by one when they are read.
+/// Size limit after unpacking, bytes; scene and files are limited one by one when they are read.
 const LARGEST: usize = 32 << 20;
-/// What an address may hold beside a link, characters: how the page draws.
+/// Characters of an address reserved beside the link, for the choice of renderer.
 const ROOM: usize = 200;
 
 impl Link {
-    /// As [`Self::format`] where that fits into an address and brings everything back; otherwise a text for [`Self::parse`] alone.
+    /// As [`Self::format`] if that fits into an address and loses nothing; otherwise a text that only [`Self::parse`] reads.
     pub fn keep(&self) -> String {
         let link = self.format();
         if link.len() + ROOM <= LONGEST_LINK && self.beside.is_empty() {
@@ -35,7 +35,7 @@ pub(super) fn read(packed: &str) -> Result<Link, LinkError> {
     let files = kept["files"].as_object().ok_or_else(damaged)?;
     let beside = files.iter().map(|(name, text)| Some((name.clone(), text.as_str()?.into())));
     let beside: Texts = beside.collect::<Option<_>>().ok_or_else(damaged)?;
-    // As a fragment: a bare text is one without a `?` too early in it.
+    // As a fragment: a bare text must not contain a `?`.
     let link = Link::read(&format!("#{link}"))?;
     Ok(Link { beside, ..link })
 }

@@ -7,7 +7,7 @@ use crate::view::{Picked, WearMap};
 
 /// Longest window of the plots that a link asks for, s.
 const LONGEST_WINDOW: f64 = 1e4;
-/// Shortest one, s.
+/// Shortest window, s.
 const SHORTEST_WINDOW: f64 = 1e-6;
 /// Longest name of a channel, or pattern: bytes.
 const LONGEST_NAME: usize = 120;
@@ -19,9 +19,9 @@ const WEAR: [(&str, WearMap); 2] = [("wear-impulse", WearMap::Impulse), ("wear-f
 /// How much of the past the plots show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlotWindow {
-    /// The last seconds of viewing, whatever the time scale.
+    /// The last seconds of viewing time, at any time scale.
     Automatic,
-    /// The last simulated time, of this many seconds.
+    /// The last seconds of simulated time.
     Last(f64),
     /// Since the reset.
     Everything,
@@ -34,7 +34,7 @@ pub struct Instruments {
     pub microscope: Option<String>,
     /// The ideal motion beside the run.
     pub ideal: bool,
-    /// What colours the sockets.
+    /// Wear map on the sockets.
     pub wear: WearMap,
 }
 
@@ -42,7 +42,7 @@ impl Instruments {
     /// Reads words separated by commas or spaces; `none` stands for none.
     ///
     /// # Errors
-    /// Another word; lists those there are.
+    /// An unknown word; lists the allowed ones.
     pub fn read(text: &str) -> Result<Self, String> {
         let mut on = Self::default();
         for part in text.split([',', ' ']).filter(|part| !part.is_empty()) {
@@ -160,7 +160,7 @@ pub fn write_window(window: PlotWindow) -> String {
 /// The part of `scene` that `text`, `joint.NAME` or `body.NAME`, names.
 ///
 /// # Errors
-/// There is no such part; lists those there are.
+/// There is no such part; lists the allowed ones.
 pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
     let joints = || scene.machine.ball_joints.iter().map(|joint| joint.name.as_str());
     let bodies = || scene.machine.bodies.iter().map(|body| body.name.as_str());

@@ -1,10 +1,10 @@
-//! Links there and back, by hand, and damaged.
+//! Round trips, hand-written links and damaged links.
 
 use super::*;
 use crate::session::log::Event;
 use crate::view::WearMap;
 
-/// Numbers that look random and are the same each time (splitmix64).
+/// Deterministic pseudo-random numbers (splitmix64).
 struct Chance(u64);
 
 impl Chance {
@@ -141,10 +141,10 @@ fn no_text_whatever_makes_it_panic() {
         }
         if let Ok(link) = Link::parse(&String::from_utf8_lossy(&bytes)) {
             read += 1;
-            // A scene of nonsense is refused in words.
+            // A nonsensical scene is an error.
             assert!(link.load().is_err() || link.log.base.is_empty());
         }
-        // Nor does anything else.
+        // Arbitrary text does not panic, either.
         let _ = Link::parse(&chance.text(200));
     }
     assert!(read > 40, "{read} were links still");
@@ -167,7 +167,7 @@ fn a_link_by_hand_takes_short_names_and_full_keys() {
     assert_eq!(scene.machine.ball_joints[0].contact.clearance, 0.5e-3);
     assert!(!link.has_instant());
 
-    // The fragment wins, and alone counts where it names a scene.
+    // The fragment overrides the query, and replaces it if it names a scene.
     let both = |text: &str| Link::parse(text).expect("a link").log.base;
     let clearance = |value: &str| vec![("contact.clearance".to_owned(), value.to_owned())];
     assert_eq!(both("/?c=1mm#c=2mm"), clearance("2mm"));

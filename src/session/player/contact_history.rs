@@ -1,11 +1,11 @@
-//! When each ball joint was free, slid or crept.
+//! Contact state of each ball joint over time: free, slip or creep.
 
 use crate::simulate::{ContactState, Frame};
 
-/// Most state changes kept for all joints together; beyond that the older half is dropped.
+/// Most state changes stored for all joints together; beyond that the older half is dropped.
 const KEPT: usize = 200_000;
 
-/// The contact states of a run over time. A stretch recorded again after going back is kept once.
+/// The contact states of a run over time. Retraced time is recorded once.
 #[derive(Clone, Debug, Default)]
 pub struct ContactHistory {
     /// By ball joint: start time, s, and state.
@@ -54,7 +54,7 @@ impl ContactHistory {
         self.changes = self.joints.iter().map(Vec::len).sum();
     }
 
-    /// Forgets what came after `time`, s.
+    /// Drops the states after `time`, s.
     pub(super) fn cut(&mut self, time: f64) {
         for states in &mut self.joints {
             states.truncate(states.partition_point(|(from, _)| *from <= time));

@@ -1,21 +1,21 @@
-//! The impacts of a run from their beginning on: how hard each struck and when, and once it is over what `run --impacts` writes of it.
+//! Impacts of a run: start and peak while each lasts, and once it is over the data that `run --impacts` writes.
 
 use std::collections::VecDeque;
 
 use crate::machine::Vec3;
 use crate::simulate::{Impact, Peak, Simulation};
 
-/// Most impacts kept; beyond that the oldest are dropped.
+/// Most impacts stored; beyond that the oldest are dropped.
 const KEPT: usize = 20_000;
 
-/// How long after its beginning the end of an impact is waited for, s. Of one that lasts longer, as of a ball that comes to rest
-/// on its wall, the peak is that of this time.
+/// Time after its start for which the end of an impact is awaited, s. A longer contact, such as a ball coming to rest on its
+/// wall, has the peak of this time.
 pub const LONGEST_IMPACT: f64 = 10e-3;
 
-/// Among so many of the latest impacts the last to end is sought.
+/// Number of latest impacts searched for the last to end.
 const RECENT: usize = 64;
 
-/// Instants of a record and of an impact differ by this, relative.
+/// Relative rounding difference between the times of a record and of an impact.
 const ROUNDING: f64 = 1e-12;
 
 /// The largest normal force of an impact.
@@ -32,19 +32,19 @@ pub struct Top {
 pub struct RecordedImpact {
     /// Ball joint.
     pub joint: usize,
-    /// When it began, s: as long as it is not over, to within a step.
+    /// Start, s; accurate to within a step until the impact is over.
     pub start: f64,
-    /// When the ball left its wall, s; infinite while it touches, and until its next impact if a change took the wall away.
+    /// Time at which the ball left its wall, s; infinite in contact, and until the next impact if a change removed the wall.
     pub end: f64,
     /// Its largest force.
     pub top: Top,
-    /// Numbers of the steps with which it began, and with which its end was known.
+    /// Numbers of the steps in which it began and in which its end became known.
     steps: [u64; 2],
     impact: Option<Impact>,
 }
 
 impl RecordedImpact {
-    /// All that is known of it once it is over; `None` before, and if a change of the contact ended it.
+    /// Complete data once it is over; `None` before that, and if a change of the contact ended it.
     pub fn finished(&self) -> Option<&Impact> {
         self.impact.as_ref()
     }
@@ -55,22 +55,22 @@ impl RecordedImpact {
     }
 }
 
-/// The impacts of a run in the order in which they began. Steps taken again after going back add none.
+/// The impacts of a run in the order in which they began. Retraced steps add none.
 #[derive(Clone, Debug, Default)]
 pub struct ImpactRecord {
     all: VecDeque<RecordedImpact>,
     dropped: u64,
-    /// Largest force so far of the impact under way, by joint.
+    /// Largest force so far of the impact in progress, by joint.
     under_way: Vec<Option<Top>>,
-    /// Accepted steps up to which all is recorded, and beginning and end of the latest of them, s.
+    /// Number of accepted steps recorded, and start and end of the latest, s.
     steps: u64,
     latest_step: [f64; 2],
-    /// Those that ended with the latest step.
+    /// Impacts that ended in the latest step.
     ended: Vec<Impact>,
 }
 
 impl ImpactRecord {
-    /// Begins a new run; `peaks` tell of the impacts that begin with it.
+    /// Begins a new run; `peaks` contain the impacts that begin with it.
     pub(super) fn begin(&mut self, peaks: &[Peak]) {
         *self = Self { under_way: vec![None; peaks.len()], ..Self::default() };
         for (joint, peak) in peaks.iter().enumerate().filter(|(_, peak)| begins(peak)) {
@@ -96,7 +96,7 @@ impl ImpactRecord {
 
     fn record_joint(&mut self, joint: usize, peak: &Peak, ended: Option<&Impact>) {
         let begins = begins(peak);
-        // What ends began with an earlier step, or with this one.
+        // An impact that ends began in an earlier step or in this one.
         let (before, now) = match ended {
             Some(impact) if begins && impact.start >= self.latest_step[0] => (None, ended),
             _ => (ended, None),
@@ -115,9 +115,9 @@ impl ImpactRecord {
     }
 
     fn add(&mut self, joint: usize, peak: &Peak) {
-        // Without a force yet, it begins where the step ends.
+        // Without a force yet, it begins at the end of the step.
         let start = self.latest_step[usize::from(peak.normal <= 0.0)];
-        // A change has taken the wall away from the one before.
+        // A change has removed the wall of the previous impact.
         self.end(joint, start, None);
         if self.all.len() == KEPT {
             self.all.pop_front();
@@ -129,7 +129,7 @@ impl ImpactRecord {
         self.all.push_back(RecordedImpact { joint, start, end: f64::INFINITY, top, steps, impact: None });
     }
 
-    /// Takes the force of the latest step for the impact of `joint` under way.
+    /// Updates the peak of the impact in progress at `joint` with the latest step.
     fn raise(&mut self, joint: usize, peak: &Peak) {
         let Some(top) = &mut self.under_way[joint] else {
             return;
@@ -145,7 +145,7 @@ impl ImpactRecord {
         }
     }
 
-    /// The contact of `joint` ended at `time`, s, as `impact` if it was one until then.
+    /// Ends the contact of `joint` at `time`, s; `impact` is `None` if a change ended it.
     fn end(&mut self, joint: usize, time: f64, impact: Option<&Impact>) {
         let Some(top) = self.under_way[joint].take() else {
             return;
@@ -165,7 +165,7 @@ impl ImpactRecord {
         self.all.insert(at, own);
     }
 
-    /// Forgets what came after `time`, s, and step number `steps`.
+    /// Drops everything after `time`, s, and step number `steps`.
     pub(super) fn cut(&mut self, time: f64, steps: u64) {
         self.all.retain(|impact| impact.steps[0] <= steps);
         self.under_way.fill(None);
@@ -182,7 +182,7 @@ impl ImpactRecord {
         self.latest_step = self.latest_step.map(|end| end.min(time));
     }
 
-    /// All that are kept, in order, with their numbers in the run, from 1.
+    /// All recorded impacts, in order, with their numbers in the run, from 1.
     fn numbered(&self) -> impl DoubleEndedIterator<Item = (u64, &RecordedImpact)> {
         let first = self.dropped + 1;
         self.all.iter().enumerate().map(move |(at, impact)| (first + at as u64, impact))
@@ -200,14 +200,14 @@ impl ImpactRecord {
         begun.filter_map(RecordedImpact::finished)
     }
 
-    /// Of the latest impacts that had begun by `time`, s, the one that ended last, but not after `end`, s.
+    /// The impact that ended last, but not after `end`, s, among the latest that had begun by `time`, s.
     pub fn last_ended(&self, time: f64, end: f64) -> Option<&Impact> {
         let ended = self.latest(None, time).filter(|impact| impact.end <= end);
         ended.take(RECENT).max_by(|a, b| a.end.total_cmp(&b.end))
     }
 
-    /// The impact under way at `time`, s, once its peak is known, but no ball that rests: of ball joint `joint`, or of any; of several the one that has its
-    /// peak then, or else the one that began last.
+    /// The impact in progress at `time`, s, of ball joint `joint`, or of any, once its peak is known; resting balls are
+    /// excluded. Among several, the one that peaks at that instant, otherwise the one that began last.
     pub fn under_way(&self, joint: Option<usize>, time: f64) -> Option<(u64, &RecordedImpact)> {
         let touching = || {
             let own = self.numbered().rev().filter(move |(_, impact)| is_of(joint, impact));
@@ -220,13 +220,13 @@ impl ImpactRecord {
         touching().find(|(_, impact)| impact.top.time == time).or_else(|| touching().next())
     }
 
-    /// Whether the peak of `impact` may still be to come.
+    /// Whether `impact` may still reach its peak.
     fn is_open(&self, impact: &RecordedImpact) -> bool {
         impact.end.is_infinite() && self.latest_step[1] <= impact.start + LONGEST_IMPACT
     }
 
-    /// The first peak after `time`, s, of an impact of ball joint `joint`, or of any. `None` as long as an earlier one may come;
-    /// with `at_once` what is known so far.
+    /// The first peak after `time`, s, of an impact of ball joint `joint`, or of any. `None` while an earlier one may still
+    /// come; with `at_once` the first known so far.
     pub fn next_peak(&self, joint: Option<usize>, time: f64, at_once: bool) -> Option<f64> {
         let own = || self.all.iter().filter(|impact| is_of(joint, impact));
         let peaks = own().map(|impact| impact.top.time).filter(|peak| *peak > time);
@@ -249,13 +249,13 @@ impl ImpactRecord {
         self.all.iter().map(|impact| (impact.joint, impact.top)).filter(move |(_, top)| within(top))
     }
 
-    /// Number of impacts that are no longer kept.
+    /// Number of impacts dropped.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
 }
 
-/// Whether an impact begins in the step of `peak`. A ball that comes to its wall without any speed does not strike it.
+/// Whether an impact begins in the step of `peak`. A ball that reaches its wall at zero speed is no impact.
 fn begins(peak: &Peak) -> bool {
     peak.impacts > 0 && peak.approach_speed > 0.0
 }
@@ -268,10 +268,10 @@ fn is_of(joint: Option<usize>, impact: &RecordedImpact) -> bool {
 mod tests {
     use super::*;
 
-    /// Seconds of a step.
+    /// Step, s.
     const STEP: f64 = 1e-3;
 
-    /// Peak of a step, N, at the end of step `k`; `speed`: an impact begins with it.
+    /// Peak of `force`, N, at the end of step `k`; `speed`: an impact begins with it.
     fn peak(k: u64, force: f64, speed: Option<f64>) -> Peak {
         Peak {
             normal: force,
@@ -283,7 +283,8 @@ mod tests {
         }
     }
 
-    /// The steps of one joint each: its forces, N, from step `k` on; the first begins an impact, and the last ends it if it `ends`.
+    /// Records the steps of one joint with its forces, N, from step `k` on. The first begins an impact; the last ends it if
+    /// `ends`.
     fn contact(record: &mut ImpactRecord, joint: usize, k: u64, forces: &[f64], ends: bool) {
         let last = k + forces.len() as u64 - 1;
         for (now, force) in (k..).zip(forces) {
@@ -310,7 +311,7 @@ mod tests {
         assert_eq!(numbers(&record, 4e-3), [0; 0]);
         assert_eq!(numbers(&record, 5e-3), [1]);
         assert_eq!(numbers(&record, 1.0), [1, 2]);
-        // The one that is hit again has its larger peak.
+        // Joint 1 has two maxima; the larger is its peak.
         assert_eq!(
             [record.next_peak(None, 0.0, false), record.next_peak(None, 4e-3, false)],
             [Some(4e-3), Some(10e-3)]
@@ -325,7 +326,7 @@ mod tests {
         assert_eq!(peaks, [(0, 9.0)]);
         assert_eq!(record.latest(None, 8e-3).next().map(|impact| impact.joint), Some(1));
         assert_eq!(record.latest(Some(0), 8e-3).count(), 1);
-        // Taken again after going back, steps would add nothing; in another future they do.
+        // Retraced steps would add nothing; those of a new branch do.
         record.cut(8e-3, 8);
         assert_eq!(numbers(&record, 1.0), [1]);
         assert_eq!(record.next_peak(None, 4e-3, false), None, "it is under way again");
@@ -363,7 +364,7 @@ mod tests {
         let mut forces = vec![0.0, 5.0, 8.0];
         forces.resize(8, 3.0);
         contact(&mut record, 0, 1, &forces, false);
-        // Its end may still be near.
+        // The impact may still end in time.
         assert_eq!((record.next_peak(None, 0.0, false), record.next_peak(None, 0.0, true)), (None, Some(3e-3)));
         assert_eq!((record.previous_peak(None, 1.0), record.previous_peak(None, 3e-3)), (Some(3e-3), None));
         assert!(record.under_way(None, 2e-3).is_none());
@@ -384,7 +385,7 @@ mod tests {
     #[test]
     fn a_force_that_still_rises_is_no_peak_yet_and_one_without_an_end_ends_with_the_next() {
         let mut record = ImpactRecord::default();
-        // One begins with the run.
+        // An impact begins with the run.
         record.begin(&[peak(0, 0.0, Some(0.1))]);
         assert_eq!((record.next_peak(None, 0.0, false), record.previous_peak(None, 1.0)), (None, None));
         for k in 1..=3 {
@@ -396,7 +397,7 @@ mod tests {
         assert_eq!(record.next_peak(None, 0.0, false), Some(3e-3));
         assert_eq!(record.until(1.0).count(), 1);
         assert!(record.under_way(None, 7e-3).is_some_and(|(number, _)| number == 2));
-        // Without any speed nothing strikes.
+        // A contact at zero speed is no impact.
         record.record_joint(0, &peak(20, 1.0, Some(0.0)), None);
         assert_eq!(record.next_peak(None, 8e-3, true), None);
     }

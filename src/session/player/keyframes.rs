@@ -1,4 +1,4 @@
-//! States to which a run can be taken back: closely spaced in the recent past, thinned out in the older.
+//! Keyframes for going back in time: closely spaced in the recent past, sparse before.
 
 use std::sync::Arc;
 
@@ -6,23 +6,23 @@ use crate::scene::SceneSnapshot;
 use crate::session::twin::TwinMark;
 use crate::simulate::Mark;
 
-/// Steps from one kept state to the next.
+/// Steps between keyframes.
 const STRIDE: u64 = 256;
-/// Steps from one to the next while retracing the past, so that stepping back once more is quick, too.
+/// Steps between keyframes while retracing, so that stepping back again is quick, too.
 const FINE_STRIDE: u64 = 16;
-/// Most bytes for the kept states, and for those of the retraced stretch.
+/// Memory limits of the keyframes and of the fine keyframes of the retraced stretch, bytes.
 const BUDGET: usize = 32 << 20;
 const FINE_BUDGET: usize = 4 << 20;
 
-/// A state, and what else a player restores with it.
+/// A simulation state, and the player data restored with it.
 pub(super) struct Keyframe {
-    /// A copy of the run shares it.
+    /// Shared with copies of the run.
     pub state: Arc<SceneSnapshot>,
     /// Number of log entries before it.
     pub events: usize,
-    /// Position in the record; only the kept states have it.
+    /// Position in the record; only `kept` keyframes have one.
     pub record: Option<Mark>,
-    /// The twin run beside it.
+    /// State of the twin run.
     pub twin: Option<TwinMark>,
 }
 
@@ -32,18 +32,18 @@ impl Keyframe {
         self.state.bytes() + twin + self.record.as_ref().map_or(0, Mark::bytes)
     }
 
-    /// The same for a run without a twin.
+    /// The same without the twin.
     fn alone(&self) -> Self {
         Self { state: self.state.clone(), record: self.record.clone(), twin: None, ..*self }
     }
 }
 
-/// The states of one run since its start.
+/// The keyframes of one run since its start.
 #[derive(Default)]
 pub(super) struct Keyframes {
     kept: Vec<Keyframe>,
     bytes: usize,
-    /// States of the stretch last retraced.
+    /// Keyframes of the stretch last retraced.
     fine: Vec<Keyframe>,
     fine_bytes: usize,
 }
@@ -54,19 +54,19 @@ impl Keyframes {
         *self = Self::default();
     }
 
-    /// Those of a copy of the run, without its twin.
+    /// Keyframes for a copy of the run, without its twin.
     pub fn copy(&self) -> Self {
         let alone = |list: &[Keyframe]| list.iter().map(Keyframe::alone).collect();
         Self { kept: alone(&self.kept), fine: alone(&self.fine), ..*self }
     }
 
-    /// Whether to keep the state after `steps` steps, the latest so far.
+    /// Whether a keyframe is due after `steps` steps, the latest so far.
     pub fn is_due(&self, steps: u64) -> bool {
         let last = self.kept.last();
         last.is_none_or(|last| steps >= last.state.steps() + STRIDE)
     }
 
-    /// Keeps the latest state.
+    /// Stores a keyframe of the latest state.
     pub fn keep(&mut self, keyframe: Keyframe) {
         self.bytes += keyframe.bytes();
         self.kept.push(keyframe);
@@ -75,7 +75,7 @@ impl Keyframes {
         }
     }
 
-    /// Drops every second state of the older three quarters, never the first.
+    /// Drops every second keyframe of the older three quarters, never the first.
     fn thin(&mut self) {
         let old = self.kept.len() * 3 / 4;
         let mut index = 0;
@@ -86,12 +86,12 @@ impl Keyframes {
         self.bytes = self.kept.iter().map(Keyframe::bytes).sum();
     }
 
-    /// Whether the state after `steps` steps, reached while retracing, is worth keeping for going further back.
+    /// Whether to store the state after `steps` steps while retracing.
     pub fn is_fine(&self, steps: u64) -> bool {
         steps.is_multiple_of(FINE_STRIDE) && self.fine_bytes < FINE_BUDGET
     }
 
-    /// Keeps a state reached while retracing.
+    /// Stores a keyframe reached while retracing.
     pub fn keep_fine(&mut self, keyframe: Keyframe) {
         let after = self.fine.last();
         if after.is_none_or(|last| last.state.steps() < keyframe.state.steps()) {
@@ -100,13 +100,13 @@ impl Keyframes {
         }
     }
 
-    /// Forgets them: another stretch is being retraced.
+    /// Drops the keyframes of the retraced stretch.
     pub fn forget_fine(&mut self) {
         self.fine.clear();
         self.fine_bytes = 0;
     }
 
-    /// The latest state for which `is_before` is true; it must be true for every earlier one.
+    /// The latest keyframe for which `is_before` is true; it must be true for every earlier one.
     pub fn latest(&self, is_before: impl Fn(&Keyframe) -> bool) -> Option<&Keyframe> {
         let last = |list: &'_ [Keyframe]| list.partition_point(&is_before).checked_sub(1);
         let kept = last(&self.kept).map(|at| &self.kept[at]);
@@ -123,14 +123,15 @@ impl Keyframes {
         Some(&self.kept[at])
     }
 
-    /// Drops what follows `steps` steps: another future begins.
+    /// Drops keyframes after `steps` steps, for a new branch.
     pub fn cut(&mut self, steps: u64) {
         self.kept.retain(|kept| kept.state.steps() <= steps);
         self.bytes = self.kept.iter().map(Keyframe::bytes).sum();
         self.forget_fine();
     }
 
-    /// The record was rearranged, as by [`History::rearranged`](crate::simulate::History::rearranged), from one of `channels`.
+    /// Adapts the positions after [`History::rearranged`](crate::simulate::History::rearranged) of a record of `channels`
+    /// channels.
     pub fn rearrange(&mut self, channels: usize, from: &[Option<usize>]) {
         for mark in self.kept.iter_mut().filter_map(|kept| kept.record.as_mut()) {
             *mark = mark.rearranged(channels, from);
@@ -138,7 +139,7 @@ impl Keyframes {
         self.bytes = self.kept.iter().map(Keyframe::bytes).sum();
     }
 
-    /// Approximate memory of all states, bytes.
+    /// Approximate memory of all keyframes, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.bytes + self.fine_bytes

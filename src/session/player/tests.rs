@@ -126,7 +126,7 @@ thread_local! {
 #[test]
 fn what_is_stepped_between_frames_is_shown_as_it_comes_and_changes_no_bit() {
     let mut player = player("spcmm");
-    // Each look takes half a millisecond, so that a spell is of some steps.
+    // Each clock reading adds half a millisecond, so that a slice between frames has several steps.
     player.clock = || LOOKS.replace(LOOKS.get() + 5e-4);
     player.pacer.set_scale(0.02);
     player.set_playing(true);
@@ -144,7 +144,7 @@ fn what_is_stepped_between_frames_is_shown_as_it_comes_and_changes_no_bit() {
             longest = longest.max(player.steps() - steps);
         }
         if frame == 20 {
-            // What a script of the page does in the midst of it.
+            // A script of the page may pause in between.
             player.set_playing(false);
             let (hash, shown) = (player.simulation().state_hash(), player.pacer.shown());
             assert_eq!(player.step_between(0.05), None);
@@ -183,11 +183,11 @@ fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
     for _ in 0..40 {
         player.step_back();
     }
-    // The future is still known, and a refused value leaves it so.
+    // The future is still known, and a refused value does not discard it.
     assert!(player.history().rows(200) == all);
     assert!(player.set("contact.friction", "-1").is_err());
     assert!(player.has_future() && player.abandoned_future().is_none());
-    // A change takes nothing of the past away, and the former future is kept apart.
+    // A change keeps the past, and the former future is stored separately.
     player.set("contact.friction", "0.3").expect("in range");
     let left = player.abandoned_future().expect("left");
     assert_eq!((left.from, left.to), (player.pacer.shown(), there));
@@ -215,7 +215,7 @@ fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
     let change = player.simulation().time();
     player.set("contact.clearance", "0.6 mm").expect("in range");
     one_clock(&player);
-    // The run goes on as if it had been changed there by itself.
+    // The run continues as if it had been changed directly at that instant.
     let mut straight = LiveScene::new(other.running()).expect("starts");
     straight.restore(&other.simulation().snapshot());
     straight.set("contact.clearance", "0.6 mm").expect("in range");
@@ -278,7 +278,7 @@ fn another_number_of_links_is_recorded_after_the_reset() {
     assert!(!recorded(&player, Quantity::NormalForce, 0.01).is_empty());
 }
 
-/// What is recorded of the channel picked as `name`, as time and greatest value.
+/// Record of the channel picked as `name`: time and greatest value of each bin.
 fn picked(player: &Player, name: &str, to: f64) -> Vec<[f64; 2]> {
     let mut channels = player.channels().picked().iter();
     let index = channels.position(|c| c.name == name).expect("picked");
@@ -304,7 +304,7 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
     let listed: Vec<&str> = player.channels().picked().iter().map(|c| &*c.name).collect();
     assert_eq!(listed, ["crank.angle", "crank.reaction.x", "crank.reaction.y", "crank.reaction.z"]);
     assert!(recorded(&player, Quantity::Position, 8e-3) == before);
-    // At once the instant on show, and the past not at all.
+    // The record starts at the displayed instant.
     let first = picked(&player, "crank.angle", 1.0);
     assert!(first.len() == 1 && first[0][0] > 7.9e-3, "{first:?}");
     for player in [&mut player, &mut straight] {
@@ -319,7 +319,7 @@ fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
     assert!((angle[angle.len() - 1][1] - now).abs() < 1e-2);
     let weight = picked(&player, "crank.reaction.z", end);
     assert!(weight.iter().all(|point| point[1] != 0.0 && point[1].is_finite()));
-    // The other way round they keep their past; what is no longer picked is gone.
+    // A channel that stays picked keeps its past; one no longer picked is dropped.
     player.pick(&names(&["crank.angle", "rod.pose.x"]));
     assert!(picked(&player, "crank.angle", end) == angle);
     assert_eq!(player.picked().len(), 2);
@@ -337,7 +337,7 @@ fn picked_channels_go_back_and_branch_with_the_rest() {
     let all = picked(&player, "crank.angle", reached);
     player.go_to(10e-3);
     one_clock(&player);
-    // The stretch before it was picked is retraced with it.
+    // Retracing the time before the pick records the channel there, too.
     player.go_to(2e-3);
     let mut bins = Vec::new();
     player.bins(player.picked().start, 0.0, 2e-3, 400, &mut bins);
@@ -387,7 +387,7 @@ fn single_steps_are_taken_back_bit_by_bit() {
         player.single_step();
     }
     assert_eq!(player.simulation().state_hash(), end);
-    // A change is not a step: the step before it is taken back, and the change waits for its time.
+    // A change is not a step: stepping back undoes the step before it, and the change stays ahead in the log.
     let before = *hashes.last().expect("steps");
     player.set("contact.friction", "0.3").expect("in range");
     player.step_back();
@@ -397,7 +397,7 @@ fn single_steps_are_taken_back_bit_by_bit() {
     assert_eq!(player.pending().machine.contact.friction, 0.3);
 }
 
-/// Of the paper's mechanism as its file gives it.
+/// Friction coefficient in the scene file of the paper's mechanism.
 const FRICTION: f64 = 0.15;
 
 /// Uniform in [0, 1): a linear congruential generator.
@@ -410,7 +410,7 @@ impl Uniform {
     }
 }
 
-/// Runs to `to`, s, with `changes` at their times; the hash at the end of every step, but for those at which something changed.
+/// Runs to `to`, s, with `changes` at their times. Returns time and state hash after every step without a change.
 fn run_with(player: &mut Player, changes: &[(f64, &str, &str)], to: f64) -> Vec<(f64, u64)> {
     let mut hashes = Vec::new();
     let mut changes = changes.iter().peekable();
@@ -446,7 +446,7 @@ fn any_instant_of_the_past_has_the_bits_of_the_first_time() {
             player.go_to(time);
             assert_eq!(player.simulation().state_hash(), hash, "{scene} at {time}");
             one_clock(&player);
-            // Nothing else is displayed between two steps, either.
+            // Between two steps the display is consistent, too.
             player.go_to(time + 1e-7);
             one_clock(&player);
         }
@@ -460,7 +460,7 @@ fn any_instant_of_the_past_has_the_bits_of_the_first_time() {
 #[test]
 #[ignore = "full: ten seconds"]
 fn full_a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
-    // Balls that lose next to nothing rattle on.
+    // Balls that lose almost no energy keep rattling.
     let changes = [("contact.restitution", "1"), ("contact.friction", "0")];
     let own = |(key, value): (&str, &str)| (key.to_owned(), value.to_owned());
     let scene = Scene::load("spcmm", &changes.map(own)).expect("in range");
@@ -514,7 +514,7 @@ fn the_twin_goes_back_and_on_with_the_run() {
         }
         assert_eq!(twin.distances(), distances, "what was known stays so");
     }
-    // Another future: the twin of the one left is forgotten.
+    // On a new branch, the twin of the abandoned future is dropped.
     player.go_to(seen[10].0);
     player.set("contact.friction", "0.3").expect("in range");
     let twin = player.twin().expect("stays on");
@@ -538,7 +538,7 @@ fn ten_minutes_stay_within_reach() {
     assert!(bytes < 64 << 20);
 }
 
-/// Memory that this process holds, bytes.
+/// Resident memory of this process, bytes.
 #[cfg(target_os = "linux")]
 fn resident() -> usize {
     let status = std::fs::read_to_string("/proc/self/status").expect("Linux has it");
@@ -605,7 +605,7 @@ fn time_runs_backwards_through_the_same_states_to_the_start() {
     assert_eq!(player.simulation().time(), 0.0);
     let start = self::player("spcmm");
     assert_eq!(player.simulation().state_hash(), start.simulation().state_hash());
-    // And forwards again over the same.
+    // And forwards again through the same states.
     player.go_to(20e-3);
     let mut straight = self::player("spcmm");
     straight.run_to(20e-3);
@@ -632,8 +632,7 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
     assert_eq!(player.simulation().state_hash(), straight.simulation().state_hash());
 }
 
-/// Ball joint, beginning and instant of the largest force of every impact of a run by itself up to `to`, s, in the order of these
-/// instants.
+/// Ball joint, start and peak time of every impact of an independent run up to `to`, s, sorted by peak time.
 fn peaks_of_run(player: &Player, to: f64) -> Vec<(usize, f64, f64)> {
     let mut alone = Simulation::new(&player.running().machine).expect("starts");
     let (mut peaks, mut steps, mut impacts) = (Vec::new(), Vec::new(), Vec::new());
@@ -663,7 +662,7 @@ fn next_and_previous_impact_arrive_at_its_peak() {
     player.run_to(known);
     player.go_to(0.0);
     let reached = player.reached();
-    // Later ones are still under way.
+    // Later impacts may still be in progress.
     let before: Vec<_> = tops.iter().filter(|top| top.2 <= reached - 10e-3).collect();
     assert!(before.len() >= 6);
     // The first impact of the paper's mechanism.
@@ -675,11 +674,11 @@ fn next_and_previous_impact_arrive_at_its_peak() {
         one_clock(&player);
         let (_, impact) = player.impact_record().under_way(None, *time).expect("an impact");
         assert_eq!((impact.joint, impact.start), (*joint, *start));
-        // The arrow of the picture is as long as the peak.
+        // The displayed force is the peak.
         let force = player.frame().joints[*joint].normal_force.norm();
         assert!((force / impact.top.force.norm() - 1.0).abs() < 1e-3, "{force} at {time}");
     }
-    // One that has not happened yet is run to, without looking at what lies between.
+    // A future impact is reached by stepping, without displaying the instants between.
     player.go_to(reached);
     player.go_to_impact(None, true);
     assert!(player.is_seeking());
@@ -707,7 +706,7 @@ fn an_impact_under_way_is_run_to_its_peak() {
     let mut player = player("spcmm");
     let tops = peaks_of_run(&player, 20e-3);
     let first = tops[0];
-    // In the middle of its rise, seen from there and from the start.
+    // Halfway up the rise, searched from there and from the start.
     let rising = 0.5 * (first.1 + first.2);
     player.run_to(rising);
     player.go_to_impact(Some(first.0), false);
@@ -727,7 +726,7 @@ fn an_impact_under_way_is_run_to_its_peak() {
     player.run_to(first.2 + 10e-6);
     player.go_to_impact(Some(first.0), false);
     assert_eq!(player.pacer.shown(), first.2);
-    // From another future, after a change in the middle of it.
+    // On a new branch, after a change during the impact.
     player.set("contact.friction", "0.3").expect("in range");
     player.go_to_impact(Some(first.0), true);
     while player.is_seeking() {

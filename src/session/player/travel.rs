@@ -1,5 +1,5 @@
-//! Going back in time and on from there: any instant of the run is displayed by restoring the nearest state before it and
-//! taking the same steps again, with the logged events on the way. The result is the same to the bit.
+//! Going back in time and continuing from there: any instant is displayed by restoring the nearest earlier keyframe and
+//! repeating the same steps and logged events. The result is bit-identical.
 
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
@@ -10,48 +10,48 @@ use crate::session::paths::Paths;
 use crate::session::settled::Settling;
 use crate::simulate::{Bin, History};
 
-/// Most steps retaken before a past instant, so that the plots show in detail what led to it.
+/// Most steps retraced before a past instant, so that the plots show its history in detail.
 const LEAD: u64 = 512;
 
-/// How far ahead the next impact is sought, s.
+/// Search horizon for the next impact, s.
 const FARTHEST: f64 = 5.0;
 
-/// An impact that the run is heading for.
+/// A search for the next impact.
 #[derive(Clone, Copy)]
 pub(super) struct ImpactSearch {
-    /// In this ball joint, or in any.
+    /// Ball joint; `None` for any.
     joint: Option<usize>,
-    /// Its peak comes after this instant, s.
+    /// The peak must come after this instant, s.
     from: f64,
     /// Time at which the search ends, s.
     until: f64,
 }
 
-/// Something that was done to the run.
+/// An event on the timeline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flag {
-    /// When, s.
+    /// Time, s.
     pub time: f64,
-    /// What, in words.
+    /// Description.
     pub words: String,
 }
 
-/// An abandoned future: the run branched at an instant before it.
+/// A future abandoned when the run branched before it.
 #[derive(Clone, Debug)]
 pub struct AbandonedFuture {
-    /// Its record, including the time before it.
+    /// Its record, including the time before the branch.
     pub history: History,
-    /// The contact states.
+    /// Its contact states.
     pub contact_history: ContactHistory,
-    /// What was done in it.
+    /// Its events.
     pub flags: Vec<Flag>,
-    /// Where the run branched off, and how far this future had been displayed, s.
+    /// Time of the branch, and latest displayed instant of this future, s.
     pub from: f64,
     #[allow(missing_docs)]
     pub to: f64,
 }
 
-/// Drops the bins from `first` on that reach into the time before `start`, s.
+/// Drops the bins from index `first` on that begin before `start`, s.
 fn drop_before(bins: &mut Vec<Bin>, first: usize, start: f64) {
     let early = bins[first..].iter().take_while(|bin| bin.from < start);
     let count = early.count();
@@ -69,7 +69,7 @@ impl Player {
         self.pacer.shown() < self.reached || self.applied < self.log.entries.len()
     }
 
-    /// The abandoned future, as far as it is still ahead.
+    /// The abandoned future, while it extends beyond the run.
     pub fn abandoned_future(&self) -> Option<&AbandonedFuture> {
         self.left.as_deref().filter(|left| left.to > self.reached)
     }
@@ -79,7 +79,7 @@ impl Player {
         self.abandoned_future().map_or(self.reached, |left| left.to)
     }
 
-    /// When the ball joints were free, slid or crept.
+    /// Contact states of the ball joints over time.
     pub fn contact_history(&self) -> &ContactHistory {
         &self.contact_history
     }
@@ -89,7 +89,7 @@ impl Player {
         &self.impact_record
     }
 
-    /// What was done to the run, its future included; of a pull only the beginning and the end.
+    /// Events of the run, its future included; a pull has only its start and end.
     pub fn flags(&self) -> impl Iterator<Item = Flag> {
         let entries = &self.log.entries;
         let pulls = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
@@ -100,9 +100,8 @@ impl Player {
             .map(|(at, time)| Flag { time: *time, words: entries[at].event.words() })
     }
 
-    /// Appends what was recorded of `channel` from `from` to `to`, s, to `out`, as by [`History::bins`]: where possible from
-    /// the stretch last retraced, which is known in full detail, and beyond the latest displayed instant from the abandoned
-    /// future.
+    /// Appends the bins of `channel` from `from` to `to`, s, to `out`, as [`History::bins`] does. Uses the window last
+    /// retraced, in full detail, where possible, and the abandoned future beyond the latest displayed instant.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
         self.own_bins(channel, from, to, most_bins, out);
         let reached = self.reached;
@@ -122,7 +121,7 @@ impl Player {
         if from < start {
             let first = out.len();
             self.history.bins(channel, from, start, most_bins, out);
-            // A wider bin extends into what follows.
+            // A wide bin may extend past `start`.
             let whole = out[first..].iter().filter(|bin| bin.to <= start).count();
             out.truncate(first + whole);
         }
@@ -142,8 +141,8 @@ impl Player {
         self.travel(time);
     }
 
-    /// Goes to the peak of the next impact of ball joint `joint` (of any joint), or of the one before, or to the start. If that peak
-    /// is not known yet, the run continues to it, frame by frame.
+    /// Goes to the peak of the next or previous impact of ball joint `joint` (`None`: any), or back to the start. If the next
+    /// peak is not known yet, the run continues to it, frame by frame.
     pub fn go_to_impact(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();
         if !forward {
@@ -161,7 +160,7 @@ impl Player {
         }
     }
 
-    /// Whether the run is heading for the next impact.
+    /// Whether the run is seeking the next impact.
     pub fn is_seeking(&self) -> bool {
         self.sought.is_some()
     }
@@ -172,7 +171,7 @@ impl Player {
         let start = (self.clock)();
         let found = loop {
             let over = self.simulation.time() > sought.until || self.stopped.is_some();
-            // Its numbers are shown with it, so it has to be over.
+            // Its results are displayed with it, so it has to be over.
             let found = self.impact_record.next_peak(sought.joint, sought.from, over);
             if found.is_some() || over || !self.pacer.may_step((self.clock)() - start) {
                 break found.or(over.then_some(f64::INFINITY));
@@ -187,7 +186,7 @@ impl Player {
         }
     }
 
-    /// Steps back: to the start of the latest step, or of the one before if that start is displayed already.
+    /// Steps back to the start of the latest step, or of the one before if that start is already displayed.
     pub fn step_back(&mut self) {
         self.set_paused();
         let Some(steps) = self.steps().checked_sub(1) else {
@@ -228,7 +227,7 @@ impl Player {
         self.arrive(time);
     }
 
-    /// Displays `time`, s, of the latest step, and reapplies what was done then.
+    /// Displays `time`, s, within the latest step, and reapplies the events logged there.
     fn arrive(&mut self, time: f64) {
         self.pacer.jump(time.min(self.simulation.time()));
         if time >= self.simulation.time().min(self.reached) {
@@ -237,8 +236,7 @@ impl Player {
         self.present();
     }
 
-    /// Restores a state before `time`, s. If what led to that instant is not known in detail, restores an earlier one and
-    /// records in detail from there.
+    /// Restores a keyframe before `time`, s: an earlier one if the history of that instant must be recorded in detail.
     fn restore_at(&mut self, time: f64) {
         let best = self.keyframes.latest(|k| k.state.time() <= time);
         let Some((start, steps)) = best.map(|k| (k.state.time(), k.state.steps())) else {
@@ -255,7 +253,7 @@ impl Player {
         self.restore(start, true);
     }
 
-    /// Restores the latest state kept up to `time`, s; with `anew` another stretch is recorded in detail from there on.
+    /// Restores the latest keyframe up to `time`, s; `anew` starts another detailed record there.
     fn restore(&mut self, time: f64, anew: bool) {
         let Some(keyframe) = self.keyframes.latest(|k| k.state.time() <= time) else {
             return;
@@ -269,7 +267,7 @@ impl Player {
         self.stopped = None;
         self.unchanged = None;
         if now > self.recorded_to {
-            // The way there was not recorded.
+            // The time skipped was not recorded.
             self.paths = Paths::new(self.simulation.running());
         }
         self.recorded_to = now;
@@ -291,7 +289,7 @@ impl Player {
         }
     }
 
-    /// Retakes steps until `is_there`, with the logged events on the way; displays nothing beyond `time`, s.
+    /// Repeats steps and logged events until `is_there`; displays nothing beyond `time`, s.
     fn retrace(&mut self, is_there: impl Fn(&Self) -> bool, time: f64) {
         while !is_there(self) {
             self.pacer.jump(self.simulation.time().min(time));
@@ -309,7 +307,7 @@ impl Player {
                 break;
             }
             if entry.event == Event::Stop {
-                // The step is refused again and says so.
+                // The step is refused again and sets `stopped`.
                 self.step();
                 break;
             }
@@ -324,15 +322,14 @@ impl Player {
         }
     }
 
-    /// Continues from the displayed instant by retaking the known steps; if more events were logged after it, that future is
-    /// abandoned.
+    /// Continues from the displayed instant by repeating the known steps; a future with later events is abandoned.
     pub(super) fn go_on(&mut self) {
         if self.applied < self.log.entries.len() {
             self.branch();
         }
     }
 
-    /// The displayed instant becomes the end of the run; what was after it is abandoned.
+    /// Makes the displayed instant the end of the run and abandons its future.
     pub(super) fn branch(&mut self) {
         if !self.has_future() {
             return;
@@ -375,7 +372,7 @@ impl Player {
         self.arrive(shown);
     }
 
-    /// Keeps the latest state, which is recorded, if one is due: while the run advances, or while it retraces its past.
+    /// Stores a keyframe of the latest state if one is due, while the run advances or retraces.
     pub(super) fn keep(&mut self) {
         let steps = self.steps();
         let new = steps >= self.most_steps;
@@ -398,7 +395,7 @@ impl Player {
         }
     }
 
-    /// A new run begins: forgets everything about the one before.
+    /// Clears the rewind data for a new run.
     pub(super) fn clear_rewind(&mut self) {
         self.keyframes.clear();
         self.near = None;
@@ -410,7 +407,7 @@ impl Player {
         (self.reached, self.recorded_to) = (0.0, 0.0);
     }
 
-    /// Approximate memory for going back, bytes.
+    /// Approximate memory of the keyframes, bytes.
     #[cfg(test)]
     pub(super) fn rewind_bytes(&self) -> usize {
         self.keyframes.bytes()

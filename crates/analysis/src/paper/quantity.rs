@@ -1,4 +1,4 @@
-//! Quantities that the paper reports of a run, and its numbers beside this program's.
+//! Quantities that the paper reports for a run, and its numbers compared with this program's.
 
 use serde::{Deserialize, Deserializer, de::Error as _};
 
@@ -7,7 +7,7 @@ use super::Published;
 use crate::response::{Extremes, Response};
 use jointplay_physics::words::{Words as _, words};
 
-/// A quantity that a figure shows of a run, as one number in SI units.
+/// A scalar of a run shown in a figure, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "their words say it")]
 pub enum FigureValue {
@@ -49,7 +49,7 @@ impl FigureValue {
     /// Contact forces, joint by joint.
     pub const NORMAL: [Self; 3] = [Self::Normal1, Self::Normal2, Self::Normal3];
 
-    /// Its unit, and its value among the extremes of a run; `None` where sampling does not matter.
+    /// Unit, and accessor of its value in the extremes of a run; `None` where sampling does not matter.
     fn row(self) -> (&'static str, fn(&Extremes) -> Option<f64>) {
         match self {
             Self::DeviationX => ("m", |e| Some(e.deviation[X.index()])),
@@ -66,7 +66,7 @@ impl FigureValue {
         }
     }
 
-    /// Its unit.
+    /// Unit.
     pub fn unit(self) -> &'static str {
         self.row().0
     }
@@ -104,7 +104,7 @@ words!(Agreement {
 });
 
 impl Agreement {
-    /// From the ratio of a number to the paper's.
+    /// Agreement for the ratio of a number to the paper's.
     pub fn of(ratio: f64) -> Self {
         if (0.9..=1.1).contains(&ratio) {
             Self::Agrees
@@ -123,7 +123,7 @@ pub struct Comparison {
     pub published: &'static Published,
     /// This program's, in continuous time.
     pub full: f64,
-    /// As a solver with the paper's output step would report it; `None` where sampling does not matter.
+    /// Value that a solver with the paper's output step would report; `None` where sampling does not matter.
     pub sampled: Option<f64>,
 }
 

@@ -6,14 +6,14 @@ use crate::paper::{Case, Comparison, PAPER, Published, Series, Variant};
 
 /// The results of a report.
 pub struct Report {
-    /// How much was computed.
+    /// Extent of the computation.
     pub extent: Extent,
     /// Results of each variant of the model, in the order of [`PAPER`].
     pub models: Vec<Findings>,
 }
 
 impl Report {
-    /// The variants with all figures and statements: this program's model, and friction that uses (13) as printed.
+    /// The variants with all figures and statements: this program's model, and the one whose friction uses (13) as printed.
     pub fn complete(&self) -> [&Findings; 2] {
         [&self.models[0], &self.models[1]]
     }
@@ -25,7 +25,7 @@ impl Report {
         let of_model = |found: &Findings| {
             found.runs.iter().map(of_run).sum::<usize>() + found.sweeps.iter().map(of_sweep).sum::<usize>()
         };
-        // One more with ideal joints.
+        // Plus the run with ideal joints.
         PAPER.period * (1 + self.models.iter().map(of_model).sum::<usize>()) as f64
     }
 }
@@ -40,7 +40,7 @@ pub struct Findings {
     pub ideal: RecordedRun,
     /// Sweeps: [`Findings::sweep`] finds one by name.
     pub sweeps: Vec<SweepData>,
-    /// Smallest differences in x (m) and beta (rad) that distinguish two sections.
+    /// Smallest distinguishable differences in x (m) and beta (rad) between two sections.
     pub resolution: [f64; 2],
 }
 
@@ -69,7 +69,7 @@ impl Findings {
         &self.cold(series).points
     }
 
-    /// Points of that sweep, and of those that follow the motion upward and downward.
+    /// Points of that sweep, and of the sweeps that follow the motion upward and downward.
     pub fn branches(&self, series: Series) -> [&[SettledPoint]; 3] {
         ["cold", "up", "down"].map(|start| &self.sweep(&format!("{series}_{start}")).points[..])
     }
@@ -77,7 +77,7 @@ impl Findings {
     /// The run of `case`.
     ///
     /// # Panics
-    /// If it is none of those in [`PAPER`].
+    /// If it is not one of those in [`PAPER`].
     pub fn run(&self, case: Case) -> &RecordedRun {
         self.runs.iter().find(|run| run.case == case).expect("the table names no other run")
     }
@@ -90,12 +90,12 @@ impl Findings {
     /// Settled curves of a series.
     ///
     /// # Panics
-    /// In a combination, which has none.
+    /// For a combination, which has none.
     pub fn loops(&self, series: Series) -> [&SettledCurve; 3] {
         series.cases().map(|case| self.run(case).settled.as_ref().expect("taken of all runs of the paper"))
     }
 
-    /// Every number of the paper from a named run, beside this program's.
+    /// Every published number of a named run, with this program's result.
     pub fn comparisons(&self) -> Vec<Comparison> {
         let of = |published: &'static Published| {
             let response = &self.run(published.case).response;

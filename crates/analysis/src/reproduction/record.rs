@@ -14,9 +14,9 @@ pub struct Column {
     pub label: &'static str,
     /// Unit in plots.
     pub unit: &'static str,
-    /// That unit in SI units.
+    /// Size of that unit in SI units.
     pub one: f64,
-    /// Its value at an instant.
+    /// Value at an instant.
     pub(super) of: fn(&Observation) -> f64,
 }
 
@@ -84,7 +84,7 @@ pub struct RecordedRun {
     pub response: Response,
     /// All instants, in order of time.
     pub rows: Vec<RecordedRow>,
-    /// Its settled motion, if that was taken.
+    /// Settled motion, if recorded.
     pub settled: Option<SettledCurve>,
 }
 
@@ -140,7 +140,7 @@ impl SettledPoint {
         extent(all[all.len() / 2..].iter().copied())
     }
 
-    /// Its regime with the period.
+    /// Regime and period in words.
     pub fn regime_word(&self) -> String {
         self.regime.map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
     }
@@ -168,7 +168,7 @@ pub fn exponents(points: &[SettledPoint]) -> (f64, f64) {
     range(measured.filter(|e| e.is_finite()))
 }
 
-/// Word for the regime of a motion that did not reach its end.
+/// Name of the regime of a motion that did not reach its end.
 pub const NO_REGIME: &str = "none";
 
 /// Number of points per regime with its period, in order of first occurrence.
@@ -195,7 +195,7 @@ pub struct SweepData {
     pub sweep: Sweep,
     /// One record per point, concatenated; empty until its blocks are added.
     pub records: Vec<f64>,
-    /// Points along its axis; empty for a map, and while there are no records.
+    /// Points along its axis; empty for a map, and before there are records.
     pub points: Vec<SettledPoint>,
 }
 

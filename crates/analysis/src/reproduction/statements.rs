@@ -1,4 +1,4 @@
-//! Whether the paper's statements hold here: a verdict by the test of each one in [`PAPER`], with its criterion and its numbers.
+//! Verdicts on the paper's statements: the test of each one in [`PAPER`], with its criterion and its numbers.
 
 use super::Findings;
 use super::record::{
@@ -7,23 +7,23 @@ use super::record::{
 use crate::paper::{Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test};
 use crate::regime::Regime;
 
-/// A change below this fraction of the amplitude counts as none; the criteria call it 5 %.
+/// A change below this fraction of the amplitude is negligible; the criteria call it 5 %.
 const LITTLE: f64 = 0.05;
 
 /// A statement of the paper and this program's verdict.
 #[derive(Clone, Debug)]
 pub struct Statement {
-    /// Where the paper makes it, what it says, and its test.
+    /// Place in the paper, wording and test.
     pub claim: &'static Claim,
     /// Whether the criterion is met here.
     pub confirmed: bool,
-    /// What must hold.
+    /// Criterion for confirmation.
     pub criterion: &'static str,
     /// The numbers behind the verdict.
     pub evidence: Vec<Reading>,
 }
 
-/// A number behind a verdict: what it is of, its value, NaN if there is none, and its unit.
+/// A number behind a verdict: its description, its value (NaN if there is none) and its unit.
 pub type Reading = (String, f64, &'static str);
 
 impl Findings {
@@ -36,7 +36,7 @@ impl Findings {
         PAPER.statements.iter().map(of).collect()
     }
 
-    /// Whether the criterion of a test is met, the criterion, and the numbers that it is held against.
+    /// Evaluates a test: whether its criterion is met, the criterion, and the numbers compared with it.
     fn judge(&self, test: &Test) -> (bool, &'static str, Vec<Reading>) {
         match *test {
             Test::StaysNearIdeal { coordinate, run } => {
@@ -203,7 +203,7 @@ impl Findings {
         }
     }
 
-    /// Distances in a coordinate, run by run, and the least that counts.
+    /// Distances in a coordinate, run by run, and the smallest one that counts.
     fn resolved(&self, of: Coordinate, over: Series, sizes: &[f64]) -> Vec<Reading> {
         let runs = over.cases().map(|case| over.run_name(case)).into_iter().zip(sizes);
         let runs = runs.map(|(name, size)| micro(&name, *size, of));
@@ -267,19 +267,19 @@ fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
     (furthest > 0.5).then(|| within as f64 / distances.len() as f64)
 }
 
-/// A value of each run of a series.
+/// One value per run of a series.
 fn each(series: Series, values: &[f64], unit: &'static str) -> Vec<Reading> {
     let runs = series.cases().into_iter().zip(values);
     runs.map(|(case, value)| (series.run_name(case), *value, unit)).collect()
 }
 
-/// Shares, which are fractions of 1.
+/// Converts shares, fractions of 1, to percent.
 fn percent<'a>(of: impl IntoIterator<Item = &'a str>, shares: &[f64]) -> Vec<Reading> {
     let shares = of.into_iter().zip(shares);
     shares.map(|(of, share)| (of.to_owned(), share * 100.0, "%")).collect()
 }
 
-/// A distance in a coordinate, m or rad.
+/// Converts a distance in a coordinate, m or rad, to µm or µrad.
 fn micro(of: &str, size: f64, coordinate: Coordinate) -> Reading {
     (of.to_owned(), size * 1e6, ["µm", "µrad"][coordinate as usize])
 }
@@ -288,7 +288,7 @@ fn count(of: &str, number: usize) -> Reading {
     (of.to_owned(), number as f64, "")
 }
 
-/// Whether none of `shares` counts.
+/// Whether all `shares` are negligible.
 fn little(shares: &[f64]) -> bool {
     shares.iter().all(|share| *share < LITTLE)
 }
@@ -389,7 +389,7 @@ mod tests {
             ([3.0, 2.0, 1.0], 0.1, [1.0, 2.0], 1e-3),
             ([3.0, 2.0, 1.0], 0.2, [1.0, 3.0], 2e-3),
             ([1.0, 2.0, 3.0], 0.5, [4.0, 3.0], 3e-3),
-            // Over friction x stays and beta goes from 1 to 3; the forces go from 3 N to 5 N, more than over clearance.
+            // Over friction, x is constant and beta grows from 1 to 3; the forces grow from 3 N to 5 N, more than over clearance.
             ([2.0, 1.0, 1.0], 0.1, [1.0, 1.0], 3e-3),
             ([5.0, 1.0, 1.0], 0.1, [1.0, 3.0], 2e-3),
         ];
@@ -470,7 +470,8 @@ mod tests {
             instants.map(row).collect()
         };
         let mut found = nothing_moves();
-        // By clearance apart only at the beginning, and until after 0.3 s; by friction 4 % apart from there on.
+        // Over clearance the curves differ only at the beginning, until after 0.3 s; over friction they differ by 4 % from there
+        // on.
         let off = [(0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (0.0, 0.02), (0.0, 0.04)];
         for (run, (early, late)) in found.runs.iter_mut().zip(off) {
             run.rows = curve(early, late);
@@ -489,7 +490,7 @@ mod tests {
             ("Figure 17a and b", "agree", false),
             ("Figure 17c to f", "agree", true),
         ]);
-        // The formulations part by 12.5 mm of 100 mm at most.
+        // The formulations differ by at most 12.5 mm of 100 mm.
         for run in &mut found.runs {
             run.response.full.deviation = [0.1; 6];
         }
@@ -500,7 +501,7 @@ mod tests {
 
     #[test]
     fn verdicts_on_sections_follow_the_sweeps() {
-        // As the paper has it.
+        // Results that agree with the paper.
         let mut found = nothing_moves();
         let as_printed = vec![
             point(0.01, Regime::Periodic(1), 0.2, &wide(0.0)),
@@ -519,7 +520,7 @@ mod tests {
             ("Figure 19a", "quasi-periodic", true),
             ("Figure 19b", "areas", true),
         ]);
-        // All periodic: by clearance all at one place, by friction at places 10 mm of 25 mm apart.
+        // All motions are periodic: over clearance all at one place, over friction at places 10 mm of 25 mm apart.
         let still = [0.01, 0.5, 1.0].map(|c| point(c, Regime::Periodic(1), 0.2, &wide(0.0)));
         put(&mut found, "clearance_cold", still.to_vec());
         put(&mut found, "runs_by_clearance", still.to_vec());
@@ -566,7 +567,7 @@ mod tests {
     #[test]
     fn portraits_are_compared_at_equal_phases() {
         let mut found = nothing_moves();
-        // By clearance 0.2 mm apart and increasingly wide; by friction 4 mm of 25 mm apart.
+        // Over clearance the curves are 0.2 mm apart and increasingly wide; over friction they are 4 mm of 25 mm apart.
         let curves = [(0.0, 1e-3), (1e-4, 2e-3), (2e-4, 3e-3), (4e-3, 0.0), (0.0, 1e-3)];
         let settled = |found: &mut Findings, run: usize, (x, width): (f64, f64)| {
             let curve = found.runs[run].settled.as_mut().expect("given above");

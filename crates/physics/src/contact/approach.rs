@@ -1,34 +1,33 @@
-//! The speed that the damping term divides by, as a function of the contact's memory and the current rate.
+//! The approach speed in the damping term, as a function of the contact state and the current rate.
 //!
-//! With `approach_speed = "largest"` it is the running maximum of the penetration rate. While the rate is the largest so far,
-//! the damping term is chi itself; once it falls, the maximum stays. A step across an instant at which the rate passes the
-//! maximum is only of order 1, so a stepper that locates corners keeps to one piece over a whole step.
+//! With `approach_speed = "largest"` it is the running maximum of the penetration rate. While the rate is at its maximum, the
+//! damping term is chi itself; once the rate falls, the maximum stays. A step across this corner is only first-order accurate, so
+//! a stepper that locates corners stays on one branch for a whole step.
 
 use serde::{Deserialize, Serialize};
 
 use super::Coefficients;
 
-/// Active piece of that rule.
+/// Active branch of the approach-speed rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ApproachPiece {
-    /// The whole rule: for the approach speed at the start, and for steppers that do not locate corners.
+    /// The full rule: for `approach_speed = "start"`, and for steppers that do not locate corners.
     #[default]
     Unsplit,
-    /// The rate is below the largest so far, which the term divides by.
+    /// The rate is below its maximum so far, which is the approach speed.
     Held,
     /// The rate is the largest so far: the term is chi.
     Rising,
 }
 
 impl Coefficients {
-    /// `rate`, but not below the floor, m/s: what the damping term divides by where nothing is remembered.
+    /// Approach speed without a contact state, m/s: `rate`, but not below the floor.
     #[inline]
     pub(super) fn floored(&self, rate: f64) -> f64 {
         rate.max(self.speed_floor)
     }
 
-    /// Speed that the damping term divides by, m/s, for a contact whose memory holds `remembered` (m/s) and whose penetration
-    /// grows at `rate` (m/s).
+    /// Approach speed, m/s, for a stored value `remembered` (m/s) and the penetration rate `rate` (m/s).
     #[inline]
     pub(super) fn approach(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> f64 {
         match pace {
@@ -38,7 +37,7 @@ impl Coefficients {
         }
     }
 
-    /// Whether that is the rate itself, so that the damping term does not depend on it.
+    /// Whether that speed is the rate itself, so that the damping term does not depend on it.
     pub(super) fn approach_follows(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> bool {
         match pace {
             ApproachPiece::Unsplit => self.largest && rate > remembered,
@@ -47,7 +46,7 @@ impl Coefficients {
         }
     }
 
-    /// Active piece for a contact whose memory holds `remembered`.
+    /// Active branch for a stored approach speed `remembered` and the penetration rate `rate`, m/s.
     pub(super) fn approach_piece_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
         if !self.largest {
             ApproachPiece::Unsplit

@@ -1,22 +1,22 @@
-//! The laws applied to the geometry: the force between a ball and the wall of its socket, and its derivatives with respect
-//! to displacement and velocity. Everything that needs a contact force or its derivatives gets them here.
+//! The force between a ball and its socket wall, and its derivatives with respect to displacement and velocity. Every contact
+//! force and derivative is computed here.
 
 use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Memory, Vec3};
 
-/// Where a ball is in its socket, and how fast it moves there.
+/// Position and motion of a ball in its socket.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Separation {
-    /// |e|, m.
+    /// Eccentricity |e|, m.
     pub distance: f64,
-    /// n = e / |e| (8); zero if e is.
+    /// n = e / |e| (8); zero for e = 0.
     pub normal: Vec3,
-    /// delta = |e| - c, m (10).
+    /// Penetration delta = |e| - c, m (10).
     pub penetration: f64,
-    /// d(delta)/dt, m/s.
+    /// Penetration rate d(delta)/dt, m/s.
     pub rate: f64,
 }
 
-/// Force on a ball, and the sliding speed behind it.
+/// Force on a ball, with its sliding speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Force {
     /// F_N, N (19).
@@ -27,12 +27,12 @@ pub struct Force {
     pub slip_speed: f64,
 }
 
-/// How full friction enters the derivatives; the ramp always enters by its tangent.
+/// Linearisation of full friction; the ramp always uses its tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slope {
-    /// By its tangent.
+    /// Tangent of the law.
     Tangent,
-    /// By F_T / v_t, which can stop sliding within a step but cannot reverse it.
+    /// F_T / v_t, which can stop sliding within a step but cannot reverse it.
     Secant,
 }
 
@@ -52,19 +52,19 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
-    /// Adds that the velocity used by friction has the derivative `by_normal` with respect to the normal, m/s.
+    /// Adds the effect of the derivative `by_normal` (m/s) of the friction velocity with respect to the normal.
     pub fn add_normal_rotation(&mut self, by_normal: &Mat3) {
         self.by_displacement += self.by_slip * by_normal * self.normal;
     }
 
-    /// For any force that acts between two points.
+    /// Derivatives of a force between two points.
     pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
         Self { by_displacement, by_rate, by_slip: Mat3::zeros(), by_clearance: Vec3::zeros(), normal: Mat3::zeros() }
     }
 }
 
 impl Coefficients {
-    /// Separation of a ball at the eccentricity e (m) that moves at de/dt (m/s).
+    /// Separation of a ball at the eccentricity e (m) with the velocity de/dt (m/s).
     #[inline]
     pub fn separation(&self, eccentricity: &Vec3, velocity: &Vec3) -> Separation {
         let distance = eccentricity.norm();
@@ -85,8 +85,8 @@ impl Coefficients {
         velocity + ball.cross(&(normal * radius)) - socket.cross(&(normal * (radius + self.clearance)))
     }
 
-    /// Derivative of [`Self::slip_velocity`] with respect to the normal, m/s. The play is so small that a ball which moves a
-    /// little there turns its normal a lot: where bodies spin, the surfaces then slide otherwise.
+    /// Derivative of [`Self::slip_velocity`] with respect to the normal, m/s. The play is so small that a slight motion of the
+    /// ball turns its normal a lot, which changes the sliding velocity of spinning bodies.
     pub fn slip_velocity_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
         match self.friction_velocity {
             FrictionVelocity::Centres | FrictionVelocity::Printed => Mat3::zeros(),
@@ -107,12 +107,12 @@ impl Coefficients {
         }
     }
 
-    /// Whether that is the velocity of the surfaces rather than the centres.
+    /// Whether friction uses the velocity of the surfaces rather than that of the centres.
     pub fn uses_surface_velocity(&self) -> bool {
         self.friction_velocity == FrictionVelocity::Surface
     }
 
-    /// Fraction of that velocity's projection that is v_t: all of it, or (1 - c/|e|) with (13) as printed.
+    /// Ratio of v_t to the projected friction velocity: 1, or (1 - c/|e|) with (13) as printed.
     #[inline]
     fn share(&self, gap: &Separation) -> f64 {
         match self.friction_velocity {
@@ -131,7 +131,7 @@ impl Coefficients {
         }
     }
 
-    /// Force on a ball in contact; `read` gives the velocity used by friction and is called only if there is friction.
+    /// Force on a ball in contact; `read` returns the velocity used by friction and is called only if there is friction.
     #[inline]
     pub fn force(&self, memory: &Memory, gap: &Separation, read: impl FnOnce() -> Vec3) -> Force {
         let approach = memory.approach(self, gap.rate);
@@ -151,7 +151,7 @@ impl Coefficients {
         force
     }
 
-    /// Derivatives of `force`, the result of [`Self::force`] there, which must be > 0, at the fixed velocity `read`.
+    /// Derivatives of `force` (the result of [`Self::force`], > 0) at the fixed friction velocity `read`.
     pub fn linearise(
         &self,
         memory: &Memory,
@@ -212,7 +212,7 @@ impl Coefficients {
         }
     }
 
-    /// Whether a contact may have left the pieces of the laws that its memory holds: the step is then searched for corners.
+    /// Whether a contact may have left its frozen branches of the laws: the step is then searched for corners.
     #[inline]
     pub fn leaves_piece(&self, memory: &Memory, gap: &Separation, force: &Force) -> bool {
         memory.may_turn(gap.rate)
@@ -291,7 +291,7 @@ mod tests {
                 [(FrictionPiece::Ramp, 3e-5), (FrictionPiece::Full, 0.04), (FrictionPiece::Unsplit, 0.04)]
             {
                 for pace in [ApproachPiece::Held, ApproachPiece::Rising] {
-                    // The printed velocity is so much smaller that it takes a higher speed to get there.
+                    // The printed velocity is so much smaller that this branch takes a higher speed.
                     let speed = match friction_velocity {
                         FrictionVelocity::Printed => speed * 150.0,
                         _ => speed,
@@ -338,7 +338,7 @@ mod tests {
         let tangential = printed - at.normal * at.normal.dot(&printed);
         let got = c.sliding(&at, &c.slip_velocity(&at.normal, &v, &BALL, &SOCKET));
         assert!((got - tangential).norm() < 1e-12 * 0.2);
-        // Its dead band ends where the centres move at v_a |e| / delta.
+        // The dead band ends where the centres move at v_a |e| / delta.
         let ends = c.slip_low * at.distance / at.penetration;
         for (part, vanishes) in [(0.999, true), (1.001, false)] {
             let slow = tangential.normalize() * (part * ends);

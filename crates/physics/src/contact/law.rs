@@ -13,7 +13,7 @@ pub fn hertz_stiffness(parameters: &Parameters, clearance: f64) -> f64 {
     4.0 / (6.0 * s) * ((r + clearance) * r / clearance).sqrt()
 }
 
-/// Penetration at which the undamped law carries `force` (N), m: where a settled contact under this load rests.
+/// Penetration at which the undamped law balances `force` (N), m: the rest position of a settled contact.
 pub fn settled_penetration(stiffness: f64, force: f64) -> f64 {
     libm::cbrt((force / stiffness) * (force / stiffness))
 }
@@ -26,7 +26,8 @@ pub fn impact_duration(stiffness: f64, damping: f64, mass: f64, speed: f64) -> f
     2.94 * deepest / speed
 }
 
-/// Half a period of a mass `mass` (kg) that rests on a contact of `stiffness` K under `force` (N), s; infinite without one.
+/// Half the oscillation period of a mass `mass` (kg) resting on a contact of `stiffness` K under `force` (N), s; infinite without
+/// force.
 pub fn settled_half_period(stiffness: f64, mass: f64, force: f64) -> f64 {
     // dF/d(delta) = 1.5 K delta^0.5 at F = K delta^1.5.
     let slope = 1.5 * libm::cbrt(stiffness * stiffness * force);
@@ -107,22 +108,22 @@ pub struct Coefficients {
     pub slip_low: f64,
     /// v_theta, m/s.
     pub slip_high: f64,
-    /// Smallest approach speed the damping term divides by, m/s.
+    /// Lower bound of the approach speed in the damping term, m/s.
     pub speed_floor: f64,
     /// Ball radius r, m.
     pub ball_radius: f64,
-    /// Which relative velocity friction uses.
+    /// Relative velocity used by friction.
     pub friction_velocity: FrictionVelocity,
     /// Current clearance c > 0, m.
     pub clearance: f64,
-    /// Its rate while it ramps to a new value, m/s.
+    /// Rate of the clearance while it ramps, m/s.
     pub clearance_rate: f64,
-    /// The damping term divides by the contact's largest rate so far, not by that at its start.
+    /// Whether the damping term divides by the contact's largest rate so far instead of its rate at the start.
     pub largest: bool,
 }
 
 impl Coefficients {
-    /// For a joint whose current clearance is `clearance` > 0.
+    /// Coefficients of a joint whose current clearance is `clearance` > 0, m.
     pub fn new(parameters: &Parameters, clearance: f64) -> Self {
         Self {
             stiffness: hertz_stiffness(parameters, clearance),
@@ -142,7 +143,7 @@ impl Coefficients {
         }
     }
 
-    /// Sets the current clearance of a ramp, and the stiffness that goes with it.
+    /// Sets the current clearance of a ramp (m), its rate (m/s), and the corresponding stiffness.
     pub fn move_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
         self.stiffness = hertz_stiffness(parameters, clearance);
         (self.clearance, self.clearance_rate) = (clearance, rate);
@@ -193,7 +194,7 @@ mod tests {
         NormalLaw::Gonthier,
     ];
 
-    /// Rebound over approach speed of a unit mass against the law's own force, by Runge-Kutta 4 in small steps.
+    /// Rebound speed over approach speed of a unit mass, integrated with Runge-Kutta 4 in small steps.
     fn simulated_restitution(law: NormalLaw, ce: f64) -> f64 {
         let parameters = Parameters { normal_law: law, restitution: ce, ..Parameters::default() };
         let c = Coefficients { stiffness: 1e10, ..Coefficients::new(&parameters, 3e-4) };

@@ -57,7 +57,7 @@ words!(FrictionLaw {
     None => "none",
 });
 
-/// Which sliding velocity the friction law uses.
+/// Sliding velocity used by the friction law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum FrictionVelocity {
     /// Relative velocity of the two centres, paper eqs. (15)-(16).
@@ -75,7 +75,7 @@ words!(FrictionVelocity {
     Printed => "printed",
 });
 
-/// Which speed the damping term of the normal force divides by.
+/// Approach speed by which the damping term of the normal force divides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd)]
 pub enum ApproachSpeed {
     /// The penetration rate at which the contact began, paper eq. (19).
@@ -104,15 +104,15 @@ pub struct Parameters {
     pub poisson_ratio: f64,
     /// Ball radius r, m.
     pub ball_radius: f64,
-    /// Which sliding velocity friction uses.
+    /// Sliding velocity used by the friction law.
     pub friction_velocity: FrictionVelocity,
-    /// v_a: below it there is no friction, m/s.
+    /// v_a, m/s: no friction below it.
     pub slip_speed_low: f64,
-    /// v_theta: above it friction is full, m/s.
+    /// v_theta, m/s: full friction above it.
     pub slip_speed_high: f64,
-    /// Smallest approach speed that the damping term divides by, m/s.
+    /// Lower bound of the approach speed in the damping term, m/s.
     pub impact_speed_floor: f64,
-    /// Which speed the damping term divides by.
+    /// Approach speed in the damping term.
     pub approach_speed: ApproachSpeed,
     /// Normal-force law.
     pub normal_law: NormalLaw,

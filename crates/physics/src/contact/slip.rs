@@ -1,16 +1,16 @@
-//! Pieces of the friction law between its corners, each continued smoothly beyond them.
+//! Branches of the friction law between its corners, each continued smoothly beyond them.
 //!
-//! A step across a corner is only of order 1. A stepper that locates corners keeps to one piece over a whole step, finds
-//! where the sliding speed leaves it, and continues from there with the next.
+//! A step across a corner is only first-order accurate. A stepper that locates corners stays on one branch for a whole step,
+//! finds where the sliding speed leaves it, and continues from there on the next.
 
 use serde::{Deserialize, Serialize};
 
 use super::Coefficients;
 
-/// Active piece of the friction law (21).
+/// Active branch of the friction law (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrictionPiece {
-    /// The whole law, corners included: for steppers that do not locate them.
+    /// The full law, corners included: for steppers that do not locate them.
     #[default]
     Unsplit,
     /// Below v_a: no friction.
@@ -22,7 +22,7 @@ pub enum FrictionPiece {
 }
 
 impl Coefficients {
-    /// The piece that a sliding speed (m/s) lies on.
+    /// Branch at a sliding speed (m/s).
     pub fn friction_piece_at(&self, speed: f64) -> FrictionPiece {
         if speed >= self.slip_high {
             FrictionPiece::Full
@@ -33,7 +33,7 @@ impl Coefficients {
         }
     }
 
-    /// How far a sliding speed is beyond the corners of `slip`, m/s: negative inside.
+    /// Distance of a sliding speed beyond the corners of the branch `slip`, m/s; negative inside.
     pub fn beyond(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {
             FrictionPiece::Unsplit => f64::NEG_INFINITY,
@@ -45,7 +45,7 @@ impl Coefficients {
         }
     }
 
-    /// Friction force divided by normal force and sliding velocity, s/m, for a piece continued beyond its corners: twice
+    /// Friction force divided by normal force and sliding velocity, s/m, for a branch continued beyond its corners: twice
     /// continuously differentiable, even through zero velocity.
     pub fn friction_per_speed(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {

@@ -1,4 +1,4 @@
-//! Expressions over numbers that carry their derivatives.
+//! Evaluation of expressions with derivatives.
 
 use super::{Binary, Number, Unary, smooth_step};
 use crate::jet::Jet;
@@ -10,7 +10,7 @@ impl Number for Jet {
 
     fn unary(self, operation: Unary) -> Self {
         let x = self.value;
-        // The value is f64's, bit for bit.
+        // The value equals that in f64, bit for bit.
         let g = x.unary(operation);
         let (g1, g2) = match operation {
             Unary::Negate => return -self,
@@ -36,7 +36,7 @@ impl Number for Jet {
                 let (_, g1, g2) = smooth_step(x);
                 (g1, g2)
             }
-            // No drive may use it.
+            // Drives reject this function.
             Unary::Abs => (1.0_f64.copysign(x), 0.0),
         };
         self.chain(g, g1, g2)
@@ -58,26 +58,26 @@ impl Number for Jet {
                 let angle = libm::atan2(y.value, x.value);
                 Self::new(angle, rate, (turn - rate * growth) / square)
             }
-            // No drive may use them.
+            // Drives reject these functions.
             Binary::Min => [self, other][usize::from(other.value < self.value)],
             Binary::Max => [self, other][usize::from(other.value > self.value)],
         }
     }
 }
 
-/// x^y; where y is constant, x may be negative as far as f64 allows it.
+/// x^y; for constant y, x may be negative as far as f64 allows.
 fn power(x: Jet, y: Jet) -> Jet {
     let value = libm::pow(x.value, y.value);
     if y.rate == 0.0 && y.acceleration == 0.0 {
         let c = y.value;
-        // A factor of 0 wins over the infinite power of 0 beside it: x and 1 have derivatives at 0.
+        // A zero factor cancels an infinite power of 0: x and 1 have derivatives at 0.
         let term = |factor: f64, exponent: f64| match factor {
             0.0 => 0.0,
             _ => factor * libm::pow(x.value, exponent),
         };
         return x.chain(value, term(c, c - 1.0), term(c * (c - 1.0), c - 2.0));
     }
-    // Its logarithm is y ln x.
+    // ln(x^y) = y ln x.
     let growth = y * x.unary(Unary::Ln);
     growth.chain(value, value, value)
 }

@@ -12,12 +12,12 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// For a pair whose lower order is `order`.
+    /// Controller for an embedded pair whose lower order is `order`.
     pub fn new(order: u32) -> Self {
         Self { exponent: f64::from(order) + 1.0, previous: 1e-4 }
     }
 
-    /// Factor for the next step after an accepted one with relative error `error` <= 1.
+    /// Step-size factor after an accepted step with relative error `error` <= 1.
     pub fn after_accept(&mut self, error: f64) -> f64 {
         let beta = 0.04;
         let error = error.max(1e-10);
@@ -27,7 +27,7 @@ impl Controller {
         factor.clamp(0.2, 8.0)
     }
 
-    /// Factor for the next try after a rejected one.
+    /// Step-size factor after a rejected step with relative error `error`.
     pub fn after_reject(&self, error: f64) -> f64 {
         if !error.is_finite() {
             return 0.25;

@@ -26,7 +26,7 @@ const D: [f64; 6] = [
     69997945.0 / 29380423.0,
 ];
 
-/// Dormand-Prince 5(4): seven stages, the last of which is the first of the next step.
+/// Dormand-Prince 5(4): seven stages, first same as last.
 pub struct DormandPrince {
     k2: Vec<f64>,
     k3: Vec<f64>,
@@ -34,15 +34,15 @@ pub struct DormandPrince {
     k5: Vec<f64>,
     k6: Vec<f64>,
     stage: Vec<f64>,
-    /// End state and derivative as the method left them: the caller may project its own copy.
+    /// End state and derivative as computed: the caller may project its own copy.
     raw_end: Vec<f64>,
     raw_k_end: Vec<f64>,
-    /// Fraction of the latest attempt that is kept.
+    /// Fraction of the latest attempt that remains after truncation.
     kept: f64,
 }
 
 impl DormandPrince {
-    /// For `dimension` components.
+    /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
         let zeros = || vec![0.0; dimension];
         Self {
@@ -58,13 +58,13 @@ impl DormandPrince {
         }
     }
 
-    /// Ends the latest attempt at `theta` of its length: the same interpolant over the shorter step.
+    /// Truncates the latest attempt to the fraction `theta` of its length, with the same interpolant.
     pub fn truncate(&mut self, theta: f64) {
         self.kept *= theta;
     }
 
-    /// Components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the
-    /// derivative there.
+    /// Interpolates components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from the state and
+    /// derivative at its start.
     pub fn interpolate(&self, part: Range<usize>, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
         let (theta, h) = (theta * self.kept, h / self.kept);
         let s = 1.0 - theta;
@@ -80,8 +80,8 @@ impl DormandPrince {
         }
     }
 
-    /// Estimate of h |lambda| for the step just attempted, from the two evaluations at its end, in the `moving` components; 0 if
-    /// it was truncated. Beyond about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
+    /// Estimate of h |lambda| for the latest attempt, from the two evaluations at its end, in the `moving` components; 0 if it
+    /// was truncated. Beyond about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
     pub fn stiffness(&self, moving: &[Range<usize>], h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         let (mut rate, mut distance) = (0.0, 0.0);
         for i in moving.iter().flat_map(Range::clone) {

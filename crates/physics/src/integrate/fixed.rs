@@ -2,13 +2,13 @@
 
 use super::{ContactSystem, Stepper, System, combine};
 
-/// v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1, keeps the energy of oscillations bounded.
+/// Semi-implicit Euler, v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1; the energy of oscillations stays bounded.
 pub struct SemiImplicitEuler {
     rate: Vec<f64>,
 }
 
 impl SemiImplicitEuler {
-    /// For `dimension` components.
+    /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
         Self { rate: vec![0.0; dimension] }
     }
@@ -38,20 +38,20 @@ impl Stepper for SemiImplicitEuler {
     }
 }
 
-/// Implicit-explicit Euler: [`SemiImplicitEuler`] but with the contact forces at the end of the step; order 1, L-stable in
-/// the contacts like the implicit Euler method, so that steps need not resolve the ringing of a settled contact.
+/// Implicit-explicit Euler: [`SemiImplicitEuler`] with the contact forces at the end of the step; order 1. It is L-stable in the
+/// contacts like implicit Euler, so steps need not resolve the ringing of a settled contact.
 pub struct ImexEuler {
     rate: Vec<f64>,
     push: Vec<f64>,
 }
 
 impl ImexEuler {
-    /// For `dimension` components.
+    /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
         Self { rate: vec![0.0; dimension], push: vec![0.0; dimension] }
     }
 
-    /// As [`Stepper::attempt`]; needs no derivative at the start and leaves none at the end.
+    /// As [`Stepper::attempt`], but neither needs the derivative at the start nor provides that at the end.
     pub fn attempt<S: ContactSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64], y_end: &mut [f64]) -> f64 {
         let positions = system.positions();
         let Self { rate, push } = self;
@@ -88,7 +88,7 @@ pub struct RungeKutta4 {
 }
 
 impl RungeKutta4 {
-    /// For `dimension` components.
+    /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
         let zeros = || vec![0.0; dimension];
         Self { k2: zeros(), k3: zeros(), k4: zeros(), stage: zeros() }

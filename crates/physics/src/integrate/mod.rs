@@ -1,7 +1,7 @@
 //! Time steppers and event location for any system of ordinary differential equations.
 //!
-//! A [`Stepper`] only *attempts* a step: it leaves the end state, an error estimate and an interpolant; whether the
-//! step counts is the caller's decision ([`Controller`] helps an adaptive one). Nothing here allocates after `new`.
+//! A [`Stepper`] only *attempts* a step: it leaves the end state, an error estimate and an interpolant, and the caller decides
+//! whether to accept ([`Controller`] helps an adaptive one). Nothing here allocates after `new`.
 
 mod controller;
 mod dormand_prince;
@@ -52,7 +52,7 @@ words!(Method {
 });
 
 impl Method {
-    /// Whether each of its steps solves a system with the Jacobian.
+    /// Whether each step solves a system with the Jacobian.
     pub fn is_implicit(self) -> bool {
         matches!(self, Self::Rosenbrock | Self::Radau5)
     }
@@ -69,59 +69,59 @@ pub trait System {
     fn dimension(&self) -> usize;
     /// Number of leading components that are positions; the others are velocities.
     fn positions(&self) -> usize;
-    /// Components that steps move, in their order. A method need not look at the others: their derivatives are zero, and where
-    /// they are at a step's end is not its business.
+    /// Components that steps advance, in order. All other components are frozen and must not be touched; their derivatives are
+    /// zero.
     fn moving(&self) -> &[Range<usize>];
-    /// f(t, y) into `dy`.
+    /// Writes f(t, y) to `dy`.
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
-    /// The position part of f alone, into the first [`System::positions`] components of `dy`; evaluates no force.
+    /// Writes the position part of f alone to the first [`System::positions`] components of `dy`; evaluates no force.
     fn position_rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
     /// Absolute scale of each component: an error of `tolerance * scale` is acceptable.
     fn scale(&self) -> &[f64];
 }
 
-/// A system that a linearly implicit method can solve: it provides an approximation of its Jacobian J = df/dy that is good
-/// in the stiff part.
+/// A system for linearly implicit methods: it provides an approximation of its Jacobian J = df/dy that is good in the stiff part.
 pub trait StiffSystem: System {
     /// Evaluates J and df/dt at (t, y) and stores them.
     fn linearise(&mut self, t: f64, y: &[f64]);
-    /// Prepares to solve with `shift` I - J.
+    /// Factors `shift` I - J.
     fn factor_shifted(&mut self, shift: f64);
     /// Solves (`shift` I - J) x = b in place.
     fn solve_shifted(&mut self, b: &mut [f64]);
-    /// Prepares to solve with (`real` + i `imaginary`) I - J.
+    /// Factors (`real` + i `imaginary`) I - J.
     fn factor_shifted_pair(&mut self, real: f64, imaginary: f64);
-    /// Solves that in place for `b_real` + i `b_imaginary`.
+    /// Solves with this complex matrix in place for `b_real` + i `b_imaginary`.
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]);
     /// df/dt at the point where J was evaluated.
     fn time_derivative(&self) -> &[f64];
 }
 
-/// A system whose friction can be linearised by itself.
+/// A system whose friction can be linearised alone.
 pub trait FrictionSystem: System {
-    /// The system with a Jacobian of which friction alone is known.
+    /// View of the system whose Jacobian contains friction alone.
     type Part<'a>: StiffSystem
     where
         Self: 'a;
-    /// Takes that view of it.
+    /// Returns this view.
     fn friction_alone(&mut self) -> Self::Part<'_>;
 }
 
-/// A system whose contacts can be stepped implicitly by themselves.
+/// A system whose contacts can be stepped implicitly on their own.
 pub trait ContactSystem: System {
-    /// f(t, y) into `dy` as if no contact carried a force.
+    /// Writes f(t, y) without contact forces to `dy`.
     fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
-    /// Given `y` at the end, `t`, of a step of size `h` without contact forces: projects it onto the constraints, and writes
-    /// its velocity change due to the contact forces at the step's end to `dv` (zero for positions). False if there are none.
+    /// Takes the state `y` at the end, `t`, of a step of size `h` without contact forces. Projects it onto the constraints, and
+    /// writes its velocity change due to the contact forces at the end of the step to `dv` (zero for positions). Returns false if
+    /// there are none.
     fn contact_velocity_change(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool;
 }
 
 /// One-step method.
 pub trait Stepper {
-    /// Tries a step of size `h` from (`t`, `y`), where `k` = f(t, y), into `y_end`.
+    /// Attempts a step of size `h` from (`t`, `y`), where `k` = f(t, y), and writes the end state to `y_end`.
     ///
-    /// On return an adaptive method has left f(t + h, y_end) in `k_end`. Returns the error estimate relative to
-    /// the system's scales (largest component; 0 for a fixed-step method), not yet divided by the tolerance.
+    /// An adaptive method also writes f(t + h, y_end) to `k_end`. Returns the error estimate relative to the system's scales
+    /// (largest component; 0 for a fixed-step method), not yet divided by the tolerance.
     fn attempt<S: System>(
         &mut self,
         system: &mut S,
@@ -146,8 +146,8 @@ pub fn hermite(theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &
     }
 }
 
-/// `out` = y + h (a_1 k_1 + a_2 k_2 + …) for the `terms` (a, k), in these `parts`. All of one length as far as the compiler
-/// knows, so that it takes several components at a time.
+/// `out` = y + h (a_1 k_1 + a_2 k_2 + …) for the `terms` (a, k), over `parts`. All slices are cut to one length so that the
+/// compiler can vectorise the loop.
 fn combine<const N: usize>(parts: &[Range<usize>], out: &mut [f64], y: &[f64], h: f64, terms: [(f64, &[f64]); N]) {
     for part in parts {
         let (out, y) = (&mut out[part.clone()], &y[part.clone()]);
@@ -162,7 +162,7 @@ fn combine<const N: usize>(parts: &[Range<usize>], out: &mut [f64], y: &[f64], h
     }
 }
 
-/// `out` += a k, in these `parts`.
+/// `out` += a k, over `parts`.
 pub(crate) fn add_scaled(parts: &[Range<usize>], out: &mut [f64], a: f64, k: &[f64]) {
     for part in parts {
         for (out, k) in out[part.clone()].iter_mut().zip(&k[part.clone()]) {
@@ -171,21 +171,21 @@ pub(crate) fn add_scaled(parts: &[Range<usize>], out: &mut [f64], a: f64, k: &[f
     }
 }
 
-/// `x` / s, in these `parts`.
+/// `x` /= s, over `parts`.
 pub(crate) fn divide(parts: &[Range<usize>], x: &mut [f64], s: f64) {
     for part in parts {
         x[part.clone()].iter_mut().for_each(|x| *x /= s);
     }
 }
 
-/// Copies these `parts`.
+/// Copies `parts`.
 pub(crate) fn copy(parts: &[Range<usize>], out: &mut [f64], from: &[f64]) {
     for part in parts {
         out[part.clone()].copy_from_slice(&from[part.clone()]);
     }
 }
 
-/// Largest component relative to its scale in these `parts`; NaN if any is.
+/// Largest component relative to its scale, over `parts`; NaN if any is.
 fn largest(parts: &[Range<usize>], x: &[f64], scale: &[f64]) -> f64 {
     let mut size: f64 = 0.0;
     for part in parts {

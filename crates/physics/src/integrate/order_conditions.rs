@@ -47,7 +47,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// All trees of at most `order` vertices; including fat vertices if `fat`.
+/// All trees of at most `order` vertices, with fat vertices if `fat`.
 fn trees(order: usize, fat: bool) -> Vec<Tree> {
     let mut all: Vec<Tree> = Vec::new();
     for n in 1..=order {
@@ -88,7 +88,7 @@ struct Tableau {
 }
 
 impl Tableau {
-    /// Without products with a matrix.
+    /// Tableau without matrix products.
     fn plain(alpha: Vec<Vec<f64>>) -> Self {
         let gamma = vec![vec![0.0; alpha.len()]; alpha.len()];
         Self { alpha, gamma }
@@ -106,7 +106,7 @@ impl Tableau {
         worst
     }
 
-    /// Asserts that the weights have this order to rounding, and none higher.
+    /// Asserts that the weights have exactly this order, to rounding.
     fn assert_order(&self, what: &str, weights: &[f64], theta: f64, order: usize, fat: bool) {
         let defects = self.defects(weights, theta, order + 1, fat);
         assert!(defects[..order].iter().all(|d| *d < ROUNDING), "{what}: {defects:?}");
@@ -119,8 +119,8 @@ const ROUNDING: f64 = 2e-14;
 /// Fractions of a step at which interpolants are checked.
 const PARTS: [f64; 4] = [0.13, 0.5, 0.77, 1.0];
 
-/// Returns `slopes[n]` for the n-th evaluation, whatever the state. Its matrix, where one is used, adds the first half of
-/// the components to the second.
+/// Returns `slopes[n]` for the n-th evaluation, whatever the state. Its matrix, if used, adds the first half of the components to
+/// the second.
 struct Probe {
     slopes: Vec<Vec<f64>>,
     calls: usize,
@@ -206,7 +206,7 @@ impl StiffSystem for Probe {
     }
 }
 
-/// Tableau and weights of an explicit method of this many stages; the last is the end if it evaluates there.
+/// Tableau and weights of an explicit method of this many stages; the last stage is the end if the method evaluates there.
 fn explicit(stepper: &mut impl Stepper, stages: usize) -> (Tableau, Vec<f64>) {
     let mut probe = Probe::units(stages, stages);
     let k = probe.slopes[0].clone();
@@ -292,7 +292,7 @@ fn ros34pw2_has_order_three_with_any_matrix_and_two_embedded() {
         let last = tableau.alpha[3][j] + tableau.gamma[3][j];
         assert!((last - weights[j]).abs() < ROUNDING, "{j}");
     }
-    // With the derivative at the end as a stage of its own, the cubic through both ends.
+    // With the derivative at the end as an extra stage: the cubic through both ends.
     let mut longer = Tableau::plain(tableau.alpha.clone());
     longer.gamma.clone_from(&tableau.gamma);
     for rows in [&mut longer.alpha, &mut longer.gamma] {
@@ -333,7 +333,7 @@ fn the_code_of_ros34pw2_is_its_tableau() {
         assert!((end[j] - weights[j]).abs() < ROUNDING, "weight {j}");
         assert!((end[4 + j] - through_gamma(&weights, j)).abs() < ROUNDING);
     }
-    // The estimate is the difference to the embedded weights: nothing up to its order.
+    // The estimate is the difference from the embedded solution: zero up to its order.
     let tableau = Tableau::plain(rosenbrock::ALPHA_IJ.map(|row| row.to_vec()).to_vec());
     for tree in trees(3, false) {
         let error = estimate(&tree, &tableau, |probe, k| {
@@ -357,7 +357,7 @@ fn radau_has_order_five_three_inside_and_three_embedded() {
         let defects = tableau.defects(&at, theta, 3, false);
         assert!(defects.iter().all(|d| *d < ROUNDING), "{theta}: {defects:?}");
     }
-    // The embedded one has the derivative at the start as a stage before the others.
+    // The embedded method has the derivative at the start as an extra first stage.
     let mut rows = vec![vec![0.0; 4]];
     rows.extend(a.iter().map(|row| [&[0.0], &row[..]].concat()));
     Tableau::plain(rows).assert_order("embedded", &embedded, 1.0, 3, false);
@@ -405,7 +405,7 @@ fn both_euler_methods_meet_the_conditions_of_order_one_and_no_more() {
         let mut system = Falling(a);
         SemiImplicitEuler::new(2).attempt(&mut system, 0.0, h, &y, &k, &mut one, &mut [0.0; 2]);
         ImexEuler::new(2).attempt(&mut system, 0.0, h, &y, &mut other);
-        // The position is moved with the velocity at the end: h^2 a, of which the exact solution has one half.
+        // The position uses the velocity at the end: h^2 a, twice the exact contribution.
         assert_eq!(one, [h * v + h * h * a, v + h * a]);
         assert_eq!(one, other);
     }

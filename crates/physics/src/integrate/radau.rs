@@ -1,8 +1,8 @@
 //! Radau IIA with three stages: implicit, order 5, stiffly accurate, L-stable, stage order 3
 //! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.8; coefficients of Table IV.5.6).
 //!
-//! Unlike a linearly implicit method it iterates: with a stiff contact on a curved path, a linearised step ends off the
-//! contact by (h v)^2 / (2 L), which is more than a settled penetration at steps of a millisecond.
+//! Unlike a linearly implicit method it iterates: with a stiff contact on a curved path, a linearised step misses the contact by
+//! (h v)^2 / (2 L), more than a settled penetration at steps of a millisecond.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,21 +28,21 @@ const T_INVERSE: [[f64; 3]; 3] = [
     [-0.502_872_634_945_786_9, 2.571_926_949_855_605, -0.596_039_204_828_224_9],
 ];
 const MOST_ITERATIONS: u32 = 7;
-/// The previous step's polynomial says nothing of a step so many times as long.
+/// Largest step ratio at which the previous step's polynomial still predicts the next step.
 const FURTHEST: f64 = 10.0;
-/// Contraction rate of the iteration that steps aim at (Gustafsson & Söderlind, SIAM J. Sci. Comput. 18, 1997): it is about
+/// Contraction rate targeted by the step size (Gustafsson & Söderlind, SIAM J. Sci. Comput. 18, 1997): the rate is about
 /// proportional to the step, and steps chosen by their error alone grow until every other iteration fails.
 const AIMED_CONTRACTION: f64 = 0.5;
-/// After an iteration that failed, steps are held at this part of the one it failed with, and may grow by this factor each from
-/// there, until an iteration contracts faster than this rate.
+/// After a failed iteration, steps are limited to the fraction `HELD` of the failed one. The limit grows by the factor `RELEASE`
+/// per step until an iteration contracts faster than `FAST`.
 const HELD: f64 = 0.5;
 const RELEASE: f64 = 1.3;
 const FAST: f64 = 0.05;
-/// Largest part of the allowed error that the iteration may leave (Hairer & Wanner II, IV.8).
+/// Fraction of the allowed error that the iteration may leave (Hairer & Wanner II, IV.8).
 const LEFT: f64 = 0.03;
 
-/// The latest step's collocation polynomial: the interpolant of that step and the starting guess for the next, so it is
-/// part of what a snapshot needs.
+/// Collocation polynomial of the latest step: its interpolant and the starting guess for the next step, and therefore part of a
+/// snapshot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Polynomial {
     /// Step size, s; 0 if there is none.
@@ -53,12 +53,12 @@ pub struct Polynomial {
     z: [Vec<f64>; 3],
     /// theta / (1 - theta) of the latest iteration that gave an estimate of its contraction rate theta.
     contraction: f64,
-    /// Longest step that the iteration is trusted with after it failed with a longer one, s.
+    /// Limit on the step after a failed iteration, s.
     held: Option<f64>,
 }
 
 impl Polynomial {
-    /// Whether it is one of `dimension` components.
+    /// Whether the polynomial has `dimension` components.
     pub fn fits(&self, dimension: usize) -> bool {
         self.z.iter().all(|z| z.len() == dimension)
     }
@@ -81,10 +81,11 @@ pub struct Radau {
 }
 
 impl Radau {
-    /// Its interior nodes within a step; the third is the end. The polynomial through a quantity there has the step's own order.
+    /// Interior nodes within a step; the third node is the end. Interpolation of a quantity through them has the order of the
+    /// step.
     pub const INTERIOR: [f64; 2] = [C[0], C[1]];
 
-    /// For `dimension` components.
+    /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
         let triple = || std::array::from_fn(|_| vec![0.0; dimension]);
         Self {
@@ -101,7 +102,7 @@ impl Radau {
         }
     }
 
-    /// Discards the Jacobian and the previous step: the state was changed by something other than a step.
+    /// Discards the Jacobian and the previous step after a change of state that is not a step.
     pub fn invalidate(&mut self) {
         self.linearised_at = None;
         self.previous.h = 0.0;
@@ -109,17 +110,17 @@ impl Radau {
         self.previous.held = None;
     }
 
-    /// What a resumed run needs to reproduce the same bits.
+    /// State that a resumed run needs to reproduce the same bits.
     pub fn polynomial(&self) -> &Polynomial {
         &self.previous
     }
 
-    /// Restores it, after [`Self::invalidate`].
+    /// Restores this state, after [`Self::invalidate`].
     pub fn set_polynomial(&mut self, polynomial: &Polynomial) {
         self.previous.clone_from(polynomial);
     }
 
-    /// As [`super::Stepper::attempt`]; `tolerance` sets how far the iteration converges. Infinite if it fails.
+    /// As [`super::Stepper::attempt`]; `tolerance` also sets the convergence target of the iteration. Infinite if that fails.
     pub fn attempt<S: StiffSystem>(
         &mut self,
         system: &mut S,
@@ -156,25 +157,25 @@ impl Radau {
         add(system.moving(), y_end, y, &self.z[2]);
         let error = self.estimate(system, t, h, y, k, tolerance);
         system.derivative(t + h, y_end, k_end);
-        // What went astray is no guess for the next try.
+        // A diverged attempt is no guess for the next one.
         if error.is_finite() {
             self.remember(system.moving(), t, h);
         }
         error
     }
 
-    /// Factor for the next step or try that the iteration of the latest attempt asks for; infinite if it asks for none.
+    /// Step-size factor requested by the iteration of the latest attempt; infinite if there is no request.
     pub fn growth(&self) -> f64 {
         self.growth
     }
 
-    /// How often the latest attempt factored its matrices.
+    /// Number of factorisations in the latest attempt.
     pub fn factorisations(&self) -> u32 {
         self.factorisations
     }
 
-    /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
-    /// Returns whether it is the former: an attempt may have failed because it went astray.
+    /// Starting guess for the stages: the extrapolated polynomial of the previous step, or that of a longer attempt from the same
+    /// point. Returns true for the former; an earlier attempt may have failed by diverging.
     fn begin(&mut self, moving: &[Range<usize>], t: f64, h: f64) -> bool {
         let again = self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
         let follows =
@@ -205,8 +206,9 @@ impl Radau {
         !again
     }
 
-    /// Takes the Jacobian at the second stage as far as it is known. Where a contact's normal turns within the step, that of its
-    /// start fits its end badly; this one serves all three stages, and the method's order does not depend on it.
+    /// Evaluates the Jacobian at the current estimate of the second stage. Where a contact normal turns within the step, a
+    /// Jacobian from the start fits the end badly. This one serves all three stages, and the order of the method does not depend
+    /// on it.
     fn linearise_within<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64]) {
         add(system.moving(), &mut self.stage, y, &self.z[1]);
         system.linearise(t + C[1] * h, &self.stage);
@@ -214,7 +216,7 @@ impl Radau {
         self.factor(system, h);
     }
 
-    /// Prepares the system to solve for the stages.
+    /// Factors the matrices of the stages.
     fn factor<S: StiffSystem>(&mut self, system: &mut S, h: f64) {
         system.factor_shifted(REAL / h);
         system.factor_shifted_pair(PAIR.0 / h, PAIR.1 / h);
@@ -223,10 +225,10 @@ impl Radau {
 
     /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
     fn iterate<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64], tolerance: f64) -> bool {
-        // The iteration's own error stays well below the step's.
+        // The iteration error stays well below the step error.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(LEFT));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
-        // If previous steps converged fast, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
+        // After fast convergence in previous steps, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
         let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
         self.previous.contraction = trusted;
         self.contraction = 0.0;
@@ -293,8 +295,8 @@ impl Radau {
                     fails = left * theta.powi(remaining) > target;
                 }
                 if fails {
-                    // One that still shrinks has come closer: with the Jacobian there it mostly gets home, for less than
-                    // another try costs.
+                    // A contracting iteration is closer to the solution: with a new Jacobian there it usually converges, at less
+                    // cost than another attempt.
                     if renewed || theta > 1.0 {
                         return false;
                     }
@@ -349,7 +351,7 @@ impl Radau {
         self.previous.end = t + h;
     }
 
-    /// Ends the latest attempt at `theta` of its length: the same polynomial over the shorter step.
+    /// Truncates the latest attempt to the fraction `theta` of its length, with the same polynomial.
     pub fn truncate(&mut self, theta: f64) {
         let n = self.stage.len();
         for i in 0..n {
@@ -372,7 +374,7 @@ impl Radau {
     }
 }
 
-/// `out` = y + z in these `parts`.
+/// `out` = y + z, over `parts`.
 fn add(parts: &[Range<usize>], out: &mut [f64], y: &[f64], z: &[f64]) {
     for part in parts {
         let [y, z] = [y, z].map(|x| &x[part.clone()]);
@@ -412,8 +414,7 @@ impl DenseOutput {
     }
 }
 
-/// Coefficient matrix behind the transformation, and the weights of the embedded method, that of the derivative at the
-/// start first.
+/// Coefficient matrix behind the transformation, and the embedded weights, the first of which is for the derivative at the start.
 #[cfg(test)]
 pub(super) fn tableau() -> ([Vec<f64>; 3], [f64; 4]) {
     use nalgebra::Matrix3;

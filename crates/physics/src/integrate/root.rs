@@ -3,7 +3,7 @@
 /// Root of `f` in [`a`, `b`], a < b, where `f(a)` = `fa` and `f(b)` = `fb` differ in sign, by the Illinois form of regula falsi
 /// (Dowell & Jarratt 1971), to an interval of `width` or until `|f|` <= `small`.
 ///
-/// Returns the end of the last interval that has the sign of `fb`, so that the event has happened there.
+/// Returns the end of the final bracket where `f` has the sign of `fb`: the event has occurred there.
 pub fn find_root(
     mut a: f64,
     mut fa: f64,
@@ -16,14 +16,14 @@ pub fn find_root(
     if fb == 0.0 {
         return b;
     }
-    // Which end moved last: Illinois halves the value at an end that stays put twice in a row.
+    // Which end moved last: Illinois halves the value at an end retained twice in a row.
     let mut moved = 0_i8;
     for _ in 0..80 {
         if (b - a).abs() <= width {
             break;
         }
         let x = b - fb * (b - a) / (fb - fa);
-        // Keeps off the ends, where regula falsi would stall.
+        // Stay clear of the ends, where regula falsi would stall.
         let inset = 1e-3 * (b - a);
         let x = if x.is_finite() { x.clamp(a + inset, b - inset) } else { 0.5 * (a + b) };
         let fx = f(x);

@@ -69,17 +69,17 @@ pub struct Rosenbrock {
     u: [Vec<f64>; STAGES],
     stage: Vec<f64>,
     rate: Vec<f64>,
-    /// Time at which the Jacobian was last evaluated; a rejected step keeps it.
+    /// Time of the latest Jacobian, which is reused after a rejected step.
     linearised_at: Option<f64>,
 }
 
 impl Rosenbrock {
-    /// Size of the step that solves with `shift`.
+    /// Step size of a step that solves with `shift`.
     pub fn step_of(shift: f64) -> f64 {
         1.0 / (GAMMA * shift)
     }
 
-    /// For `dimension` components.
+    /// Stepper for `dimension` components.
     pub fn new(dimension: usize) -> Self {
         Self {
             table: Tableau::new(),
@@ -90,7 +90,7 @@ impl Rosenbrock {
         }
     }
 
-    /// Discards the Jacobian: the state was changed by something other than a step.
+    /// Discards the Jacobian after a change of state that is not a step.
     pub fn invalidate(&mut self) {
         self.linearised_at = None;
     }
@@ -267,7 +267,7 @@ mod tests {
         assert!(error < 1e-4, "{error:e}");
     }
 
-    /// y' = (1 + off) rate y, of which the Jacobian knows `rate`.
+    /// y' = (1 + off) rate y, with `rate` as its Jacobian.
     struct Off {
         rate: f64,
         off: f64,
@@ -324,7 +324,7 @@ mod tests {
                 assert!(found < 1.0, "{rate} {off}: {found}");
             }
         }
-        // Further off it is not.
+        // A larger error makes it unstable.
         assert!(amplification(-1e4, 1.0) > 1.0);
     }
 }

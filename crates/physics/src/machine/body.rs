@@ -1,11 +1,11 @@
-//! Rigid bodies and what they look like.
+//! Rigid bodies and their appearance.
 
 use std::sync::Arc;
 
 use super::{Mat3, Mesh, Quat, Vec3};
 use crate::words::words;
 
-/// A rigid body. The file places its frame; the centroid may lie elsewhere.
+/// A rigid body. The scene places its frame; the centroid may lie elsewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Unique name.
@@ -16,27 +16,27 @@ pub struct Body {
     pub centre: Vec3,
     /// Inertia about the centroid, body axes, kg m^2; symmetric positive definite.
     pub inertia: Mat3,
-    /// What to draw, body frame.
+    /// Shapes to draw, body frame.
     pub shapes: Vec<Shape>,
-    /// Density of the shapes from which mass, centroid and inertia were computed, kg/m^3; `None` where the file gives those.
+    /// Density of the shapes from which mass, centroid and inertia were computed, kg/m^3; `None` if the file gives these.
     pub density: Option<f64>,
 }
 
 impl Body {
-    /// A body of `mass`, kg, whose centroid is the origin of its frame, with the inertia about that, kg m^2, and without shapes.
+    /// A body of mass `mass` (kg) without shapes, whose centroid is the frame origin; `inertia` (kg m^2) is about the centroid.
     pub fn new(name: &str, mass: f64, inertia: Mat3) -> Self {
         Self { name: name.to_owned(), mass, centre: Vec3::zeros(), inertia, shapes: Vec::new(), density: None }
     }
 }
 
-/// What a shape represents: the view picks its colour and material.
+/// Role of a shape, which determines its colour and material in the view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A part that slides.
+    /// A sliding part.
     Slider,
-    /// A part that a drive turns: a crank.
+    /// A part turned by a drive: a crank.
     DrivingRod,
-    /// A part that follows: a coupler, a link.
+    /// A passive part: a coupler, a link.
     DrivenRod,
     /// The part that does the machine's work.
     Platform,
@@ -44,9 +44,9 @@ pub enum Role {
     Pin,
     /// A measuring tip.
     Probe,
-    /// What a part slides on.
+    /// A guide on which a part slides.
     Rail,
-    /// What stands still.
+    /// Fixed structure.
     Frame,
 }
 
@@ -66,9 +66,9 @@ words!(Role {
 pub struct Shape {
     /// Form and position.
     pub geometry: Geometry,
-    /// What it represents; `None` leaves that to what its body does ([`Scene::body_roles`]).
+    /// Role; `None` takes that of its body ([`super::Machine::body_roles`]).
     pub role: Option<Role>,
-    /// Red, green and blue (sRGB), where it is not to have the colour of its role.
+    /// Red, green and blue (sRGB), in place of the role's colour.
     pub colour: Option<[u8; 3]>,
 }
 
@@ -120,14 +120,14 @@ pub enum Geometry {
     Plate {
         /// Corners in order, in one plane.
         corners: Vec<Vec3>,
-        /// What fills it, as indices of corners: [`super::fill`].
+        /// Triangulation, as indices of corners ([`super::fill`]).
         triangles: Vec<[usize; 3]>,
         /// Thickness.
         thickness: f64,
     },
-    /// Triangles of a file.
+    /// Triangle mesh from a file.
     Mesh {
-        /// In the file's frame and unit; shapes of the same file share them.
+        /// Mesh in the file's frame and unit, shared by all shapes of that file.
         mesh: Arc<Mesh>,
         /// Length of the file's unit.
         unit: f64,

@@ -7,8 +7,8 @@ use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use crate::units::{Dimension, format_quantity, unit_names};
 
-/// With fewer fixed steps than this much of an impact is lost; twice as many resolve it. Implicit Euler contacts need more:
-/// numerical damping takes about the same share of an impact as a step does of its duration.
+/// Fewest fixed steps per impact: with fewer, much of it is lost; twice as many resolve it. Implicit Euler contacts need more:
+/// numerical damping removes about the same fraction of an impact as a step is of its duration.
 pub fn least_impact_steps(method: Method) -> u64 {
     match method {
         Method::ImexEuler => 40,
@@ -19,26 +19,25 @@ pub fn least_impact_steps(method: Method) -> u64 {
 /// Loosest tolerance at which impacts conserve energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
 
-/// Most sentences about ball joints; a last one stands for the rest.
+/// Most sentences about ball joints; one more stands for the rest.
 const MOST_LISTED: usize = 40;
 
-/// Largest difference between the restitution that a law gives and the one asked for. The paper's 0.9, of which its law makes
-/// 0.913, is within it.
+/// Largest accepted error of a law's restitution. The paper's 0.9, which its law turns into 0.913, is within it.
 const RESTITUTION_ERROR: f64 = 0.02;
 
-/// A slide's stop counts as a ball this many times as large as its depth.
+/// A slide's stop counts as a ball of this many times its depth.
 const OF_A_DEPTH: f64 = 50.0;
 
-/// An inertia is symmetric to this fraction of its largest component.
+/// Allowed asymmetry of an inertia, as a fraction of its largest component.
 const ROUNDING: f64 = 1e-9;
 
-/// What a machine that was built in code lacks; a scene file says it with its line.
+/// Fault of a machine built in code; a scene file reports it with its line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MachineFault {
     /// No body.
     #[error("a machine needs at least one body")]
     Empty,
-    /// Not one joint for each body, in body order.
+    /// The joints do not match the bodies one to one, in body order.
     #[error(
         "body {body} needs the joint on which it hangs at the same index of `joints`, with `child` = {body} (counted from 0)"
     )]
@@ -46,38 +45,38 @@ pub enum MachineFault {
         /// Index.
         body: usize,
     },
-    /// A parent that does not come before its child.
+    /// A parent does not precede its child.
     #[error("the parent of body {body} must come before it (counted from 0)")]
     Order {
         /// Index of the child.
         body: usize,
     },
-    /// A point on a body that does not exist.
+    /// A point refers to a body that does not exist.
     #[error("{what} holds body {body}, of {bodies} (counted from 0)")]
     NoBody {
-        /// What holds it.
+        /// The joint or element with that point.
         what: String,
         /// Index.
         body: usize,
         /// Number of bodies.
         bodies: usize,
     },
-    /// A coordinate of a joint that does not have it.
+    /// A joint does not have this coordinate.
     #[error("force element {element} acts on a coordinate that no joint has")]
     NoCoordinate {
-        /// Its name.
+        /// Name of the element.
         element: String,
     },
-    /// A body without inertia.
+    /// A body has no valid inertia.
     #[error("body {body}: mass must be above 0 kg, and the inertia symmetric and positive definite")]
     Inertia {
-        /// Its name.
+        /// Name of the body.
         body: String,
     },
-    /// Contact parameters that contradict one another.
+    /// Contact parameters contradict one another.
     #[error("{joint}: {fault}")]
     Contact {
-        /// Name of the ball joint; of the machine as a whole, "contact".
+        /// Name of the ball joint; "contact" for the machine as a whole.
         joint: String,
         /// The contradiction.
         fault: ContactFault,
@@ -85,10 +84,10 @@ pub enum MachineFault {
 }
 
 impl Machine {
-    /// Whether its parts fit together, as those of every scene file do.
+    /// Checks that the parts fit together, as those of every scene file do.
     ///
     /// # Errors
-    /// The first that does not.
+    /// The first fault.
     pub fn check(&self) -> Result<(), MachineFault> {
         let bodies = self.bodies.len();
         if bodies == 0 {
@@ -137,14 +136,20 @@ impl Machine {
         })
     }
 
-    /// Length that a relative tolerance multiplies, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
-    /// most 1 m. A joint that closes a loop counts as a ball joint of the scene's radius.
+    /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
+    /// most 1 m. A loop-closing joint counts as a ball joint of the scene's radius.
     pub fn length_scale(&self) -> f64 {
         let radii = self.ball_joints.iter().map(|joint| joint.contact.ball_radius);
         let closing = self.closing_joints.iter().map(|_| self.contact.ball_radius);
         let depths = self.elements.iter().filter_map(|element| match &element.kind {
             ElementKind::Stop(stop) if !element.is_on_hinge() => Some(OF_A_DEPTH * stop.depth),
-            _ => None,
+            ElementKind::Stop(_)
+            | ElementKind::Spring(_)
+            | ElementKind::Load(_)
+            | ElementKind::JointSpring(_)
+            | ElementKind::Bushing(_)
+            | ElementKind::Motor(_)
+            | ElementKind::Tyre(_) => None,
         });
         radii.chain(closing).chain(depths).fold(1.0, f64::min)
     }
@@ -159,7 +164,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Choices that are allowed but may not mean what the user expects: [`Self::doubts`], and whatever slows a run down.
+    /// Allowed choices that may not be what the user expects: [`Self::doubts`], and causes of slow stepping.
     pub fn warnings(&self) -> Vec<Warning> {
         let doubts = self.doubts().into_iter();
         let mut warnings: Vec<Warning> = doubts.map(Warning::Doubt).collect();
@@ -220,7 +225,7 @@ impl Machine {
         (rattles && loose).then_some(Doubt::Tolerance { tolerance: self.solver.tolerance, loosest: LOOSEST })
     }
 
-    /// Warns of a fixed step too long for the shortest expected impact, and recommends one that is not.
+    /// Warns of a fixed step too long for the shortest expected impact, and recommends a shorter one.
     fn step_warning(&self) -> Option<Doubt> {
         if self.solver.method.is_adaptive() {
             return None;
@@ -236,7 +241,7 @@ impl Machine {
         if self.solver.step <= duration / steps {
             return None;
         }
-        // Round to 1, 2 or 5 times a power of ten.
+        // Round down to 1, 2 or 5 times a power of ten.
         let most = duration / (2.0 * steps);
         let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
         let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
@@ -246,14 +251,13 @@ impl Machine {
             step: self.solver.step,
             duration,
             sliding: friction > 1.0,
-            // It integrates force elements explicitly.
+            // Imex Euler integrates force elements explicitly.
             stable: self.solver.method == Method::ImexEuler && friction <= 1.0 && self.elements.is_empty(),
             recommended,
         })
     }
 
-    /// Sum of the magnitudes of the forces of elements on each body, N. What the stretch of a spring adds is left out: it needs
-    /// the start poses.
+    /// Sum of the magnitudes of the element forces on each body, N, without the stretch of springs, which needs the start poses.
     fn pushes(&self) -> Vec<f64> {
         let mut pushes = vec![0.0; self.bodies.len()];
         for element in &self.elements {
@@ -264,15 +268,15 @@ impl Machine {
         pushes
     }
 
-    /// Bound on the acceleration between bodies that gravity and forces, each N on kg, can cause, m/s^2.
+    /// Bound on the relative acceleration of bodies under gravity and forces, given as pairs of N and kg, m/s^2.
     pub fn most_acceleration(&self, pushes: impl IntoIterator<Item = (f64, f64)>) -> f64 {
         let pushes = pushes.into_iter().map(|(force, mass)| force / mass);
         pushes.fold(self.gravity.norm(), |sum, push| sum + push)
     }
 
-    /// Estimated duration of the first impact of a joint with clearance, s, whose bodies gravity and the forces `pushes` (N, by
-    /// body) drive through the gap, or of the oscillation under those forces, if shorter; and how many times within it friction
-    /// could reverse sliding at the approach speed, at least 1.
+    /// Estimated duration of the first impact of a joint with clearance, s, when gravity and the forces `pushes` (N, by body)
+    /// drive its bodies through the gap, or of the oscillation under those forces, if shorter. The second value is how many times
+    /// within it friction could reverse sliding at the approach speed, at least 1.
     fn impact_duration(&self, joint: &BallJoint, pushes: &[f64]) -> (f64, f64) {
         let c = &joint.contact;
         let coefficients = contact::Coefficients::new(c, c.clearance);
@@ -311,7 +315,7 @@ impl Machine {
     /// Groups of ball joints with equal contact parameters, with their names.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
         let mut joints: Vec<_> = self.ball_joints.iter().enumerate().collect();
-        // No value is NaN: ranges have no place for it.
+        // No value is NaN: the parameter ranges exclude it.
         joints.sort_by(|a, b| a.1.contact.partial_cmp(&b.1.contact).unwrap_or(Ordering::Equal));
         let mut groups: Vec<_> = joints.chunk_by(|a, b| a.1.contact == b.1.contact).collect();
         groups.sort_by_key(|group| group[0].0);
@@ -323,10 +327,10 @@ impl Machine {
     }
 }
 
-/// Two contact parameters that are inconsistent.
+/// A contradiction between contact parameters.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ContactFault {
-    /// A ball that does not fit into its socket.
+    /// The ball does not fit into its socket.
     #[error(
         "clearance {} must be below the ball radius, {}; allowed 0 mm to below {1}; units {}",
         format_quantity(*.clearance, "mm"),
@@ -334,12 +338,12 @@ pub enum ContactFault {
         unit_names(Dimension::Length).join(", ")
     )]
     Clearance {
-        /// m.
+        /// Clearance, m.
         clearance: f64,
-        /// m.
+        /// Ball radius, m.
         ball_radius: f64,
     },
-    /// A friction ramp that ends before it begins.
+    /// The friction ramp ends before it begins.
     #[error(
         "slip_speed_low {} must be below slip_speed_high {}; units {}",
         format_quantity(*.low, "mm/s"),
@@ -347,9 +351,9 @@ pub enum ContactFault {
         unit_names(Dimension::Speed).join(", ")
     )]
     SlipSpeeds {
-        /// m/s.
+        /// Start of the ramp, m/s.
         low: f64,
-        /// m/s.
+        /// End of the ramp, m/s.
         high: f64,
     },
     /// A restitution of 0 under a law that divides by it.
@@ -358,7 +362,7 @@ pub enum ContactFault {
 }
 
 impl ContactFault {
-    /// Last parts of the keys at fault, the likelier first.
+    /// Last parts of the keys involved, the likelier cause first.
     pub fn parts(&self) -> [&'static str; 2] {
         match self {
             Self::Clearance { .. } => ["clearance", "ball_radius"],
@@ -368,12 +372,12 @@ impl ContactFault {
     }
 }
 
-/// An inconsistency of the machine's contact parameters, or of those of one of its ball joints, by index.
+/// A contradiction in the contact parameters of the machine, or of one of its ball joints, by index.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactConflict {
-    /// Ball joint; `None` for those of the machine as a whole.
+    /// Ball joint; `None` for the machine as a whole.
     pub joint: Option<usize>,
-    /// What is inconsistent.
+    /// The contradiction.
     pub fault: ContactFault,
 }
 
@@ -399,7 +403,7 @@ mod tests {
     use crate::scene::{Scene, built_in_text};
     use crate::simulate::Simulation;
 
-    /// A bob in a socket, changed.
+    /// Fault of a machine with a bob in a socket after `change`.
     fn fault(change: impl FnOnce(&mut Machine)) -> Option<MachineFault> {
         let mut machine = Machine::default();
         let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
@@ -407,7 +411,7 @@ mod tests {
         machine.ball_joints.push(BallJoint::new("S1", socket, ball));
         change(&mut machine);
         let found = machine.check().err();
-        // Nothing panics, and a simulation says the same.
+        // Nothing panics, and a simulation reports the same fault.
         let started = Simulation::new(&machine).err().map(|error| error.0);
         assert_eq!(started, found.clone().map(MechanismError::Machine));
         found

@@ -1,31 +1,31 @@
-//! Reasons in a scene's settings to doubt any result of it: numbers, and their wording.
+//! Reasons in a scene's settings to doubt its results, as numbers with their wording.
 
 use std::fmt;
 
 use crate::contact::NormalLaw;
 use crate::units::{format_quantity, format_quantity_digits};
 
-/// Why a scene's results are not to be trusted, whatever happens in the run. Its `Display` is a sentence for the user.
+/// A reason in the settings to distrust any result of a scene. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
-    /// A restitution that the normal-force law does not give.
+    /// The normal-force law does not give the requested restitution.
     Restitution {
         /// Names of the joints.
         joints: String,
         /// Their law.
         law: NormalLaw,
-        /// The restitution asked for.
+        /// Requested restitution.
         asked: f64,
-        /// What an undisturbed impact gives.
+        /// Restitution of an undisturbed impact.
         given: f64,
     },
     /// A clearance so small that the contact patch is not small compared with the ball.
     Clearance {
         /// Names of the joints.
         joints: String,
-        /// m.
+        /// Clearance, m.
         clearance: f64,
-        /// m.
+        /// Ball radius, m.
         ball_radius: f64,
     },
     /// A fixed step too long for the shortest expected impact.
@@ -34,11 +34,11 @@ pub enum Doubt {
         joint: String,
         /// `solver.step`, s.
         step: f64,
-        /// Duration of the impact, or of sliding in it until friction reverses it, s.
+        /// Duration of the impact, or of sliding within it until friction reverses it, s.
         duration: f64,
-        /// Whether `duration` is that of the sliding.
+        /// Whether `duration` refers to sliding.
         sliding: bool,
-        /// The method stays stable, but loses the impact.
+        /// Whether the method stays stable, though it does not resolve the impact.
         stable: bool,
         /// A step that is short enough, s.
         recommended: f64,
@@ -47,15 +47,15 @@ pub enum Doubt {
     Tolerance {
         /// `solver.tolerance`.
         tolerance: f64,
-        /// The loosest adequate one.
+        /// Loosest adequate tolerance.
         loosest: f64,
     },
-    /// Friction with the velocities of (13) as printed.
+    /// Friction uses the velocities of (13) as printed.
     PrintedFriction {
         /// Names of the joints.
         joints: String,
     },
-    /// More ball joints with distinct settings than are listed.
+    /// The list of ball joints with distinct settings is incomplete.
     MoreJoints,
 }
 
@@ -112,8 +112,7 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// What the user should know before a run: why its result is not to be trusted, or what makes it slow. Its `Display` is a
-/// sentence.
+/// A warning before a run: a reason to distrust its result, or a cause of slow stepping. Its `Display` is a sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
     /// A reason to doubt the result.
@@ -129,27 +128,27 @@ pub enum Warning {
     MeshUnit {
         /// Key of the shape.
         shape: String,
-        /// How many others are like it.
+        /// Number of other meshes with the same fault.
         others: usize,
         /// Length of its unit, m.
         unit: f64,
-        /// How far it reaches from its origin, m.
+        /// Largest distance from its origin, m.
         reach: f64,
-        /// How far everything else does, m.
+        /// The same distance for the rest of its body or of the machine, m.
         rest: f64,
         /// A unit that fits.
         better: &'static str,
-        /// How far it reaches with that, m.
+        /// `reach` in that unit, m.
         at_better: f64,
     },
 }
 
-/// Kind of a warning: two of the same kind differ only in numbers and names.
+/// Kind of a warning: warnings of one kind differ only in numbers and names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct WarningKind(std::mem::Discriminant<Warning>, Option<std::mem::Discriminant<Doubt>>);
 
 impl Warning {
-    /// Its kind.
+    /// Kind of this warning.
     pub fn kind(&self) -> WarningKind {
         let doubt = match self {
             Self::Doubt(doubt) => Some(std::mem::discriminant(doubt)),
@@ -158,7 +157,7 @@ impl Warning {
         WarningKind(std::mem::discriminant(self), doubt)
     }
 
-    /// Key of the parameter that it is about: `solver.step`, or without a section one that ball joints may have of their own.
+    /// Key of the parameter concerned: `solver.step`, or a key without section that ball joints may override.
     pub fn key(&self) -> Option<&'static str> {
         match self {
             Self::Doubt(Doubt::Restitution { .. }) => Some("restitution"),
@@ -171,7 +170,7 @@ impl Warning {
         }
     }
 
-    /// Whether other `[solver]` settings would remove it.
+    /// Whether other `[solver]` settings would remove the warning.
     pub fn is_about_solver(&self) -> bool {
         self.key().is_some_and(|key| key.starts_with("solver."))
     }

@@ -1,80 +1,80 @@
-//! What a driven coordinate follows: q(t) with exact first and second derivatives. The motions are in `mechanism/drives`.
+//! Drive laws: prescribed q(t) with exact first and second derivatives. The motions are in `mechanism/drives`.
 
 use crate::expression::Program;
 
-/// Law of a driven coordinate, or of whatever else follows a function of time. On a hinge lengths are angles (rad) and speeds
-/// angular speeds (rad/s).
+/// Prescribed function of time, for a joint coordinate, a motor's target or a tyre's ground. On a hinge, lengths are angles (rad)
+/// and speeds angular speeds (rad/s).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
-    /// This coordinate, from 0, of the machine's closed form.
+    /// Coordinate of the machine's closed form, by index from 0.
     ClosedForm(usize),
     /// `position` + `velocity` t.
     Constant {
-        /// At t = 0, m.
+        /// Position at t = 0, m.
         position: f64,
-        /// m/s.
+        /// Velocity, m/s.
         velocity: f64,
     },
     /// `mean` plus a sum of harmonics.
     Harmonic {
-        /// m.
+        /// Mean, m.
         mean: f64,
         /// The harmonics.
         terms: Vec<Harmonic>,
     },
-    /// From one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s^3 - 15 s^4 + 6 s^5).
+    /// Transition between two positions: with s from 0 to 1 over the duration, from + (to - from) (10 s^3 - 15 s^4 + 6 s^5).
     Ramp {
-        /// Before, m.
+        /// Initial position, m.
         from: f64,
-        /// Afterwards, m.
+        /// Final position, m.
         to: f64,
-        /// When it begins, s.
+        /// Start time, s.
         start: f64,
-        /// How long it lasts, s.
+        /// Duration, s.
         duration: f64,
     },
-    /// One bump: with s from 0 to 1 over the duration, base + height sin^3(pi s).
+    /// Single pulse: with s from 0 to 1 over the duration, base + height sin^3(pi s).
     Pulse {
-        /// Before and afterwards, m.
+        /// Position before and afterwards, m.
         base: f64,
-        /// Height of the bump above it, m.
+        /// Height of the pulse above `base`, m.
         height: f64,
-        /// When it begins, s.
+        /// Start time, s.
         start: f64,
-        /// How long it lasts, s.
+        /// Duration, s.
         duration: f64,
     },
     /// A cubic spline through points.
     Table {
-        /// Instants, s, and positions, m, in the order of time.
+        /// Times (s) and positions (m), in ascending time.
         points: Vec<[f64; 2]>,
-        /// Whether they are one period of the motion.
+        /// Whether the points span one period of the motion.
         repeats: bool,
     },
-    /// An expression of the time t.
+    /// An expression in the time t.
     Formula {
-        /// Of one variable, t, s.
+        /// Program with one variable, t in s.
         program: Program,
-        /// One of its value, m.
+        /// Length of one unit of its result, m.
         scale: f64,
-        /// Longest step that an adaptive method takes, s.
+        /// Longest step of an adaptive method, s.
         resolve: f64,
     },
 }
 
-/// amplitude sin(2 pi frequency t + phase).
+/// Harmonic amplitude sin(2 pi frequency t + phase).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
-    /// m or rad.
+    /// Amplitude, m or rad.
     pub amplitude: f64,
-    /// Hz.
+    /// Frequency, Hz.
     pub frequency: f64,
-    /// rad.
+    /// Phase, rad.
     pub phase: f64,
 }
 
 impl Drive {
-    /// The coordinate, from 0, of the machine's closed form, if it follows that.
+    /// Coordinate of the machine's closed form that this drive follows, by index from 0, if any.
     pub fn closed_form(&self) -> Option<usize> {
         match self {
             Self::ClosedForm(coordinate) => Some(*coordinate),

@@ -1,4 +1,4 @@
-//! Force elements: springs, loads, stops and whatever else loads bodies without a constraint. Their physics is in
+//! Force elements: springs, loads, stops and others that load bodies without a constraint. Their physics is in
 //! `mechanism/elements`, one file for each kind.
 
 use super::{Attachment, Drive, Freedom, Quat, Vec3};
@@ -9,112 +9,112 @@ use crate::words::words;
 pub struct Element {
     /// Unique name.
     pub name: String,
-    /// What it is.
+    /// Kind, with its parameters.
     pub kind: ElementKind,
-    /// Where it acts: at one point, or between two; of one that acts on a coordinate, the points of parent and child that the joint
-    /// connects.
+    /// Points of application: one, or two for an element between points. An element on a joint coordinate has the parent and
+    /// child points of that joint.
     pub points: Vec<Attachment>,
 }
 
 /// Kind of a force element. Adding one takes a variant here, a file in `mechanism/elements`, and its row in the scene format.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ElementKind {
-    /// Spring with a damper along the line between two points.
+    /// Spring-damper along the line between two points.
     Spring(Spring),
-    /// Force and torque from outside on a body.
+    /// External force and torque on a body.
     Load(Load),
-    /// Spring with a damper on a coordinate of a joint.
+    /// Spring-damper on a joint coordinate.
     JointSpring(JointSpring),
-    /// Stops at the ends of a coordinate of a joint.
+    /// Stops at the limits of a joint coordinate.
     Stop(Stop),
     /// Three springs along and three about axes fixed in a body.
     Bushing(Bushing),
-    /// Force or torque on a coordinate of a joint.
+    /// Force or torque on a joint coordinate.
     Motor(Motor),
-    /// Tyre of a wheel on a ground that may move.
+    /// Tyre of a wheel on ground that may move.
     Tyre(Tyre),
 }
 
-/// A coordinate of a joint on which an element acts.
+/// Joint coordinate on which an element acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointCoordinate {
     /// Index of the joint among [`super::Machine::kinematic_joints`].
     pub joint: usize,
-    /// Which of its coordinates.
+    /// The coordinate.
     pub freedom: Freedom,
 }
 
-/// What a spring exerts without its damper.
+/// Elastic characteristic of a spring.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Elastic {
-    /// preload + stiffness s at a stretch s.
+    /// preload + stiffness s, with the stretch s.
     Line {
-        /// N (N m on a hinge).
+        /// Force at zero stretch, N (N m on a hinge).
         preload: f64,
-        /// N/m (N m/rad on a hinge).
+        /// Stiffness, N/m (N m/rad on a hinge).
         stiffness: f64,
     },
-    /// A curve through points: stretch, m (rad), and tension, N (N m), in the order of the stretch.
+    /// A curve through points of stretch, m (rad), and tension, N (N m), in ascending stretch.
     Curve(Vec<[f64; 2]>),
 }
 
-/// Tension `elastic` + `damping` dl/dt along the line between two points, of which only part is left where it acts one way.
+/// Tension `elastic` + `damping` dl/dt along the line between two points, restricted to one sign if the spring is one-sided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring {
-    /// Distance of the points from which the stretch counts, m.
+    /// Distance of the points at zero stretch, m.
     pub length: f64,
-    /// By the stretch.
+    /// Tension as a function of the stretch.
     pub elastic: Elastic,
-    /// N s/m.
+    /// Damping, N s/m.
     pub damping: f64,
-    /// Which way it acts.
+    /// Direction in which it acts.
     pub side: SpringSide,
 }
 
-/// Constant where the frequency is 0, otherwise times sin(2 pi frequency t + phase).
+/// An external load: constant if the frequency is 0, otherwise times sin(2 pi frequency t + phase).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
-    /// At its point, N.
+    /// Force at its point, N.
     pub force: Vec3,
-    /// N m.
+    /// Torque, N m.
     pub torque: Vec3,
-    /// In which both are constant.
+    /// Axes of both.
     pub axes: LoadAxes,
-    /// Hz.
+    /// Frequency, Hz.
     pub frequency: f64,
-    /// rad.
+    /// Phase, rad.
     pub phase: f64,
 }
 
 /// Force or torque on the child, towards lower coordinates: `elastic` + `damping` dq/dt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointSpring {
-    /// On which it acts.
+    /// Coordinate on which it acts.
     pub on: JointCoordinate,
-    /// Coordinate from which the stretch counts, m or rad.
+    /// Coordinate at zero stretch, m or rad.
     pub position: f64,
-    /// By the stretch.
+    /// Tension as a function of the stretch.
     pub elastic: Elastic,
-    /// N s/m or N m s/rad.
+    /// Damping, N s/m or N m s/rad.
     pub damping: f64,
 }
 
-/// F = K d^1.5 (1 + a dd/dt), never below 0, d the depth beyond a limit.
+/// Stop force F = K d^1.5 (1 + a dd/dt), never below 0, with the depth d beyond a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// On which it acts.
+    /// Coordinate on which it acts.
     pub on: JointCoordinate,
-    /// Coordinates at which the stops begin, m or rad; infinite where there is none.
+    /// Lower limit of the coordinate, m or rad; infinite without a stop.
     pub lower: f64,
-    /// As `lower`.
+    /// Upper limit, likewise.
     pub upper: f64,
-    /// What a stop bears when it is pressed in slowly by `depth`, N or N m.
+    /// Quasi-static force at `depth`, N or N m.
     pub force: f64,
-    /// m or rad.
+    /// Reference depth, m or rad.
     pub depth: f64,
-    /// Speed after over speed before an impact at `speed`.
+    /// Restitution of an impact at `speed`.
     pub restitution: f64,
-    /// m/s or rad/s.
+    /// Reference impact speed, m/s or rad/s.
     pub speed: f64,
 }
 
@@ -123,57 +123,57 @@ pub struct Stop {
 pub struct Bushing {
     /// Its axes in the first body.
     pub axes: Quat,
-    /// Orientation of the second body in the first in which it exerts no torque.
+    /// Orientation of the second body relative to the first at which the torque vanishes.
     pub rotation: Quat,
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness: Vec3,
-    /// N s/m.
+    /// Damping, N s/m.
     pub damping: Vec3,
-    /// N m/rad.
+    /// Rotational stiffness, N m/rad.
     pub turning_stiffness: Vec3,
-    /// N m s/rad.
+    /// Rotational damping, N m s/rad.
     pub turning_damping: Vec3,
 }
 
 /// force + stiffness (target - q) + damping (target' - q'), clamped to the limit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motor {
-    /// On which it acts.
+    /// Coordinate on which it acts.
     pub on: JointCoordinate,
     /// Constant part, N or N m.
     pub force: f64,
-    /// N/m or N m/rad.
+    /// Stiffness, N/m or N m/rad.
     pub stiffness: f64,
-    /// N s/m or N m s/rad.
+    /// Damping, N s/m or N m s/rad.
     pub damping: f64,
-    /// Largest force or torque, either way; infinite for no limit.
+    /// Largest magnitude of the force or torque; infinite for no limit.
     pub limit: f64,
-    /// Motion that it is to follow.
+    /// Target motion.
     pub target: Option<Drive>,
 }
 
-/// k d + c dd/dt along `up` at the wheel's centre, never below 0, d the depth of the wheel in the ground.
+/// Tyre force k d + c dd/dt along `up` at the wheel's centre, never below 0, with the depth d of the wheel in the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tyre {
     /// Unit vector, world axes.
     pub up: Vec3,
-    /// Height of the centre over the ground at which it begins to push, m.
+    /// Height of the centre above ground at first contact, m.
     pub radius: f64,
-    /// N/m.
+    /// Stiffness, N/m.
     pub stiffness: f64,
-    /// N s/m.
+    /// Damping, N s/m.
     pub damping: f64,
-    /// Height of the ground along `up`; at rest in the origin if there is none.
+    /// Height of the ground along `up`; `None` is ground at rest at the origin.
     pub ground: Option<Drive>,
 }
 
-/// Axes in which a load is constant.
+/// Axes in which a load is defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LoadAxes {
-    /// Those of the world.
+    /// World axes.
     #[default]
     World,
-    /// Those of the body, with which it turns.
+    /// Body axes, which turn with the body.
     Body,
 }
 
@@ -182,7 +182,7 @@ words!(LoadAxes {
     Body => "body",
 });
 
-/// Which way a spring acts.
+/// Direction in which a spring acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SpringSide {
     /// Pushes and pulls.
@@ -201,7 +201,7 @@ words!(SpringSide {
 });
 
 impl SpringSide {
-    /// The tension that is left of one, N.
+    /// The part of a tension that this side transmits, N.
     pub fn of(self, tension: f64) -> f64 {
         match self {
             Self::Both => tension,
@@ -212,7 +212,7 @@ impl SpringSide {
 }
 
 impl Elastic {
-    /// Whether it ever exerts anything.
+    /// Whether the tension is ever nonzero.
     pub fn acts(&self) -> bool {
         match self {
             Self::Line { preload, stiffness } => *preload != 0.0 || *stiffness != 0.0,
@@ -220,7 +220,7 @@ impl Elastic {
         }
     }
 
-    /// Tension where the stretch is 0, N or N m: of a curve, on the line between the points about that.
+    /// Tension at zero stretch, N or N m; a curve is interpolated linearly.
     fn unstretched(&self) -> f64 {
         let points = match self {
             Self::Line { preload, .. } => return *preload,
@@ -234,7 +234,7 @@ impl Elastic {
 }
 
 impl Element {
-    /// The coordinate on which it acts, of one that acts on a joint.
+    /// The joint coordinate on which it acts, if any.
     pub fn coordinate(&self) -> Option<JointCoordinate> {
         match &self.kind {
             ElementKind::JointSpring(spring) => Some(spring.on),
@@ -249,16 +249,20 @@ impl Element {
         self.coordinate().is_some_and(|on| on.freedom.turns())
     }
 
-    /// The law of time that it follows, if any.
+    /// The time law that it follows, if any.
     pub fn law(&self) -> Option<&Drive> {
         match &self.kind {
             ElementKind::Motor(motor) => motor.target.as_ref(),
             ElementKind::Tyre(tyre) => tyre.ground.as_ref(),
-            _ => None,
+            ElementKind::Spring(_)
+            | ElementKind::Load(_)
+            | ElementKind::JointSpring(_)
+            | ElementKind::Stop(_)
+            | ElementKind::Bushing(_) => None,
         }
     }
 
-    /// Largest force at its points that its own values give, N: without what the motion adds.
+    /// Largest force at its points due to its own parameters, N; contributions of the motion are excluded.
     pub fn own_force(&self) -> f64 {
         let on_hinge = self.is_on_hinge();
         match &self.kind {
@@ -266,13 +270,17 @@ impl Element {
             ElementKind::Load(load) => load.force.norm(),
             ElementKind::JointSpring(spring) if !on_hinge => spring.elastic.unstretched().abs(),
             ElementKind::Motor(motor) if !on_hinge => motor.force.abs().min(motor.limit),
-            _ => 0.0,
+            ElementKind::JointSpring(_)
+            | ElementKind::Motor(_)
+            | ElementKind::Stop(_)
+            | ElementKind::Bushing(_)
+            | ElementKind::Tyre(_) => 0.0,
         }
     }
 }
 
 impl ElementKind {
-    /// Its word, that of its section in a scene file.
+    /// Name of the kind in a scene file.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Spring(_) => "spring",

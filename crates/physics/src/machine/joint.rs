@@ -1,10 +1,10 @@
-//! Joints: those that bodies hang on or that close loops, and ball-and-socket joints.
+//! Joints: tree joints, loop-closing joints, and ball-and-socket joints.
 
 use super::{Drive, Quat, Vec3};
 use crate::contact;
 use crate::words::words;
 
-/// The joint that connects `child` to `parent`: one that the child hangs on in the tree, or one that closes a loop.
+/// A joint between `child` and `parent`, in the tree or closing a loop.
 ///
 /// Pose of the child for joint coordinate q, with R the parent's (world: identity) rotation, `rotation` = R0: revolute
 /// `R_child = R Rot(axis, q) R0`, the two points coincide; prismatic `R_child = R R0`, the child's point is at the parent's
@@ -30,23 +30,23 @@ pub struct Joint {
     pub child_axis: Vec3,
     /// Child's orientation in the parent at q = 0.
     pub rotation: Quat,
-    /// Prescribes q(t), of two coordinates the first; `None` leaves it to the dynamics.
+    /// Drive of q(t), or of the first of two coordinates; `None` leaves it to the dynamics.
     pub drive: Option<Drive>,
-    /// Prescribes the second of two coordinates.
+    /// Drive of the second of two coordinates.
     pub second_drive: Option<Drive>,
-    /// Its start values; without meaning where a drive prescribes its motion.
+    /// Start values; ignored where a drive prescribes the motion.
     pub start: JointStart,
     /// Whether the view draws a pin or a rail for it.
     pub drawn: bool,
 }
 
 impl Joint {
-    /// Leaves body `child` free, at rest in the world's origin.
+    /// Free joint of body `child`, at rest at the world origin.
     pub fn free(child: usize) -> Self {
         Self::free_at(child, Vec3::zeros())
     }
 
-    /// Leaves body `child` free, at rest in `position`, m, with its axes along those of the world.
+    /// Free joint of body `child`, at rest at `position` (m), with its axes parallel to those of the world.
     pub fn free_at(child: usize, position: Vec3) -> Self {
         let start = JointStart::Pose {
             position,
@@ -57,7 +57,7 @@ impl Joint {
         Self { start, ..Self::new(JointKind::Free, None, child, Vec3::x()) }
     }
 
-    /// A hinge about the unit vector `axis`, through the origins of the frames of `child` and `parent`, the world if `None`.
+    /// A hinge about the unit vector `axis`, through the frame origins of `child` and `parent` (the world if `None`).
     pub fn revolute(parent: Option<usize>, child: usize, axis: Vec3) -> Self {
         Self::new(JointKind::Revolute, parent, child, axis)
     }
@@ -85,37 +85,37 @@ impl Joint {
         }
     }
 
-    /// The same joint, whose first coordinate follows `drive`.
+    /// The same joint with its first coordinate driven by `drive`.
     pub fn with_drive(self, drive: Drive) -> Self {
         Self { drive: Some(drive), ..self }
     }
 
-    /// The same joint of one coordinate, which starts at `position` (m or rad) with the rate `velocity`.
+    /// The same joint of one coordinate, starting at `position` (m or rad) with the rate `velocity`.
     pub fn with_start(self, position: f64, velocity: f64) -> Self {
         Self { start: JointStart::Scalar { position, velocity }, ..self }
     }
 
-    /// The points that it connects: the parent's, then the child's.
+    /// Connected points: the parent's, then the child's.
     pub fn points(&self) -> [Attachment; 2] {
         let parent = Attachment { body: self.parent, point: self.parent_point };
         let child = Attachment { body: Some(self.child), point: self.child_point };
         [parent, child]
     }
 
-    /// Its driven coordinates.
+    /// Driven coordinates with their drives.
     pub fn drives(&self) -> impl Iterator<Item = (Freedom, &Drive)> {
         let drives = [&self.drive, &self.second_drive];
         let coordinates = self.kind.freedoms().iter().zip(drives);
         coordinates.filter_map(|(freedom, drive)| Some((*freedom, drive.as_ref()?)))
     }
 
-    /// Whether time alone moves its child against its parent.
+    /// Whether the child's motion relative to its parent is a function of time alone.
     pub fn is_prescribed(&self) -> bool {
         self.kind != JointKind::Free && self.drives().count() == self.kind.freedoms().len()
     }
 }
 
-/// Kind of a tree joint.
+/// Kind of a joint other than a ball joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// No motion.
@@ -141,7 +141,7 @@ words!(JointKind {
     Universal => "universal",
 });
 
-/// What one coordinate of a joint measures.
+/// Meaning of a joint coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
     /// Displacement along the axis of a slide or a cylindrical joint, m.
@@ -157,7 +157,7 @@ pub enum Freedom {
 }
 
 impl Freedom {
-    /// The coordinate's name in files and channels.
+    /// Name of the coordinate in files and channels.
     pub fn word(self) -> &'static str {
         match self {
             Self::Slide => "position",
@@ -166,14 +166,14 @@ impl Freedom {
         }
     }
 
-    /// Whether it is an angle.
+    /// Whether the coordinate is an angle.
     pub fn turns(self) -> bool {
         self != Self::Slide
     }
 }
 
 impl JointKind {
-    /// Its coordinates; a free joint's pose has none.
+    /// Coordinates of a joint of this kind; a free joint's pose has none.
     pub fn freedoms(self) -> &'static [Freedom] {
         match self {
             Self::Fixed | Self::Free => &[],
@@ -225,7 +225,7 @@ pub struct Attachment {
 }
 
 impl Attachment {
-    /// A point of the world, m.
+    /// A world-fixed point, m.
     pub fn world(point: Vec3) -> Self {
         Self { body: None, point }
     }
@@ -253,7 +253,7 @@ pub struct BallJoint {
 }
 
 impl BallJoint {
-    /// With the default contact, and its socket drawn open towards -z.
+    /// Ball joint with default contact parameters and the drawn socket open towards -z.
     pub fn new(name: &str, socket: Attachment, ball: Attachment) -> Self {
         Self { name: name.to_owned(), socket, ball, opening: -Vec3::z(), contact: contact::Parameters::default() }
     }

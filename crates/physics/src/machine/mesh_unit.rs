@@ -1,22 +1,22 @@
-//! Meshes whose unit hardly fits the machine around them: millimetres read as metres, or the other way round.
+//! Meshes in an implausible unit: millimetres read as metres, or the reverse.
 
 use super::solid::Solid;
 use super::*;
 
-/// A mesh that reaches this many times as far as anything else in the machine has the wrong unit: a part hung by points so close
-/// together is rare, and the slip is a factor of 1000.
+/// A mesh that extends this many times as far as the rest of the machine has the wrong unit: attachment points so close together
+/// are rare, and the error is a factor of 1000.
 const LARGE: f64 = 30.0;
 
-/// So has one that reaches less than this fraction of what else belongs to its body,
+/// Smallest plausible extent of a mesh, as a fraction of the extent of the rest of its body,
 const SMALL_ON_BODY: f64 = 0.01;
-/// or than this of the machine, which may have screws.
+/// and of the machine, which may have screws.
 const SMALL_IN_MACHINE: f64 = 0.001;
 
-/// What a file is likely to be in, with what the key `unit` then says.
+/// Likely units of a file: value of the key `unit`, and length in m.
 const UNITS: [(&str, f64); 2] = [("mm", 1e-3), ("m", 1.0)];
 
 impl Machine {
-    /// The warning of the mesh whose unit fits worst, if another would make it fit.
+    /// Warning about the mesh with the least plausible unit, if another unit would fit.
     pub(super) fn mesh_unit_warning(&self) -> Option<Warning> {
         let is_mesh = |shape: &Shape| matches!(shape.geometry, Geometry::Mesh { .. });
         if !self.bodies.iter().any(|body| body.shapes.iter().any(is_mesh)) {
@@ -58,8 +58,8 @@ impl Machine {
         })
     }
 
-    /// How far from each body's origin lies what belongs to it and has no mesh, m: points where it is held or pushed, other
-    /// shapes, and the mass where the file gives it.
+    /// Largest distance from each body's origin, m, of its attachment points, its shapes other than meshes, and its mass if the
+    /// file gives that.
     fn reaches_without_meshes(&self) -> Vec<f64> {
         let mut reaches: Vec<f64> = vec![0.0; self.bodies.len()];
         for point in self.points() {
@@ -79,7 +79,7 @@ impl Machine {
         reaches
     }
 
-    /// Diagonal of the box around the points of the world to which joints and elements hold, m.
+    /// Diagonal of the bounding box of the world points of joints and elements, m.
     fn span_of_world_points(&self) -> f64 {
         let mut points = self.points().filter(|point| point.body.is_none()).map(|point| point.point);
         let Some(first) = points.next() else { return 0.0 };
@@ -87,7 +87,7 @@ impl Machine {
         (high - low).norm()
     }
 
-    /// The points of all joints and force elements.
+    /// Attachment points of all joints and force elements.
     fn points(&self) -> impl Iterator<Item = Attachment> {
         let joints = self.joints.iter().chain(&self.closing_joints).flat_map(Joint::points);
         let balls = self.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);

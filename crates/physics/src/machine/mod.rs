@@ -1,5 +1,4 @@
-//! What a machine is: bodies, joints, drives and force elements as typed data in SI units, which a program can build as well as a
-//! scene file.
+//! Machines as typed data in SI units: bodies, joints, drives and force elements, built in code or read from a scene file.
 
 mod body;
 mod check;
@@ -34,31 +33,31 @@ pub type Quat = nalgebra::UnitQuaternion<f64>;
 
 /// A mechanism and everything needed to simulate and draw it.
 ///
-/// Cut every ball joint and every joint that closes a loop, and a forest remains: each body hangs on its parent by exactly one
+/// Cutting the ball joints and the joints that close loops leaves a forest: each body is attached to its parent by exactly one
 /// entry of `joints`, and parents come before children.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
     /// Gravity, world axes, m/s^2.
     pub gravity: Vec3,
-    /// Contact parameters of the machine as a whole: those of joints that close loops, where these count as ball joints.
+    /// Contact parameters of the machine as a whole; they also apply to loop-closing joints where these count as ball joints.
     pub contact: contact::Parameters,
     /// Equations of motion.
     pub formulation: Formulation,
     /// Stepper settings.
     pub solver: Solver,
-    /// What its drives follow where they follow a closed form.
+    /// Closed-form motion that drives may follow.
     pub spcmm: Option<Spcmm>,
-    /// What the pose columns report.
+    /// Contents of the pose columns.
     pub output: Output,
-    /// How the start values are to be understood.
+    /// Interpretation of the start values.
     pub start: StartRule,
     /// Moving bodies, parents before children.
     pub bodies: Vec<Body>,
     /// One tree joint for each body, in body order: `joints[i].child == i`.
     pub joints: Vec<Joint>,
-    /// The cut joints.
+    /// Ball joints; all are cut.
     pub ball_joints: Vec<BallJoint>,
-    /// Joints that close loops: both bodies hang elsewhere. They have neither drive nor start values.
+    /// Loop-closing joints, between bodies that have their own tree joints. They have neither drive nor start values.
     pub closing_joints: Vec<Joint>,
     /// Force elements: springs, external loads.
     pub elements: Vec<Element>,
@@ -67,7 +66,7 @@ pub struct Machine {
 }
 
 impl Default for Machine {
-    /// Nothing but the world, without gravity.
+    /// The world alone, without gravity.
     fn default() -> Self {
         Self {
             gravity: Vec3::zeros(),
@@ -88,7 +87,7 @@ impl Default for Machine {
 }
 
 impl Machine {
-    /// Adds a body with the joint on which it hangs, whose `child` it becomes; its index. Parents come before children.
+    /// Adds a body with its tree joint, sets the joint's `child`, and returns the body's index. Parents come before children.
     pub fn add_body(&mut self, body: Body, joint: Joint) -> usize {
         let child = self.bodies.len();
         self.bodies.push(body);
@@ -96,14 +95,13 @@ impl Machine {
         child
     }
 
-    /// Names of the joints at which trees are cut, in the order in which they are counted: ball joints, then joints that close
-    /// loops.
+    /// Names of the cut joints in index order: ball joints, then loop-closing joints.
     pub fn cut_joints(&self) -> impl Iterator<Item = &str> {
         let balls = self.ball_joints.iter().map(|joint| joint.name.as_str());
         balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
     }
 
-    /// Whether `next` is this machine but for gravity, contacts and the stepper, which may change while it runs.
+    /// Whether `next` differs from this machine only in gravity, contacts and stepper, which may change during a run.
     pub fn differs_in_conditions_alone(&self, next: &Self) -> bool {
         let mut like_next = self.clone();
         like_next.gravity = next.gravity;
@@ -116,12 +114,12 @@ impl Machine {
         like_next == *next
     }
 
-    /// Joints besides ball joints: those that bodies hang on, then those that close loops.
+    /// Joints other than ball joints: tree joints, then loop-closing joints.
     pub fn kinematic_joints(&self) -> impl Iterator<Item = &Joint> + Clone {
         self.joints.iter().chain(&self.closing_joints)
     }
 
-    /// Driven coordinates in the order in which they are counted, each with its joint.
+    /// Driven coordinates in index order, each with its joint.
     pub fn driven(&self) -> impl Iterator<Item = (&Joint, Freedom)> {
         let of = |joint| Joint::drives(joint).map(move |(freedom, _)| (joint, freedom));
         self.joints.iter().flat_map(of)
@@ -151,7 +149,7 @@ pub struct Spcmm {
     pub driven_rod: f64,
 }
 
-/// What the pose columns report.
+/// Contents of the pose columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
     /// Index of the body whose frame is reported.

@@ -1,15 +1,15 @@
-//! What a body does, where its shapes do not say it.
+//! Default roles of bodies, from their joints and drives.
 
 use super::{Freedom, JointKind, Machine, Role};
 
 impl Machine {
-    /// Roles that shapes without one have, by body; on the world it is that of a frame.
+    /// Default role of the shapes of each body, in body order; fixed shapes default to a frame.
     pub fn body_roles(&self) -> Vec<Role> {
         let mut roles: Vec<Role> = Vec::with_capacity(self.bodies.len());
         for (body, joint) in self.joints.iter().enumerate() {
             let driven = joint.drives().next().map(|(freedom, _)| freedom);
             let role = match (joint.kind, driven) {
-                // Parents come first.
+                // Parents precede their children.
                 (JointKind::Fixed, _) => joint.parent.map_or(Role::Frame, |parent| roles[parent]),
                 (_, Some(Freedom::Slide)) => Role::Slider,
                 (_, Some(_)) => Role::DrivingRod,

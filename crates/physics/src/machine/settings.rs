@@ -1,9 +1,9 @@
-//! How a machine is to be simulated: form of the equations, start, stepper.
+//! Simulation settings of a machine: formulation, start rule, stepper.
 
 use crate::integrate::Method;
 use crate::words::words;
 
-/// How the start values of the joints are to be understood.
+/// Interpretation of the joints' start values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartRule {
     /// Exactly as the file gives them.
@@ -12,8 +12,8 @@ pub enum StartRule {
     /// Initial guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities that
     /// follow from the drives.
     Ideal,
-    /// As [`Self::Ideal`], and then every ball lies on the wall of its socket where the mechanism without play would press it,
-    /// as deep as that force needs.
+    /// As [`Self::Ideal`], with every ball then moved onto its socket wall, in the direction and to the penetration given by the
+    /// joint force of the mechanism without play.
     Settled,
 }
 
@@ -42,7 +42,7 @@ words!(Formulation {
 pub enum Preset {
     /// Fast, rough.
     Preview,
-    /// The fastest that keeps impacts resolved.
+    /// The fastest that resolves impacts.
     RealTime,
     /// For figures.
     Accurate,
@@ -60,9 +60,9 @@ words!(Preset {
 /// Stepper settings. An explicit method, step or tolerance takes precedence over the preset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
-    /// Named point; fills in what is not given.
+    /// Preset, which supplies the settings not given.
     pub preset: Option<Preset>,
-    /// Method in force.
+    /// Effective method.
     pub method: Method,
     /// Fixed step, s; the first step of an adaptive method.
     pub step: f64,
@@ -73,7 +73,7 @@ pub struct Solver {
 }
 
 impl Default for Solver {
-    /// The automatic choice of methods at a tolerance of 1e-6.
+    /// Automatic selection of the method, at a tolerance of 1e-6.
     fn default() -> Self {
         Self { preset: None, method: Method::Automatic, step: 10e-6, tolerance: 1e-6, energy_ledger: true }
     }

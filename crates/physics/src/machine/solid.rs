@@ -1,4 +1,4 @@
-//! Mass properties of the forms that shapes have: what a body of one density weighs.
+//! Mass properties of shapes of uniform density.
 
 use super::{Geometry, Mat3, Mesh, Shape, Vec3};
 use std::f64::consts::PI;
@@ -15,7 +15,7 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// Of one form.
+    /// Volume and moments of one shape.
     pub fn of(geometry: &Geometry) -> Self {
         match geometry {
             Geometry::Sphere { centre, radius } => {
@@ -62,7 +62,7 @@ impl Solid {
         }
     }
 
-    /// Several of them; where two overlap, the volume counts twice.
+    /// Sum of several solids; overlapping volume counts twice.
     pub fn together(parts: impl IntoIterator<Item = Self>) -> Self {
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
         for part in parts {
@@ -74,7 +74,7 @@ impl Solid {
         Self::new(volume, centre, second - centre * centre.transpose() * volume)
     }
 
-    /// All shapes of a body.
+    /// Sum over all shapes of a body.
     pub fn of_shapes(shapes: &[Shape]) -> Self {
         Self::together(shapes.iter().map(|shape| Self::of(&shape.geometry)))
     }
@@ -84,7 +84,7 @@ impl Solid {
         Mat3::identity() * self.second.trace() - self.second
     }
 
-    /// Distance of the centroid from the origin and the radius of gyration about it, added, m: about how far it reaches.
+    /// Approximate extent from the origin, m: distance of the centroid plus radius of gyration about it.
     pub fn reach(&self) -> f64 {
         self.centre.norm() + (self.second.trace() / self.volume).sqrt()
     }
@@ -100,7 +100,7 @@ impl Solid {
         Self::new(volume, 0.5 * (from + to), round(&axis, square) * volume)
     }
 
-    /// What a closed mesh encloses: tetrahedra with a common corner, those seen from behind counted negative.
+    /// Interior of a closed mesh: tetrahedra with a common vertex and signed volumes.
     fn inside(mesh: &Mesh) -> Self {
         let origin = mesh.middle();
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
@@ -117,7 +117,7 @@ impl Solid {
         Self::new(volume, Vec3::from(origin.map(f64::from)) + centre, second)
     }
 
-    /// A polygon as the triangles that fill it, extruded.
+    /// Extruded polygon, given by its triangulation.
     fn plate(corners: &[Vec3], triangles: &[[usize; 3]], thickness: f64) -> Self {
         let triangles = triangles.iter().map(|&[i, j, k]| {
             let origin = corners[i];
@@ -155,7 +155,7 @@ mod tests {
     use crate::machine::Quat;
     use crate::scene::mesh::Format;
 
-    /// Whether `point` lies in the form: written from its definition.
+    /// Whether `point` lies in the shape, from the shape's definition.
     fn holds(geometry: &Geometry, point: &Vec3) -> bool {
         let on_axis = |from: &Vec3, to: &Vec3| {
             let (axis, length) = direction(from, to);
@@ -212,7 +212,7 @@ mod tests {
                 thickness: 0.2,
             },
         ];
-        // Midpoints of cells.
+        // Midpoint rule.
         const CELLS: i32 = 120;
         let size = 2.0 / f64::from(CELLS);
         let at = |i: i32| (f64::from(i) + 0.5) * size - 1.0;
@@ -257,7 +257,7 @@ mod tests {
         assert!((whole.inertia() - both.inertia()).amax() < 1e-16 && both.centre.norm() < 1e-16);
     }
 
-    /// A shape of the OBJ file `text`, in millimetres, turned and shifted.
+    /// A shape from the OBJ file `text`, in millimetres, rotated and shifted.
     fn of_file(text: &str) -> Geometry {
         let alone = |_: &str| Err(String::new().into());
         let mesh = Format::Obj.read(text.as_bytes(), &alone).unwrap();
@@ -270,7 +270,7 @@ mod tests {
         }
     }
 
-    /// Deviations of volume and inertia from those of the form, relative, and of the centroid from `position`, m.
+    /// Relative errors of volume and inertia against those of the form, and distance of the centroid from `position`, m.
     fn off(mesh: &Geometry, form: &Geometry) -> [f64; 3] {
         let Geometry::Mesh { position, rotation, .. } = mesh else { panic!("a mesh") };
         let (found, wanted) = (Solid::of(mesh), Solid::of(form));
@@ -322,7 +322,7 @@ mod tests {
             }
             off(&of_file(&text), &ball)
         });
-        // The polyhedron lies within the ball, by a part that falls with the square of its edges.
+        // The polyhedron is inscribed in the ball; its error falls with the square of the edge length.
         assert!(errors[1][0] < 2e-3 && errors[1][1] < 1e-8 && errors[1][2] < 3e-3, "{errors:?}");
         for i in [0, 2] {
             let order = errors[0][i] / errors[1][i];

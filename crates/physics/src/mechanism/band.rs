@@ -1,9 +1,9 @@
-//! Banded matrices of 3 x 3 blocks, eliminated in place without exchanging rows. Allocates nothing.
+//! Banded matrices of 3 x 3 blocks, eliminated in place without pivoting. Allocates nothing.
 
 use crate::machine::{Mat3, Vec3};
 use std::ops::Range;
 
-/// Which blocks of a banded matrix may differ from zero, before its elimination or after, and where they stand, row by row.
+/// Sparsity pattern of a banded block matrix and of its factors, and the storage index of each block, row by row.
 #[derive(Default)]
 pub struct Band {
     size: usize,
@@ -12,13 +12,13 @@ pub struct Band {
 }
 
 impl Band {
-    /// With room for so many rows of blocks, none further than `reach` from the diagonal.
+    /// With capacity for `size` block rows of bandwidth `reach`.
     pub fn with_room(size: usize, reach: usize) -> Self {
         Self { filled: Vec::with_capacity(Self::places(size, reach)), ..Self::default() }
     }
 
-    /// Takes a matrix of `size` rows, whose blocks (i, j) differ from zero on the diagonal and, at most `reach` away from it, where
-    /// `coupled` says so. Two legs of a platform, say, couple through it alone.
+    /// Sets the pattern of a matrix with `size` block rows: block (i, j) may be nonzero on the diagonal and, within bandwidth
+    /// `reach`, where `coupled(i, j)`. Two legs of a platform, for example, couple only through it.
     pub fn arrange(&mut self, size: usize, reach: usize, coupled: impl Fn(usize, usize) -> bool) {
         (self.size, self.reach) = (size, reach);
         self.filled.clear();
@@ -39,27 +39,27 @@ impl Band {
         }
     }
 
-    /// Rows of blocks.
+    /// Number of block rows.
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// Number of places for blocks of so many rows.
+    /// Storage for `size` block rows, in blocks.
     pub fn places(size: usize, reach: usize) -> usize {
         size * (2 * reach + 1)
     }
 
-    /// Number of places for blocks.
+    /// Storage in use, in blocks.
     pub fn len(&self) -> usize {
         Self::places(self.size, self.reach)
     }
 
-    /// Place of block (`i`, `j`).
+    /// Storage index of block (`i`, `j`).
     pub fn at(&self, i: usize, j: usize) -> usize {
         i * (2 * self.reach + 1) + j + self.reach - i
     }
 
-    /// Columns of row `i` that may differ from zero.
+    /// Columns of row `i` that may be nonzero.
     pub fn row(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
         self.within(i, i.saturating_sub(self.reach)..self.end(i))
     }
@@ -76,7 +76,7 @@ impl Band {
         (i + self.reach + 1).min(self.size)
     }
 
-    /// Factors `blocks`; they become NaN where a diagonal block is singular.
+    /// Factors `blocks` in place; they become NaN if a diagonal block is singular.
     pub fn factor(&self, blocks: &mut [Mat3]) {
         for k in 0..self.size {
             let inverse = blocks[self.at(k, k)].try_inverse().unwrap_or_else(|| Mat3::from_element(f64::NAN));
@@ -123,7 +123,7 @@ mod tests {
     fn it_solves_what_it_was_given() {
         for (size, reach) in [(0, 0), (1, 0), (5, 1), (6, 5)] {
             let number = |n: usize| libm::sin(1.0 + n as f64);
-            // Some are zero, of which a few fill in.
+            // Some blocks are zero, and a few of those fill in.
             let coupled = |i, j| (i + 2 * j) % 3 != 0;
             let mut band = Band::with_room(size, reach);
             band.arrange(size, reach, coupled);

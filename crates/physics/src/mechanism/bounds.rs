@@ -1,8 +1,7 @@
 //! Cost of a scene's equations, counted in time linear in its size and before anything is allocated.
 //!
-//! The matrices are sparse, but fill in for a body that carries many joints or for a long row of hinges: memory then grows
-//! with the square of the size, and the cost of an evaluation with its cube. `docs/scene-format.md` says what the limits
-//! mean for such scenes.
+//! The matrices are sparse, but fill in for a body that carries many joints or for a long row of hinges. Memory then grows with
+//! the square of the size, and the cost of an evaluation with its cube. `docs/scene-format.md` states the limits for such scenes.
 
 use super::MechanismError;
 use super::factor::NONE;
@@ -14,14 +13,14 @@ use crate::machine::{Formulation, Machine, StartRule};
 
 /// Maximum number of matrix entries of one scene: 32 MiB.
 pub const MOST_ENTRIES: u64 = 1 << 22;
-/// Approximate maximum number of multiplications per evaluation: some 40 ms on a processor of 2020.
+/// Approximate maximum number of multiplications per evaluation: about 40 ms on a 2020 processor.
 pub const MOST_PRODUCTS: u64 = 1 << 25;
 
 /// Multiplications per ancestor of a body, and per pair of constraint rows on a body.
 const OF_AN_ANCESTOR: u64 = 20;
 const OF_A_PAIR: u64 = 25;
 
-/// What exceeded a limit.
+/// The task whose cost exceeds a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CostOf {
     /// Evaluating the equations.
@@ -30,12 +29,12 @@ pub enum CostOf {
     /// Closing the joints at the start.
     #[error("assembling the start")]
     Assembly,
-    /// The method that is implicit in the contacts.
+    /// The method that steps contacts implicitly.
     #[error("solver.method imex-euler")]
     ImplicitContacts,
 }
 
-/// What a limit counts.
+/// The quantity limited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Counted {
     /// Matrix entries.
@@ -46,7 +45,7 @@ pub enum Counted {
     Products,
 }
 
-/// What to do about a scene that is too costly.
+/// Remedy for a scene that is too costly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Advice {
     /// Another formulation.
@@ -75,7 +74,7 @@ impl Cost {
         self.products += products;
     }
 
-    /// Adds storing and factoring an envelope matrix whose rows begin at these columns.
+    /// Adds the cost of storing and factoring an envelope matrix whose rows begin at the columns `first`.
     fn add_envelope(&mut self, first: &[u64]) {
         for (i, f) in (0_u64..).zip(first) {
             self.entries += i - f + 1;
@@ -93,7 +92,7 @@ impl Cost {
         self.entries <= MOST_ENTRIES && self.products <= MOST_PRODUCTS
     }
 
-    /// Cost of the equations in one `form`; as a tree, with the joints `closed` as constraints.
+    /// Cost of the equations in formulation `form`; in tree coordinates, with the joints `closed` as constraints.
     pub fn of(form: Formulation, machine: &Machine, model: &Model, closed: &[usize]) -> Self {
         match form {
             Formulation::Tree => Self::of_tree(model, closed),
@@ -104,7 +103,7 @@ impl Cost {
     /// Cost of the `tree` formulation with these joints closed.
     fn of_tree(model: &Model, joints: &[usize]) -> Self {
         let mut cost = Self::default();
-        // Coordinates visited when solving with each block's mass matrix.
+        // Number of coordinates visited by a solve with each block's mass matrix.
         let mut solution = Vec::with_capacity(model.blocks.len());
         for block in &model.blocks {
             let n = block.n as u64;
@@ -167,7 +166,7 @@ impl Cost {
         cost.add_envelope(&rows);
         let n = model.nv as u64;
         if n > 0 && rows.len() as u64 == n {
-            // Determinant that tells which side of a singular pose the loops are on.
+            // The determinant, whose sign tells the side of a singular pose.
             cost.add(n * n, n.saturating_pow(3) / 3);
         }
         cost
@@ -199,17 +198,17 @@ impl Cost {
         cost
     }
 
-    /// Cost of contacts that are stepped implicitly: `joints`, each coupled with `reach` joints before and after it, with
+    /// Cost of stepping contacts implicitly: `joints` contacts, each coupled with `reach` joints before and after it, with
     /// columns of `width` numbers in total.
     pub fn of_implicit_contacts(joints: usize, reach: usize, width: usize) -> Self {
         let (joints, reach, width) = (joints as u64, reach as u64, width as u64);
         let band = joints * (2 * reach + 1);
-        // Entries: three 3 x 3 blocks; three columns, and ten numbers for what a coordinate moves.
-        // Products: one elimination, and the blocks.
+        // Entries: three 3 x 3 blocks; three columns, and ten numbers per Jacobian column. Products: one elimination, and the
+        // blocks.
         Self { entries: 27 * band + 13 * width, products: 40 * joints * (reach + 1) * (reach + 1) + 250 * band }
     }
 
-    /// Rejects a cost beyond a limit; `of` says what it is the cost of.
+    /// Rejects a cost beyond a limit; `of` names the task.
     ///
     /// # Errors
     /// The amount needed, and the limit.
@@ -225,34 +224,34 @@ impl Cost {
     }
 }
 
-/// Approximate time of one evaluation, ns on one core of a server, as measured on chains, the paper's mechanism and machines
-/// with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass matrices and constraint
-/// rows. Only its ratio to the times of algebra counts.
+/// Approximate time of one evaluation, ns on one core of a server, measured on chains, the paper's mechanism and machines with
+/// ideal joints: a constant, plus terms per velocity coordinate, per joint with clearance, and per multiplication in mass
+/// matrices and constraint rows. Only its ratio to the times of linear algebra matters.
 pub fn evaluation_time(machine: &Machine, model: &Model) -> f64 {
     let cost = Cost::of(machine.formulation, machine, model, &model.ideal_joints);
     let loose = model.joints.len() - model.ideal_joints.len();
     600.0 + 6.0 * model.nv as f64 + 60.0 * loose as f64 + 0.8 * cost.products as f64
 }
 
-/// The same of linearising, factoring and solving an implicit step whose contacts and elements couple so many velocity
-/// `coordinates`, and whose elimination took so many `products` for the real shift.
+/// Approximate time to linearise, factor and solve an implicit step, ns. `coordinates` is the number of velocity coordinates
+/// coupled by contacts and elements, `products` that of multiplications in the elimination with the real shift.
 pub fn implicit_time(coordinates: usize, products: usize) -> f64 {
     800.0 * coordinates as f64 + 6.0 * products as f64
 }
 
-/// The same of a step with friction alone implicit, for every ball that touches.
+/// Approximate time per ball in contact of a step with only friction implicit, ns.
 pub const FRICTION_TIME: f64 = 1200.0;
 
-/// The implicit methods refuse more velocity coordinates than this: they hold matrices over all of them.
+/// Maximum number of velocity coordinates of the implicit methods, which hold dense matrices.
 pub const LARGEST_DENSE: usize = 1024;
-/// Where all coordinates are coupled, an implicit step with more of them than this costs more than many explicit ones: the
+/// If all coordinates are coupled, an implicit step with more of them than this costs more than many explicit steps, and the
 /// automatic choice stays explicit.
 pub const LARGEST_COUPLED: usize = 96;
 
-/// Rejects a scene whose equations or whose assembly at the start exceed the limits.
+/// Rejects a scene whose equations, or whose assembly at the start, exceed the limits.
 ///
 /// # Errors
-/// As [`Cost::check`]; the advice is the other formulation if that one is within the limits.
+/// As [`Cost::check`]; advises the other formulation if it is within the limits.
 pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
     let closed = match model.start {
         StartRule::AsGiven | StartRule::Settled => model.ideal_joints.clone(),
@@ -260,7 +259,7 @@ pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
     };
     let cost = |form| Cost::of(form, machine, model, &closed);
     let own = cost(machine.formulation);
-    // Joints are closed in the coordinates of the tree, whatever the formulation.
+    // Assembly uses tree coordinates in every formulation.
     let assembly = match closed.is_empty() && model.closures.is_empty() {
         true => Cost::default(),
         false => cost(Formulation::Tree),
@@ -294,7 +293,7 @@ mod tests {
 
     #[test]
     fn sparse_scenes_grow_linearly_and_dense_ones_are_known_to_be_dense() {
-        // Growth of (numbers, multiplications) in the tree and the lagrange form from n to 2n parts: 2 is linear.
+        // Growth of (entries, multiplications) from n to 2n parts, for tree and lagrange: 2 is linear.
         for (kind, tree, lagrange) in [
             ("free bodies", [1.0, 1.0], [1.0, 1.0]),
             ("a chain", [2.0, 2.0], [2.0, 2.0]),
@@ -314,7 +313,7 @@ mod tests {
         }
     }
 
-    /// Whether `kind` with `n` parts is accepted, or the message with which it is rejected.
+    /// Whether `kind` with `n` parts is accepted, or the error message.
     fn taken(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &changes).expect("a scene");

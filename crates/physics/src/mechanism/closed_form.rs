@@ -1,5 +1,5 @@
-//! A motion that is known in closed form: driven coordinates, and the pose of the output body where no joint has play, as
-//! functions of time alone.
+//! Motion known in closed form, as functions of time alone: driven coordinates and, where no joint has play, the pose of the
+//! output body.
 
 use std::fmt::Debug;
 
@@ -7,7 +7,7 @@ use super::MechanismError;
 use crate::jet::Jet;
 use crate::machine::{Mat3, Vec3};
 
-/// Most coordinates that one closed form drives.
+/// Maximum number of coordinates driven by one closed form.
 pub const MOST_DRIVEN: usize = 3;
 
 /// The motion at one instant.
@@ -17,7 +17,7 @@ pub struct ClosedMotion {
     pub driven: [Jet; MOST_DRIVEN],
     /// Origin of the output body, m.
     pub position: [Jet; 3],
-    /// Its rotation.
+    /// Rotation of the output body.
     pub rotation: Mat3,
     /// Its angular velocity, rad/s.
     pub angular_velocity: Vec3,
@@ -25,14 +25,14 @@ pub struct ClosedMotion {
     pub angular_acceleration: Vec3,
 }
 
-/// Drives whose law, and the motion of the output body with it, are known for every instant.
+/// Closed-form laws of the drives, with the resulting motion of the output body.
 pub trait ClosedForm: Debug + Send + Sync {
     /// The motion at `t`.
     fn at(&self, t: f64) -> ClosedMotion;
 
-    /// Checks that the mechanism can follow it at every instant.
+    /// Checks that the mechanism can follow the motion at every instant.
     ///
     /// # Errors
-    /// Where it cannot.
+    /// The mechanism cannot follow it.
     fn check(&self) -> Result<(), MechanismError>;
 }

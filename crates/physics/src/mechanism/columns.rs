@@ -1,4 +1,4 @@
-//! Jacobian columns of a contact: how each coordinate moves it.
+//! Jacobian columns of a contact, one per coordinate.
 
 use super::equations::Equations;
 use super::model::{Anchor, BallJoint, Model};
@@ -18,13 +18,13 @@ pub struct Column {
     pub turn: Vec3,
 }
 
-/// Centres of ball and socket, in that order, each with its radius to the wall, m.
+/// Centres of ball and socket, in that order, each with the distance from it to the wall, m.
 pub fn contact_sides(joint: &BallJoint, c: &Coefficients) -> [(Anchor, f64); 2] {
     [(joint.ball, c.ball_radius), (joint.socket, c.ball_radius + c.clearance)]
 }
 
-/// Fills `columns`: how each coordinate moves the first of two points relative to the second, and likewise the points of
-/// their bodies offset from them along `n`.
+/// Fills `columns` with the velocity of the first point relative to the second per unit rate of each coordinate, and likewise for
+/// the points of their bodies offset from them along `n`.
 pub fn collect_columns(
     columns: &mut Vec<Column>,
     model: &Model,
@@ -53,7 +53,7 @@ pub fn collect_columns(
     }
 }
 
-/// The same for two points that coincide, without the coordinates that move both bodies as one.
+/// The same for two coincident points, without the coordinates that move both bodies as one.
 pub fn collect_relative_columns(
     columns: &mut Vec<Column>,
     model: &Model,
@@ -68,7 +68,7 @@ pub fn collect_relative_columns(
         let point = m.position + m.rotation * anchor.offset;
         let of_first = columns.len();
         equations.visit_columns(model, anchor.body, &point, &mut |coordinate, velocity, omega| {
-            // Both walks go down to the root: what they share comes in the same order.
+            // Both walks end at the root and visit the shared coordinates in the same order.
             let own = columns[shared..of_first].iter().position(|c| c.coordinate == coordinate);
             if let Some(at) = own {
                 columns[shared + at].coordinate = SHARED;

@@ -1,5 +1,5 @@
-//! Joints that close loops in tree coordinates: three constraint rows for each ideal ball joint, (45), up to six for others, solved
-//! for their Lagrange multipliers, and the projection that keeps closed loops closed.
+//! Loop closure in tree coordinates: three constraint rows for each ideal ball joint, (45), up to six for other joints, solved
+//! for their Lagrange multipliers, and the projection onto the constraints.
 
 use super::kinematics::{Kinematics, Wrench, part};
 use super::model::{Anchor, BodyIndex, Model};
@@ -9,7 +9,7 @@ use super::tree::{Tree, visit_columns};
 use crate::machine::{Mat3, Vec3};
 use std::ops::Range;
 
-/// The rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n row-major from `offset`.
+/// Rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n, row-major from `offset`.
 struct Side {
     block: usize,
     offset: usize,
@@ -17,7 +17,7 @@ struct Side {
 }
 
 impl Side {
-    /// Its three rows of the Jacobians or of W.
+    /// The three rows in `of`: the Jacobians or W.
     #[inline]
     fn rows<'a>(&self, of: &'a [f64]) -> [&'a [f64]; 3] {
         let rows = &of[self.offset..][..3 * self.n];
@@ -35,17 +35,17 @@ impl Side {
     }
 }
 
-/// One part of a joint that closes a loop: of its points or of its orientation. Its three rows in the blocks are the relative
-/// velocity, or angular velocity, of its bodies along the world's axes; what it holds are up to three directions of these.
+/// Translational or rotational part of a loop-closing joint. Its three rows in the blocks are the relative velocity, or angular
+/// velocity, of its bodies in world axes; up to three directions of these are constrained.
 struct Unit {
     /// Index of the joint among those that close loops.
     closure: usize,
     turns: bool,
     rows: Vec<Rows>,
-    /// Its first constraint row, and how many there are.
+    /// First constraint row, and number of rows.
     first: usize,
     count: usize,
-    /// Directions of these, and violation with its first and second derivative, at the latest motion.
+    /// Constrained directions, and violation with its first and second derivative, at the latest motion.
     along: [Vec3; 3],
     state: [[f64; 3]; 3],
 }
@@ -55,7 +55,7 @@ impl Unit {
         self.first..self.first + self.count
     }
 
-    /// Looks at the motion of the bodies.
+    /// Updates directions and violations.
     fn measure(&mut self, model: &Model, motion: &[Kinematics]) {
         let pair = &model.closures[self.closure];
         let (c, p) = (&motion[pair.child.body], &motion[pair.parent.body]);
@@ -69,22 +69,22 @@ impl Unit {
         }
     }
 
-    /// Force, or torque, of these multipliers of all rows.
+    /// Force or torque of this unit, given the multipliers of all rows.
     fn load(&self, multipliers: &[f64]) -> Vec3 {
         let own = self.along.iter().zip(&multipliers[self.range()]);
         own.map(|(along, x)| along * *x).sum()
     }
 }
 
-/// Constraint rows of a set of ball joints and of all joints that close loops.
+/// Constraint rows of a set of ball joints and of all other loop-closing joints.
 pub struct Constraints {
     joints: Vec<usize>,
-    /// After the ball joints.
+    /// Units follow the ball joints.
     units: Vec<Unit>,
     sides: Vec<Vec<Side>>,
-    /// (i, j, side of i, side of j) with j <= i for every shared block, of ball joints alone.
+    /// (i, j, side of i, side of j) with j <= i for every shared block, between ball joints.
     pairs: Vec<(usize, usize, usize, usize)>,
-    /// The same where i is not a ball joint.
+    /// The same if i is a unit.
     unit_pairs: Vec<(usize, usize, usize, usize)>,
     jacobian: Vec<f64>,
     weighted: Vec<f64>,
@@ -102,7 +102,7 @@ pub struct Constraints {
 }
 
 impl Constraints {
-    /// Rows of the ball joints with these indices and of the joints that close loops.
+    /// Rows of the ball joints with these indices and of all other loop-closing joints.
     pub fn new(model: &Model, joints: &[usize]) -> Self {
         let mut total = 0;
         let mut count = 3 * joints.len();
@@ -189,13 +189,13 @@ impl Constraints {
         }
     }
 
-    /// Whether the Jacobian of the latest factorisation, if square, has a positive determinant: the sign changes when the
-    /// loops pass through a singular pose.
+    /// Whether the Jacobian of the latest factorisation, if square, has a positive determinant. The sign changes when the loops
+    /// pass through a singular pose.
     pub fn is_determinant_positive(&mut self, model: &Model) -> bool {
         self.is_minor_positive(model, Some)
     }
 
-    /// The same for a subset of as many rows as coordinates: `place` maps a row to its place in the square matrix.
+    /// The same for a subset of as many rows as coordinates; `place` maps a row to its index in the square matrix.
     pub fn is_minor_positive(&mut self, model: &Model, place: impl Fn(usize) -> Option<usize>) -> bool {
         let n = model.nv;
         let a = &mut self.square;
@@ -229,7 +229,7 @@ impl Constraints {
         super::factor::is_determinant_positive(a, n)
     }
 
-    /// Treats the rows as dependent from now on, with a rank of at most `rank`.
+    /// From now on treats the rows as dependent, with a rank of at most `rank`.
     pub fn treat_as_dependent(&mut self, rank: usize) {
         let units = self.units_of_rows();
         let group = units.flat_map(|rows| rows.clone().map(move |_| rows.start));
@@ -243,13 +243,13 @@ impl Constraints {
         self.matrix.is_dependent()
     }
 
-    /// Number of independent rows: as found by the latest factorisation if rows are treated as dependent, else all.
+    /// Number of independent rows: that of the latest factorisation if rows are treated as dependent, else all.
     pub fn rank(&self) -> usize {
         self.matrix.rank()
     }
 
-    /// Whether the reaction of the `k`-th joint is unique at the latest factorisation: of the ball joints, then of the joints that
-    /// close loops.
+    /// Whether the reaction of joint `k` is unique at the latest factorisation; ball joints come first, then other loop-closing
+    /// joints.
     pub fn is_unique(&self, k: usize) -> bool {
         let rows = match k.checked_sub(self.joints.len()) {
             None => 3 * k..3 * k + 3,
@@ -258,7 +258,7 @@ impl Constraints {
         self.matrix.is_unique(rows.start, rows.len())
     }
 
-    /// Rows of each ball joint, then of the points and of the orientation of each joint that closes a loop.
+    /// Row ranges: each ball joint, then the translational and rotational part of each other loop-closing joint.
     fn units_of_rows(&self) -> impl Iterator<Item = Range<usize>> {
         let balls = (0..self.joints.len()).map(|k| 3 * k..3 * k + 3);
         balls.chain(self.units.iter().map(Unit::range))
@@ -294,7 +294,7 @@ impl Constraints {
         Vec3::from_column_slice(&self.multipliers[3 * k..3 * k + 3])
     }
 
-    /// Adds what `multipliers` of all rows exert on the bodies to `wrench`.
+    /// Adds the loads exerted on the bodies by `multipliers` of all rows to `wrench`.
     pub fn load(&self, model: &Model, multipliers: &[f64], motion: &[Kinematics], wrench: &mut [Wrench]) {
         let mut push = |body: BodyIndex, arm: Vec3, force: Vec3| {
             let w = &mut wrench[body];
@@ -323,13 +323,13 @@ impl Constraints {
         }
     }
 
-    /// Force, N, and torque, N m, of the `c`-th joint that closes a loop on its child.
+    /// Force, N, and torque, N m, exerted on its child by the `c`-th loop-closing joint.
     pub fn closure_load(&self, c: usize) -> [Vec3; 2] {
         [2 * c, 2 * c + 1].map(|unit| self.units[unit].load(&self.multipliers))
     }
 
-    /// Computes the Jacobians and factors J M^-1 J^T for a tree that has been moved forward and assembled at (t, q); does
-    /// nothing if the latest call was for the same (t, q).
+    /// Computes the Jacobians and factors J M^-1 J^T, unless the latest call was for the same (t, q). Kinematics and mass
+    /// matrices of the tree must be up to date at (t, q).
     fn factor(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64]) {
         if self.is_factored(t, q) {
             return;
@@ -402,7 +402,7 @@ impl Constraints {
         }
     }
 
-    /// The blocks of J M^-1 J^T that belong to units.
+    /// Blocks of J M^-1 J^T that involve units.
     fn add_unit_blocks(&mut self) {
         let balls = self.joints.len();
         let world = [Vec3::x(), Vec3::y(), Vec3::z()];
@@ -417,7 +417,7 @@ impl Constraints {
             let block = Mat3::from_fn(|r, c| block[r][c]);
             let unit = &self.units[i - balls];
             if i == j {
-                // Of both sides, if it has two.
+                // Sum over both sides, if there are two.
                 let before = if referred.0 == i { referred.1 } else { 0.0 };
                 referred = (i, before + block.trace());
                 self.matrix.refer(unit.first, referred.1);
@@ -464,7 +464,7 @@ impl Constraints {
         }
     }
 
-    /// The same for the three rows of these sides.
+    /// The same for the three rows of `sides`.
     #[inline(always)]
     fn add_weighted_rows(&self, model: &Model, sides: &[Side], &[x1, x2, x3]: &[f64; 3], v: &mut [f64]) {
         for side in sides {
@@ -476,8 +476,8 @@ impl Constraints {
         }
     }
 
-    /// Looks at the motion of the bodies, and puts the negative of each unit's violation (`order` 0), of its rate (1) or second
-    /// derivative (2) to its multipliers. Returns the largest.
+    /// Sets each unit's multipliers to the negative of its violation (`order` 0), its rate (1) or its second derivative (2) at
+    /// `motion`. Returns the largest magnitude.
     fn put_unit_residuals(&mut self, model: &Model, motion: &[Kinematics], order: usize) -> f64 {
         let mut largest: f64 = 0.0;
         for unit in &mut self.units {
@@ -490,8 +490,8 @@ impl Constraints {
         largest
     }
 
-    /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and keeps the multipliers.
-    /// The tree must have been moved forward (bias accelerations) and assembled at the same state.
+    /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and stores the multipliers. Bias
+    /// accelerations and mass matrices of the tree must be up to date at the same state.
     pub fn correct(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64], vdot: &mut [f64]) {
         self.factor(model, tree, t, q);
         for k in 0..self.joints.len() {
@@ -513,8 +513,8 @@ impl Constraints {
         self.add_weighted(model, &self.multipliers, vdot);
     }
 
-    /// Removes from the accelerations `vdot` the part that would open the joints: the linear part of [`Self::correct`], with
-    /// its matrices.
+    /// Removes the part of the accelerations `vdot` that would open the joints: the linear part of [`Self::correct`], with its
+    /// matrices.
     pub fn project_accelerations(&mut self, model: &Model, vdot: &mut [f64]) {
         for k in 0..self.joints.len() {
             let residual = self.apply(model, k, vdot);
@@ -535,7 +535,7 @@ impl Constraints {
 
     /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
     ///
-    /// Returns the remaining closure error, m or rad: above `1e-12` the loops could not be closed.
+    /// Returns the remaining closure error, m or rad: above `1e-12`, the loops could not be closed.
     pub fn project(&mut self, model: &Model, tree: &mut Tree, t: f64, y: &mut [f64]) -> f64 {
         let gravity = Vec3::zeros();
         let mut error = f64::INFINITY;
@@ -550,14 +550,14 @@ impl Constraints {
                 }
             }
             largest = largest.max(self.put_unit_residuals(model, &tree.motion, 0));
-            // Newton converges quadratically: stop once another step would only change rounding errors.
-            // Dependent rows leave a residual: the inconsistency of the parts' dimensions.
+            // Newton converges quadratically: stop once another step would only change rounding errors. Dependent rows leave a
+            // residual, the inconsistency of the dimensions.
             let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };
             if largest <= 1e-15 || (largest < stirred && largest >= 0.5 * error) || largest.is_nan() {
                 error = largest;
                 break;
             }
-            // Once close, the previous iteration's matrix is as good as a new one.
+            // Close to the solution, the previous iteration's matrix is good enough.
             if error.is_infinite() || !(largest < 1e-4 * error && largest < 1e-9) {
                 self.prepare(model, tree, t, &y[..model.nq], &gravity);
             }
@@ -588,7 +588,7 @@ impl Constraints {
         error
     }
 
-    /// Computes the Jacobians and factors J M^-1 J^T for a tree that has been moved forward to (t, q).
+    /// Computes the Jacobians and factors J M^-1 J^T for a tree whose kinematics are up to date at (t, q).
     pub fn prepare(&mut self, model: &Model, tree: &mut Tree, t: f64, q: &[f64], gravity: &Vec3) {
         if self.is_factored(t, q) {
             return;
@@ -600,7 +600,7 @@ impl Constraints {
     }
 }
 
-/// Scalar product of two vectors of the same length, mostly of a free body's six coordinates.
+/// Dot product of two vectors of equal length, mostly a free body's six coordinates.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     match (a.as_array::<6>(), b.as_array::<6>()) {

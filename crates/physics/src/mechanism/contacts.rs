@@ -1,5 +1,5 @@
-//! The ball joints of a scene: which of them carry a force, their clearance ramps, their gaps. Allocates nothing. The force
-//! of a single joint is in `elements/contact.rs`.
+//! Ball joints of a scene: active contacts, clearance ramps and gaps. Allocates nothing. The force of a single joint is in
+//! `elements/contact.rs`.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,12 +37,12 @@ pub struct Contacts {
     ramps: Vec<Option<Ramp>>,
     any_ramp: bool,
     any_contact: bool,
-    /// Evaluations leave out the joints whose balls do not touch: some of their bodies are asleep.
+    /// Evaluations skip joints without contact, because some of their bodies are suspended.
     pub(super) only_touching: bool,
 }
 
 impl Contacts {
-    /// Contacts of `scene`.
+    /// Contacts of `machine`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
         let parameters: Vec<Parameters> = machine.ball_joints.iter().map(|j| j.contact).collect();
         let joints: Vec<Contact> = model
@@ -67,7 +67,7 @@ impl Contacts {
         self.joints.len()
     }
 
-    /// Whether there is no ball joint.
+    /// Whether there are no ball joints.
     pub fn is_empty(&self) -> bool {
         self.joints.is_empty()
     }
@@ -92,12 +92,12 @@ impl Contacts {
         &self.joints[i]
     }
 
-    /// Whether joint `i` left the piece of its law held in the memory in an evaluation since [`Self::forget_left_pieces`].
+    /// Whether joint `i` left the frozen branch of its law in an evaluation since [`Self::forget_left_pieces`].
     pub fn has_left_piece(&self, i: usize) -> bool {
         self.joints[i].left_piece
     }
 
-    /// As if every joint had stayed on the pieces held in the memory.
+    /// Clears the flags of [`Self::has_left_piece`].
     pub fn forget_left_pieces(&mut self) {
         for contact in &mut self.joints {
             contact.left_piece = false;
@@ -114,12 +114,12 @@ impl Contacts {
         &self.joints[i].law
     }
 
-    /// Clearance of joint `i` in force at the latest evaluation, m.
+    /// Clearance of joint `i` at the latest evaluation, m.
     pub fn clearance(&self, i: usize) -> f64 {
         self.joints[i].law.clearance
     }
 
-    /// Clearance ramps that are running, by joint.
+    /// Active clearance ramps, by joint.
     pub fn ramps(&self) -> &[Option<Ramp>] {
         &self.ramps
     }
@@ -130,13 +130,13 @@ impl Contacts {
         self.any_ramp = self.ramps.iter().any(Option::is_some);
     }
 
-    /// Sets new parameters for joint `i`; `clearance` is its current clearance.
+    /// Sets parameters of joint `i`; `clearance`, m, is its current clearance.
     pub fn set_parameters(&mut self, i: usize, parameters: &Parameters, clearance: f64) {
         self.parameters[i] = *parameters;
         self.joints[i].law = Coefficients::new(parameters, clearance);
     }
 
-    /// Updates ramping clearances to `t`.
+    /// Updates ramped clearances to `t`.
     #[inline]
     fn update_ramps(&mut self, t: f64) {
         if !self.any_ramp {
@@ -151,7 +151,7 @@ impl Contacts {
         }
     }
 
-    /// Gaps and forces of all contacts, if any may carry a force.
+    /// Adds contact forces and updates gaps, if any contact may carry a force.
     pub(super) fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         if !self.any_contact || matches!(at.touching, ActiveSet::Nothing) {
             return;
@@ -167,7 +167,7 @@ impl Contacts {
         }
     }
 
-    /// Completes the gaps of the latest evaluation, with `touching`, and measures those that it left out.
+    /// Completes the gaps of the latest evaluation, with `touching`, and measures those it skipped.
     pub(super) fn finish_all(&mut self, touching: ActiveSet<'_>, motion: &[Kinematics]) {
         for contact in &mut self.joints {
             if self.only_touching && !contact.may_press(touching) {
@@ -178,7 +178,7 @@ impl Contacts {
         }
     }
 
-    /// Gap geometry alone (no force) at `t`.
+    /// Gap geometry at `t`, without forces.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
         for contact in &mut self.joints {
@@ -186,7 +186,7 @@ impl Contacts {
         }
     }
 
-    /// The same of joint `i` alone.
+    /// The same for joint `i` alone.
     pub fn measure_one(&mut self, i: usize, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
         self.joints[i].measure(motion);
@@ -197,7 +197,7 @@ impl Contacts {
         self.joints[i].slip_velocity(n, motion)
     }
 
-    /// Sliding speed of joint `i`, whose ball must be off centre, in the motion last measured, m/s.
+    /// Sliding speed of joint `i` in the motion last measured, m/s; the ball must be off centre.
     pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
         let contact = &self.joints[i];
         let at = &contact.gap.separation;

@@ -1,15 +1,15 @@
-//! Sparse factorisation of a tree's mass matrix, H = L^T D L: fill-in free because every coordinate couples only with
-//! its ancestors (Featherstone, *Rigid Body Dynamics Algorithms*, 2008, section 6.5).
+//! Sparse factorisation of a tree's mass matrix, H = L^T D L, without fill-in because every coordinate couples only with its
+//! ancestors (Featherstone, *Rigid Body Dynamics Algorithms*, 2008, section 6.5).
 
 /// No parent coordinate.
 pub const NONE: usize = usize::MAX;
 
-/// Sparsity pattern: which coordinates each one couples with.
+/// Sparsity pattern: the coordinates that each coordinate couples with.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     /// Parent coordinate of each; [`NONE`] at a root.
     pub parent: Vec<usize>,
-    /// All further coordinates are direct children of a free body's six: the case that is worth fixed-size loops.
+    /// Whether all further coordinates are direct children of a free body's six, a case worth fixed-size loops.
     on_free_body: bool,
 }
 
@@ -27,7 +27,7 @@ impl Pattern {
         self.parent.len()
     }
 
-    /// Factors the lower triangle of the row-major matrix `h` in place; `inverse_diagonal` gets 1 / D.
+    /// Factors the lower triangle of the row-major matrix `h` in place; writes 1 / D to `inverse_diagonal`.
     #[inline]
     pub fn factor(&self, h: &mut [f64], inverse_diagonal: &mut [f64]) {
         let (n, parent) = (self.len(), &self.parent);
@@ -86,7 +86,7 @@ fn six(h: &[f64], n: usize, k: usize) -> [f64; 6] {
     std::array::from_fn(|j| h[k * n..k * n + 6][j])
 }
 
-/// [`Pattern::factor`] where coordinates 6.. are children of a free body's six: the same operations in fixed-size loops.
+/// [`Pattern::factor`] if coordinates 6.. are children of a free body's six: the same operations in fixed-size loops.
 fn factor_on_free_body(h: &mut [f64], n: usize, inverse_diagonal: &mut [f64]) {
     let mut base: [[f64; 6]; 6] = std::array::from_fn(|i| six(h, n, i));
     for k in 6..n {
@@ -94,7 +94,7 @@ fn factor_on_free_body(h: &mut [f64], n: usize, inverse_diagonal: &mut [f64]) {
         let inverse = 1.0 / h[k * n + k];
         inverse_diagonal[k] = inverse;
         let scaled = row.map(|x| x * inverse);
-        // The upper triangle is updated too: full rows are cheaper than ragged ones, and nobody reads it.
+        // Also updates the unused upper triangle: full rows are cheaper than ragged ones.
         for i in 0..6 {
             for j in 0..6 {
                 base[i][j] -= scaled[i] * row[j];
@@ -189,29 +189,29 @@ const SIDE: usize = 3;
 
 type Block = [[f64; SIDE]; SIDE];
 
-/// Cholesky factorisation of a symmetric positive definite matrix stored by its row envelope, in blocks of up to three rows
-/// that couple alike, such as those of a ball joint; smaller ones are filled up with rows of the unit matrix.
+/// Cholesky factorisation of a symmetric positive definite matrix stored by its row envelope, in blocks of up to three rows with
+/// the same sparsity, such as those of a ball joint. Smaller blocks are padded with rows of the identity.
 ///
-/// Nothing outside the envelope fills in, so that a chain costs linear time. Inside it, blocks that stay zero are skipped: two
-/// legs of a platform couple only through their rows on it. Otherwise every sum runs in the order of the rows.
+/// There is no fill-in outside the envelope, so that a chain costs linear time. Inside it, blocks that stay zero are skipped: two
+/// legs of a platform couple only through their rows on it. Otherwise sums run in row order.
 pub struct Skyline {
-    /// Block of each row, and its place there.
+    /// Block of each row, and its index within the block.
     place: Vec<(usize, usize)>,
     /// Rows in each block.
     size: Vec<usize>,
-    /// The row of blocks i holds the columns `first[i]..=i` from `offset[i]`, of which those in
-    /// `coupled[coupled_of[i]..coupled_of[i + 1]]`, and the last, are not zero.
+    /// Block row i stores the block columns `first[i]..=i` from `offset[i]`; the nonzero ones are
+    /// `coupled[coupled_of[i]..coupled_of[i + 1]]` and the last.
     first: Vec<usize>,
     offset: Vec<usize>,
     coupled: Vec<usize>,
     coupled_of: Vec<usize>,
     blocks: Vec<Block>,
-    /// Right side and solution by blocks.
+    /// Right-hand side and solution by blocks.
     x: Vec<[f64; SIDE]>,
 }
 
 impl Skyline {
-    /// For rows that hold an entry at these `columns` before the diagonal.
+    /// For rows with entries in these `columns` before the diagonal.
     pub fn new(mut columns: Vec<Vec<usize>>) -> Self {
         let mut skyline = Self {
             place: Vec::with_capacity(columns.len()),
@@ -280,15 +280,15 @@ impl Skyline {
     }
 
     /// Adds to entry (i, j), j <= i, inside the envelope.
-    // Every pair of rows adds one: a call of its own would cost the lagrange form four per cent.
+    // Inlined: every pair of rows adds one, and a call would cost the lagrange form four per cent.
     #[inline(always)]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         let ((i, row), (j, column)) = (self.place[i], self.place[j]);
         self.blocks[self.offset[i] + j - self.first[i]][row][column] += value;
     }
 
-    /// Adds to block (i, j), j <= i, inside the envelope, where every block has its three rows. What is above the diagonal is
-    /// never read.
+    /// Adds to block (i, j), j <= i, inside the envelope, if every block has three rows. Entries above the diagonal are never
+    /// read.
     #[inline]
     pub fn add_block(&mut self, i: usize, j: usize, block: &Block) {
         debug_assert_eq!((self.place[SIDE * i], self.place[SIDE * j]), ((i, 0), (j, 0)));
@@ -316,13 +316,13 @@ impl Skyline {
         (entries.map(|l| l * l).sum::<f64>() + pivot, pivot)
     }
 
-    /// Columns of the row of blocks i before its diagonal that are not zero.
+    /// Nonzero block columns of block row i before the diagonal.
     #[inline]
     fn coupled(&self, i: usize) -> &[usize] {
         &self.coupled[self.coupled_of[i]..self.coupled_of[i + 1]]
     }
 
-    /// Factors in place. Returns the smallest ratio of a pivot to its diagonal entry: at rounding level or below, rows are
+    /// Factors in place. Returns the smallest ratio of a pivot to its diagonal entry: at or below rounding level, rows are
     /// dependent.
     pub fn factor(&mut self) -> f64 {
         let mut blocks = std::mem::take(&mut self.blocks);
@@ -424,7 +424,7 @@ fn subtract_product(block: &mut Block, l: &Block, m: &Block) {
     }
 }
 
-/// `block` = `block` L^-T for a lower triangle L, as [`factor_block`] leaves it.
+/// `block` = `block` L^-T for a lower triangle L from [`factor_block`].
 #[inline]
 fn divide(block: &mut Block, l: &Block) {
     for row in block {
@@ -437,8 +437,8 @@ fn divide(block: &mut Block, l: &Block) {
     }
 }
 
-/// Cholesky factor of a block of `size` rows, in place, with the inverses of its diagonal entries there, since solving divides by
-/// them; and their pivots.
+/// Cholesky factor of a block of `size` rows in place, with inverted diagonal entries because solves divide by them. Returns the
+/// pivots.
 #[inline]
 fn factor_block(block: &mut Block, size: usize) -> [f64; SIDE] {
     let mut pivots = [1.0; SIDE];
@@ -464,7 +464,7 @@ fn factor_block(block: &mut Block, size: usize) -> [f64; SIDE] {
 mod tests {
     use super::*;
 
-    /// A symmetric matrix with the pattern's zeros, diagonally dominant.
+    /// A symmetric, diagonally dominant matrix with the pattern's zeros.
     fn matrix(parent: &[usize]) -> nalgebra::DMatrix<f64> {
         let n = parent.len();
         let mut m = nalgebra::DMatrix::zeros(n, n);
@@ -516,8 +516,8 @@ mod tests {
 
     #[test]
     fn skyline_fills_in_where_it_must_and_skips_the_rest() {
-        // Four legs of two joints: three rows of the first couple with nothing before, two of the second with those and with
-        // all other second ones.
+        // Four legs of two joints: three rows of the first joint couple with no earlier rows, two of the second with those three
+        // and with all rows of earlier second joints.
         let mut columns: Vec<Vec<usize>> = Vec::new();
         for leg in 0..4 {
             let second = (0..leg).flat_map(|other| 5 * other + 3..5 * other + 5);
@@ -548,7 +548,7 @@ mod tests {
         let mut x = b;
         a.solve(x.as_mut_slice());
         assert!((x - expected).norm() < 1e-13);
-        // The first column makes rows 2 and 3 couple, and those fill in the last row between its entries.
+        // The first column couples rows 2 and 3, which fill in the last row between its entries.
         let star = Skyline::new(vec![vec![], vec![], vec![0], vec![0], vec![1, 2]]);
         assert_eq!((star.coupled(3), star.coupled(4)), (&[0, 2][..], &[1, 2, 3][..]));
     }

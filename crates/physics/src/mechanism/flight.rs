@@ -1,5 +1,5 @@
-//! Free flight: a free body that nothing but gravity acts on, by the Taylor series of its motion. Between two contacts the
-//! whole motion is then known at the cost of one evaluation, to rounding.
+//! Free flight: Taylor series of the motion of a free body under gravity alone. Between two contacts the whole motion is then
+//! known to rounding at the cost of one evaluation.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,24 +12,24 @@ use crate::machine::{Formulation, Machine, Vec3};
 
 /// Order of the series in time.
 const ORDER: usize = 10;
-/// Largest part of a unit quaternion, and of the angular velocity, that the last term of a series may contribute.
+/// Maximum contribution of the last term, relative to a unit quaternion and to the angular velocity.
 const LAST_TERM: f64 = 1e-17;
-/// The longest flight, s.
+/// Maximum duration of a flight, s.
 const LONGEST: f64 = 0.1;
 
-/// A free body that nothing but contacts, gravity and the hand ever loads.
+/// A free body that is loaded only by contacts, gravity and the hand.
 #[derive(Clone, Debug)]
 pub struct FreeFlightBody {
-    /// Its index.
+    /// Body index.
     pub body: BodyIndex,
-    /// Ball joints of which it carries the ball or the socket.
+    /// Ball joints whose ball or socket is on the body.
     pub joints: Vec<usize>,
     q: usize,
     v: usize,
 }
 
 impl FreeFlightBody {
-    /// Those of `scene`, none where bodies couple through ideal joints or drives must hold what others do.
+    /// Free-flight bodies of a scene; none if ideal joints couple bodies or drive forces depend on unknown accelerations.
     pub(super) fn all(mechanism: &Mechanism, machine: &Machine) -> Vec<Self> {
         let model = &*mechanism.model;
         let separate = mechanism.equations.is_block_diagonal() && mechanism.sources.forces_suffice;
@@ -48,7 +48,7 @@ impl FreeFlightBody {
                 joints[joint.socket.body].push(j);
             }
         }
-        // In the order of their bodies, as blocks are.
+        // In order of body index, like the blocks.
         let lone = model.blocks.iter().filter_map(|block| block.lone);
         let flyer = |body: BodyIndex| match model.bodies[body].motion {
             Motion::Free { q, v } => Some(Self { body, joints: std::mem::take(&mut joints[body]), q, v: model.nq + v }),
@@ -57,38 +57,38 @@ impl FreeFlightBody {
         lone.filter(|&b| !loaded[b]).filter_map(flyer).collect()
     }
 
-    /// Its components of a state: positions, then velocities.
+    /// Its components of the state: positions, then velocities.
     pub fn parts(&self) -> [Range<usize>; 2] {
         [self.q..self.q + 7, self.v..self.v + 6]
     }
 }
 
-/// Components of a state that steps move: those of the bodies that do not fly.
+/// Components of the state advanced by steps: those of bodies not in free flight.
 #[derive(Default)]
 pub(super) struct ActiveRanges {
-    /// In their order, positions first.
+    /// Ranges in ascending order, positions first.
     pub parts: Vec<Range<usize>>,
-    /// How many of them are positions.
+    /// Number of ranges that are positions.
     of_positions: usize,
 }
 
 impl ActiveRanges {
-    /// With room to leave out so many flyers.
+    /// With capacity to exclude this number of bodies.
     pub fn with_room(free_flight_bodies: usize) -> Self {
         Self { parts: Vec::with_capacity(2 * (free_flight_bodies + 1)), of_positions: 0 }
     }
 
-    /// Those that are positions.
+    /// Ranges of positions.
     pub fn positions(&self) -> &[Range<usize>] {
         &self.parts[..self.of_positions]
     }
 
-    /// Those that are velocities.
+    /// Ranges of velocities.
     pub fn velocities(&self) -> &[Range<usize>] {
         &self.parts[self.of_positions..]
     }
 
-    /// Of a state of `dimension` components, `positions` of them positions, of which the `free_flight_bodies` are left out.
+    /// Excludes `free_flight_bodies` from a state of `dimension` components, the first `positions` of which are positions.
     fn leave_out<'a>(
         &mut self,
         positions: usize,
@@ -118,22 +118,22 @@ impl ActiveRanges {
 /// A free body in free flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Flight {
-    /// When it began and until when the series hold, s.
+    /// Start, and end of the series' validity, s.
     start: f64,
     end: f64,
-    /// Of the centroid at the start, m and m/s.
+    /// Position and velocity of the centroid at the start, m and m/s.
     position: Vec3,
     velocity: Vec3,
-    /// m/s^2.
+    /// Gravity, m/s^2.
     gravity: Vec3,
     /// Coefficients of the quaternion (w, x, y, z).
     turn: [[f64; 4]; ORDER + 1],
-    /// Coefficients of the angular velocity in body axes, rad/s: Euler's equations without a torque.
+    /// Coefficients of the angular velocity in body axes, rad/s, from Euler's equations without torque.
     spin: [Vec3; ORDER + 1],
 }
 
 impl Flight {
-    /// Of `body` from its position coordinates `q` and velocity coordinates `v` at `t`.
+    /// Flight of `body` from its position coordinates `q` and velocity coordinates `v` at `t`.
     pub(super) fn new(body: &Body, gravity: &Vec3, t: f64, q: &[f64; 7], v: &[f64; 6]) -> Self {
         let [x, y, z, unit @ ..] = q;
         let [vx, vy, vz, wx, wy, wz] = *v;
@@ -158,7 +158,7 @@ impl Flight {
             spin[n + 1] = body.inertia_inverse * torque * next;
             turn[n + 1] = rate.map(|rate| 0.5 * next * rate);
         }
-        // Of the last two terms, one may vanish by symmetry.
+        // Checks the last two terms, because one may vanish by symmetry.
         let mut length = LONGEST;
         for n in [ORDER - 1, ORDER] {
             let turns = turn[n].iter().map(|c| c * c).sum::<f64>().sqrt();
@@ -176,12 +176,12 @@ impl Flight {
         }
     }
 
-    /// Whether it is known until `t`.
+    /// Whether the series are valid at `t`.
     pub fn lasts_until(&self, t: f64) -> bool {
         t <= self.end
     }
 
-    /// Writes the coordinates of `flyer` at `t` to those of the state `y`.
+    /// Writes the coordinates of `flyer` at `t` to the state `y`.
     pub fn put(&self, flyer: &FreeFlightBody, t: f64, y: &mut [f64]) {
         let s = t - self.start;
         let mut turn = self.turn[ORDER];
@@ -204,12 +204,12 @@ impl Flight {
 }
 
 impl Mechanism {
-    /// The bodies that may fly.
+    /// Bodies capable of free flight.
     pub fn free_flight_bodies(&self) -> &[FreeFlightBody] {
         &self.free_flight_bodies
     }
 
-    /// Of ball and socket of joint `j`, those that may fly.
+    /// Ball and socket bodies of joint `j` that are capable of free flight.
     pub fn flyers_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
         let of = |b: BodyIndex| self.free_flight_bodies.binary_search_by_key(&b, |flyer| flyer.body).ok();
@@ -222,7 +222,7 @@ impl Mechanism {
         Flight::new(body, &self.gravity, t, part(y, flyer.q), part(y, flyer.v))
     }
 
-    /// Lets evaluations leave out the flyers for which `asleep` holds, by their index.
+    /// Lets evaluations skip the free-flight bodies for whose index `asleep` holds.
     pub fn suspend(&mut self, asleep: impl Fn(usize) -> bool) {
         let free_flight_bodies = &self.free_flight_bodies;
         let sleeps = |b: BodyIndex| {
@@ -237,12 +237,12 @@ impl Mechanism {
         self.moving.leave_out(positions, dimension, left_out);
     }
 
-    /// Components of the state that steps move.
+    /// Components of the state advanced by steps.
     pub fn moving(&self) -> &[Range<usize>] {
         &self.moving.parts
     }
 
-    /// Completes an evaluation at (t, y), with `touching`, by the motion of the bodies that it left out and all gaps.
+    /// Completes an evaluation at (t, y), with `touching`: adds the motion of the skipped bodies and all gaps.
     pub fn complete_gaps(&mut self, touching: ActiveSet<'_>, y: &[f64]) {
         if self.contacts.only_touching {
             self.equations.update_asleep(&self.model, y);
@@ -257,7 +257,7 @@ mod tests {
     use crate::integrate::{DormandPrince, Stepper, System};
     use crate::scene::Scene;
 
-    /// A slender body that tumbles about all its axes.
+    /// A slender body tumbling about all its axes.
     fn tumbling() -> (Mechanism, Vec<f64>) {
         let text = r#"
             [gravity]
@@ -297,7 +297,7 @@ mod tests {
         let length = flight.end - flight.start;
         assert!((1e-3..0.1).contains(&length), "{length}");
         assert!(flight.lasts_until(0.25 + length) && !flight.lasts_until(0.25 + 1.01 * length));
-        // 400 steps of order 5 leave rounding alone.
+        // 400 steps of order 5 leave only rounding errors.
         let (n, mut t) = (400, 0.25);
         let mut stepper = DormandPrince::new(y.len());
         let (mut end, mut k) = (y.clone(), y.clone());

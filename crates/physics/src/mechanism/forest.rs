@@ -1,4 +1,4 @@
-//! The complete `tree` formulation: the spanning forest, and the ideal ball joints and other joints that close loops in it.
+//! The complete `tree` formulation: spanning forest plus loop constraints of ideal ball joints and other cut joints.
 
 use super::constraints::Constraints;
 use super::equations::Equations;
@@ -9,11 +9,12 @@ use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
 use crate::machine::Vec3;
 
-/// Spanning forest with constraint rows for what closes loops in it.
+/// Spanning forest with constraint rows for the joints that close loops.
 pub(super) struct Forest {
     tree: Tree,
     constraints: Option<Constraints>,
-    /// What the joint above each body bears at the latest [`Self::find_drive_forces`], about the body's centroid; then the world's.
+    /// Wrench transmitted by the joint above each body at the latest [`Self::find_drive_forces`], about the body's centroid; then
+    /// the world's.
     borne: Vec<Wrench>,
 }
 
@@ -29,8 +30,8 @@ impl Forest {
         }
     }
 
-    /// Drive forces for the accelerations in the tree's motion under its loads, from the bodies selected by `moved`; `closed`: the
-    /// joints that close loops exert their reactions, too.
+    /// Drive forces for the accelerations in the tree's motion under its loads, from the bodies selected by `moved`. If `closed`,
+    /// includes the reactions of loop-closing joints.
     fn find_drive_forces(
         &mut self,
         model: &Model,
@@ -272,7 +273,7 @@ impl Equations for Forest {
         if all {
             self.tree.accelerate(model, y, dv);
         }
-        // If forces suffice, everything carried by a drive depends on time alone.
+        // If forces suffice, the motion of everything carried by a drive is a function of time.
         let moved = |b: usize| all || model.bodies[b].driven_only;
         let mut power = 0.0;
         self.find_drive_forces(model, gravity, all, moved, |driven, drive, force| {

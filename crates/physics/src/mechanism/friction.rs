@@ -1,13 +1,13 @@
-//! Friction of touching balls alone, linearised: what holds an explicit step back while a ball creeps under load.
+//! Linearised friction of balls in contact, the stiff term that limits an explicit step while a ball creeps under load.
 //!
-//! On the ramp of its friction law a joint under the load F_N answers to sliding like a damper of mu F_N / v_theta. With S the
-//! velocity of a contact point per velocity coordinate and W that of what friction reads, dQ/dv = sum S_c^T B_c W_c, three rows
-//! a contact. So (s I - M^-1 dQ/dv) x = b takes no matrix of the size of the mechanism: the velocities w_c = W_c x solve
-//! s w_c - sum_d H_cd B_d w_d = W_c b with H_cd = W_c M^-1 S_d^T, and x = (b + M^-1 sum S_c^T B_c w_c) / s.
+//! On the ramp of its friction law, a joint under the load F_N responds to sliding like a damper of mu F_N / v_theta. Let S be
+//! the velocity of a contact point per velocity coordinate, and W that of the slip velocity. Then dQ/dv = sum S_c^T B_c W_c, with
+//! three rows per contact. Solving (s I - M^-1 dQ/dv) x = b thus needs no matrix of the size of the mechanism: the velocities
+//! w_c = W_c x satisfy s w_c - sum_d H_cd B_d w_d = W_c b with H_cd = W_c M^-1 S_d^T, and x = (b + M^-1 sum S_c^T B_c w_c) / s.
 //!
-//! The force that a contact carries may rise many times over within a step. A W-method takes any B; one that is too large only
-//! damps, one that is too small by half is unstable. So B is that of the larger load of both ends of the step, as far as the
-//! approach tells.
+//! The force of a contact may grow many times over within a step. A W-method admits any B, but too large a B only adds damping,
+//! while one too small by half is unstable. So B uses the larger of the loads at both ends of the step, as predicted from the
+//! approach velocity.
 
 use super::MechanismError;
 use super::band::Band;
@@ -22,11 +22,11 @@ use crate::contact::{Coefficients, Memory, Slope};
 use crate::integrate::{Method, add_scaled, copy, divide};
 use crate::machine::{Mat3, Vec3};
 
-/// What a ball and one of the trees that it acts on do to each other.
+/// Coupling between a contact and one of the trees it acts on.
 struct TreePart {
-    /// Coordinates of the tree.
+    /// Coordinate range of the tree.
     range: (usize, usize),
-    /// Coordinates that move the contact, and the velocity that friction reads for their unit rates.
+    /// Coordinates that move the contact, and the slip velocity per unit rate of each.
     reads: Vec<(usize, Vec3)>,
     /// M^-1 S^T.
     weighted: Vec<Vec3>,
@@ -44,18 +44,18 @@ struct Touch {
     joint: usize,
     law: Coefficients,
     memory: Memory,
-    /// m, m/s, and the velocity that friction reads, m/s.
+    /// Eccentricity, m, its rate and the slip velocity, m/s.
     eccentricity: Vec3,
     rate: Vec3,
     read: Vec3,
-    /// Where it acts, with what friction reads per velocity coordinate and M^-1 S^T there.
+    /// Trees it acts on.
     trees: Vec<TreePart>,
     /// B, N s/m.
     resistance: Mat3,
 }
 
 impl Touch {
-    /// dF/dw for the larger load of now and `h` later, s.
+    /// Sets B = dF/dw for the larger of the loads now and `h`, s, later.
     fn resist(&mut self, h: f64) {
         let later = self.law.separation(&self.eccentricity, &self.rate).rate > 0.0;
         let ahead = if later { h } else { 0.0 };
@@ -73,7 +73,7 @@ impl Touch {
         }
     }
 
-    /// Velocity that friction reads for the velocities `x`.
+    /// Slip velocity for the velocities `x`.
     fn reading(&self, x: &[f64]) -> Vec3 {
         let reads = self.trees.iter().flat_map(|tree| &tree.reads);
         reads.fold(Vec3::zeros(), |sum, (coordinate, read)| sum + read * x[*coordinate])
@@ -93,12 +93,12 @@ impl Touch {
         self.trees.iter().find(|tree| tree.range == range)
     }
 
-    /// Whether a tree feels both.
+    /// Whether both contacts act on a common tree.
     fn meets(&self, other: &Self) -> bool {
         self.trees.iter().any(|tree| other.on(tree.range).is_some())
     }
 
-    /// W M^-1 S^T of another's forces.
+    /// W M^-1 S^T for the forces of `other`.
     fn mobility(&self, other: &Self) -> Mat3 {
         let mut sum = Mat3::zeros();
         for tree in &self.trees {
@@ -116,16 +116,16 @@ impl Touch {
 /// The linearisation and its factors.
 pub struct Friction {
     n: usize,
-    /// A force accelerates only the trees that it acts on.
+    /// Whether a force accelerates only the trees it acts on.
     within: bool,
-    /// Every ball with play, and which of them touch.
+    /// Every ball with play, and the indices of those in contact.
     touches: Vec<Touch>,
     active: Vec<usize>,
-    /// Those that the band is arranged for.
+    /// Contacts for which the band is arranged.
     arranged: Vec<usize>,
-    /// Touches further apart in their order do not feel each other.
+    /// Touches further apart in their order are not coupled.
     band: Band,
-    /// s I - H B, factored; H in the same places.
+    /// s I - H B, factored, and H in the same layout.
     blocks: Vec<Mat3>,
     mobility: Vec<Mat3>,
     right: Vec<Vec3>,
@@ -134,20 +134,20 @@ pub struct Friction {
     rate: Vec<f64>,
     scratch: Vec<f64>,
     columns: Vec<Column>,
-    /// First touch on every tree.
+    /// First touch on each tree.
     first_on: Vec<usize>,
-    /// df/dt: friction follows the state alone.
+    /// df/dt: friction depends on the state alone.
     pub time_derivative: Vec<f64>,
     /// Scratch for the derivative at the point of linearisation.
     pub derivative: Vec<f64>,
 }
 
 impl Friction {
-    /// For `velocities` velocity coordinates in a state of `dimension`. With `within`, a force accelerates only the trees that
-    /// it acts on; else all.
+    /// For `velocities` velocity coordinates in a state of `dimension`. With `within`, a force accelerates only the trees it acts
+    /// on; otherwise all coordinates.
     ///
     /// # Errors
-    /// Contacts that couple too widely.
+    /// The contacts are coupled too widely.
     pub fn new(
         model: &Model,
         contacts: &Contacts,
@@ -216,7 +216,7 @@ impl Friction {
         Ok(friction)
     }
 
-    /// Takes the balls that touch, from the gaps of the evaluation just made at `y`.
+    /// Collects the balls in contact from the gaps of the evaluation just made at `y`.
     pub fn gather(
         &mut self,
         model: &Model,
@@ -275,7 +275,7 @@ impl Friction {
         self.couple();
     }
 
-    /// Balls that touch.
+    /// Number of balls in contact.
     pub fn touching(&self) -> usize {
         self.active.len()
     }
@@ -324,8 +324,8 @@ impl Friction {
         band.factor(&mut self.blocks);
     }
 
-    /// Bound on the rates at which friction damps sliding, 1/s, as factored last: the largest sum of norms in a row of H B
-    /// (Gershgorin). The coupling of neighbours may double what a contact has on its own.
+    /// Bound on the rates at which friction damps sliding, 1/s, in the latest factorisation: the largest row sum of norms of H B
+    /// (Gershgorin). Coupling between neighbours may double a contact's own rate.
     pub fn fastest(&self) -> f64 {
         let band = &self.band;
         let norm = |i: usize, j: usize| {
@@ -336,8 +336,8 @@ impl Friction {
         (0..band.size()).map(row).fold(0.0, f64::max)
     }
 
-    /// Largest angular frequency, rad/s, at which a ball rings on its wall where friction was linearised, its neighbours' forces
-    /// constant: sqrt(n' H n dF_N/d(delta)) with dF_N/d(delta) = 3/2 F_N/delta (19). The method steps this explicitly.
+    /// Largest angular frequency, rad/s, of a ball vibrating on its wall at the linearisation, with its neighbours' forces
+    /// constant: sqrt(n' H n dF_N/d(delta)), where dF_N/d(delta) = 3/2 F_N/delta (19). The method steps this explicitly.
     pub fn ringing(&self) -> f64 {
         let square = |(i, &slot): (usize, &usize)| {
             let touch = &self.touches[slot];
@@ -353,7 +353,7 @@ impl Friction {
         squares.fold(0.0, f64::max).sqrt()
     }
 
-    /// Solves (s I - J) x = b in place, for the components that move.
+    /// Solves (s I - J) x = b in place for the active components.
     pub fn solve(&mut self, b: &mut [f64], moving: &ActiveRanges, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let b_v = &mut b[positions..];
@@ -373,7 +373,7 @@ impl Friction {
     }
 }
 
-/// How far apart in their order touches that act on these trees feel each other. `first_on` is scratch, one entry a coordinate.
+/// Bandwidth of the coupling between touches that act on these trees. `first_on` is scratch, one entry per coordinate.
 fn reach_of(
     touches: impl Iterator<Item = impl Iterator<Item = (usize, usize)>> + Clone,
     first_on: &mut [usize],
@@ -398,7 +398,8 @@ mod tests {
     use crate::mechanism::{ActiveSet, Mechanism};
     use crate::scene::Scene;
 
-    /// Without damping, so that the load, and with it friction, does not follow the penetration rate: that is left out.
+    /// Without damping: the load, and with it friction, would otherwise depend on the penetration rate, which the linearisation
+    /// leaves out.
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
         let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
         let elastic = [("contact.restitution", "1"), ("contact.slip_speed_low", "0")];
@@ -406,11 +407,11 @@ mod tests {
         Scene::load(name, &changes).unwrap()
     }
 
-    /// m/s: so slow that no load is expected to rise within a step.
+    /// Slip velocity, m/s: so slow that no load is predicted to rise within a step.
     const SLIP: f64 = 2e-8;
 
     /// Balls that rest 0.2 um deep in their walls and creep along them: two neighbours in a chain, one tree between driven
-    /// slides, and the same with an ideal joint.
+    /// slides, and the latter with an ideal joint.
     fn resting() -> Vec<(Scene, Vec<f64>)> {
         let deep = 0.3e-3 + 2e-7;
         let chain = scene("chain", &[("chain.links", "3")]);
@@ -436,7 +437,7 @@ mod tests {
         all
     }
 
-    /// dv/dt along `x` by central differences of the velocities.
+    /// Derivative of dv/dt for velocities along `x`, by central differences.
     fn along(scene: &Scene, memory: &[Memory], y: &[f64], x: &[f64]) -> Vec<f64> {
         let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         let positions = mechanism.positions();
@@ -464,7 +465,7 @@ mod tests {
         let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
         evaluator.friction_alone().linearise(0.0, &y);
         let ringing = mechanism.friction_ringing();
-        // How fast the lowest joint closes again; the world gives way less to the highest.
+        // Closing acceleration of the lowest joint; the highest, on the world, is stiffer.
         let mut opening = |by: f64| {
             let (mut moved, mut out) = (y.clone(), vec![0.0; y.len()]);
             moved[7 * 2 + 2] -= by;

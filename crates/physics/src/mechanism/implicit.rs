@@ -1,10 +1,10 @@
 //! Contact forces at the end of a step: the implicit part of a semi-implicit step.
 //!
-//! The step is first taken as if no contact carried a force. Each joint then in contact couples with the coordinates
-//! through only three directions: with W the Jacobian of the relative velocity at a contact and S that of its contact
-//! point, the velocities w added by the contacts and their forces f at the end of the step solve
-//! w = h W M^-1 S^T f(w): three rows per joint instead of one per coordinate. Newton's method needs the mass matrix only
-//! once. The lever arms of the contact points belong to a fixed normal, which is updated if it turns too far.
+//! The step is first taken without contact forces. Each joint then in contact couples with the coordinates through only three
+//! directions. Let W be the Jacobian of the relative velocity at a contact and S that of its contact point. The velocities w
+//! added by the contacts, and the contact forces f at the end of the step, satisfy w = h W M^-1 S^T f(w), which has three rows
+//! per joint instead of one per coordinate, and Newton's method needs the mass matrix only once. The lever arms of the contact
+//! points belong to a fixed normal, which is updated if it turns too far.
 
 use super::MechanismError;
 use super::band::Band;
@@ -18,31 +18,31 @@ use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
 use crate::integrate::Method;
 use crate::machine::{Mat3, Vec3};
 
-/// Maximum number of Newton iterations, and the change of a force relative to the largest at which they stop.
+/// Maximum number of Newton iterations, and the force change relative to the largest force at which they stop.
 const ITERATIONS: usize = 24;
 const CONVERGED: f64 = 1e-3;
 /// Maximum number of successive halvings of a Newton step.
 const HALVINGS: u32 = 3;
-/// Fraction of the clearance within which a ball is too far from the wall to be pushed into it.
+/// Eccentricity, as a fraction of the clearance, below which a ball is too far from the wall to be pushed into it.
 const NEAR: f64 = 0.5;
 /// Rotation of a normal (rad) beyond which its lever arms are updated.
 const TURNED: f64 = 0.03;
 /// Maximum number of passes with updated arms.
 pub const TURNS: usize = 4;
 
-/// One joint in contact at the end of the step, or that others may push into contact.
+/// A joint in contact at the end of the step, or one that others may push into contact.
 struct Touch {
     joint: usize,
     law: Coefficients,
     memory: Memory,
-    /// Without contact forces: eccentricity (m), its rate and the velocity used by friction (m/s).
+    /// Values without contact forces: eccentricity (m), its rate and the velocity used by friction (m/s).
     eccentricity: Vec3,
     rate: Vec3,
     read: Vec3,
-    /// Added by the contacts: to the velocity of the centres, and to that used by friction, m/s.
+    /// Velocities added by the contacts: of the centres, and used by friction, m/s.
     added: Vec3,
     slipping: Vec3,
-    /// Normal that the lever arms belong to, and the latest normal.
+    /// Normal to which the lever arms belong, and the latest normal.
     arm: Vec3,
     normal: Vec3,
     /// Force, N, and its derivatives with respect to the added velocities, N s/m.
@@ -83,29 +83,29 @@ impl Touch {
 /// Workspace of the implicit part, allocated once.
 pub struct ImplicitContacts {
     n: usize,
-    /// Range of velocity coordinates that a force at each joint may accelerate.
+    /// Velocity coordinates that a force at each joint may accelerate.
     ranges: Vec<(usize, usize)>,
-    /// Joints further apart than this in their order are not coupled.
+    /// Bandwidth: joints further apart in their order are not coupled.
     reach: usize,
     band: Band,
     touches: Vec<Touch>,
     columns: Vec<Vec<Column>>,
-    /// M^-1 S^T, three columns per joint over its range, interleaved.
+    /// M^-1 S^T: three interleaved columns per joint over its range.
     weighted: Vec<Vec<f64>>,
     /// Block-banded matrix and its right-hand side.
     blocks: Vec<Mat3>,
     right: Vec<Vec3>,
     before: Vec<Vec3>,
-    /// W M^-1 S^T in the same band, with W for the centres and for the velocity used by friction.
+    /// W M^-1 S^T in the same band, where W is for the centres and for the velocity used by friction.
     mobility: Vec<[Mat3; 2]>,
     scratch: Vec<f64>,
 }
 
 impl ImplicitContacts {
-    /// For `n` velocity coordinates. With `blocks`, a force accelerates only the trees it acts on; otherwise all.
+    /// For `n` velocity coordinates. With `blocks`, a force accelerates only the trees it acts on; otherwise all coordinates.
     ///
     /// # Errors
-    /// Contacts that are coupled too widely.
+    /// The contacts are coupled too widely.
     pub fn new(model: &Model, n: usize, blocks: bool) -> Result<Self, MechanismError> {
         let joints = model.joints.len();
         let block_of =
@@ -125,7 +125,7 @@ impl ImplicitContacts {
             }
             (range.0.min(range.1), range.1)
         };
-        // Joints are coupled through a tree that both act on.
+        // Joints that act on the same tree are coupled.
         let mut first_on = vec![usize::MAX; model.blocks.len()];
         let mut reach = if blocks { 0 } else { joints.saturating_sub(1) };
         for j in 0..joints {
@@ -154,15 +154,15 @@ impl ImplicitContacts {
         })
     }
 
-    /// Collects the joints in contact, from the gaps just measured at the end of the step without contact forces. Returns
-    /// whether there are any.
+    /// Collects the joints in contact from the gaps just measured at the end of the step without contact forces. Returns whether
+    /// there are any.
     pub fn gather(&mut self, model: &Model, contacts: &Contacts, touching: ActiveSet<'_>) -> bool {
         self.touches.clear();
         self.right.clear();
         let mut near = false;
         for (j, joint) in model.joints.iter().enumerate() {
             let gap = contacts.gap(j);
-            // Others may push a ball that is still free into its wall.
+            // Other contacts may push a ball that is still free into its wall.
             let distance = gap.eccentricity.norm();
             if joint.ideal.is_some() || distance < NEAR * contacts.clearance(j) {
                 continue;
@@ -195,7 +195,7 @@ impl ImplicitContacts {
         near
     }
 
-    /// Computes the contacts' Jacobian columns and sliding velocities for the latest normals.
+    /// Computes the Jacobian columns and sliding velocities of the contacts for the latest normals.
     pub fn arrange(&mut self, model: &Model, contacts: &Contacts, equations: &dyn Equations) {
         for touch in &mut self.touches {
             let (j, n) = (touch.joint, touch.normal);
@@ -207,7 +207,8 @@ impl ImplicitContacts {
         }
     }
 
-    /// Finds the forces at the end of a step of size `h`. Returns whether a normal turned so far that its arms need updating.
+    /// Computes the forces at the end of a step of size `h`, s. Returns whether a normal turned so far that its arms need an
+    /// update.
     pub fn solve(&mut self, model: &Model, h: f64, equations: &mut dyn Equations, counts: &mut Counts) -> bool {
         let within = equations.is_block_diagonal();
         for touch in &self.touches {
@@ -230,7 +231,7 @@ impl ImplicitContacts {
             }
         }
         self.couple();
-        // Start from the forces found for the previous arms, if any.
+        // Start from the forces found with the previous arms, if any.
         self.right.resize(self.touches.len(), Vec3::zeros());
         let (mut worst, mut halvings) = (f64::INFINITY, 0);
         for _ in 0..ITERATIONS {
@@ -261,7 +262,7 @@ impl ImplicitContacts {
         }
         let mut turned = false;
         for (touch, force) in self.touches.iter().zip(&mut self.right) {
-            // The last iterate must not pull.
+            // Contact forces must not be tensile.
             if touch.normal.dot(force) > 0.0 {
                 *force = Vec3::zeros();
             }
@@ -281,7 +282,7 @@ impl ImplicitContacts {
         }
     }
 
-    /// Computes how the contacts move each other.
+    /// Computes the mobility matrix that couples the contacts.
     fn couple(&mut self) {
         let Self { band, touches, ranges, .. } = self;
         let range = |i: usize| ranges[touches[i].joint];

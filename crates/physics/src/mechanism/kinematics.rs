@@ -6,20 +6,20 @@ use super::path::Path;
 use crate::jet::Jet;
 use crate::machine::{Mat3, Quat, Vec3};
 
-/// Motion of a body's centroid frame. The world is one with everything zero.
+/// Motion of a body's centroid frame. For the world everything is zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Kinematics {
     /// Body axes as columns.
     pub rotation: Mat3,
     /// Centroid, m.
     pub position: Vec3,
-    /// Of the centroid, m/s.
+    /// Velocity of the centroid, m/s.
     pub velocity: Vec3,
-    /// rad/s.
+    /// Angular velocity, rad/s.
     pub angular_velocity: Vec3,
-    /// Of the centroid, m/s^2.
+    /// Acceleration of the centroid, m/s^2.
     pub acceleration: Vec3,
-    /// rad/s^2.
+    /// Angular acceleration, rad/s^2.
     pub angular_acceleration: Vec3,
     /// Joint axis.
     pub axis: Vec3,
@@ -43,7 +43,7 @@ impl Kinematics {
         }
     }
 
-    /// Pose and velocity of a free body at its coordinates: centroid, quaternion (w, x, y, z); velocity, angular velocity.
+    /// Sets pose and velocity of a free body from its coordinates: centroid, quaternion (w, x, y, z); velocity, angular velocity.
     #[inline]
     pub fn move_freely(&mut self, [x, y, z, turn @ ..]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) {
         self.rotation = rotation_of(turn);
@@ -52,13 +52,13 @@ impl Kinematics {
         self.angular_velocity = Vec3::new(wx, wy, wz);
     }
 
-    /// Velocity of a point fixed to the body at `arm` (world axes) from the centroid.
+    /// Velocity of the body-fixed point at `arm` (world axes) from the centroid, m/s.
     #[inline]
     pub fn point_velocity(&self, arm: &Vec3) -> Vec3 {
         self.velocity + self.angular_velocity.cross(arm)
     }
 
-    /// Acceleration of such a point.
+    /// Acceleration of that point, m/s^2.
     #[inline]
     pub fn point_acceleration(&self, arm: &Vec3) -> Vec3 {
         self.acceleration
@@ -67,7 +67,7 @@ impl Kinematics {
     }
 }
 
-/// Components `at..at + N` of a state: one check of bounds for all of them.
+/// Components `at..at + N` of a state, with a single bounds check.
 #[inline(always)]
 pub fn part<const N: usize>(of: &[f64], at: usize) -> &[f64; N] {
     let Some(part) = of[at..].first_chunk() else {
@@ -88,15 +88,15 @@ pub fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
 
 impl BallJoint {
     /// Centres of ball and socket from the centroids of their bodies, m.
-    // Three times in an evaluation, and shorter than its call.
+    // Inlined: called three times per evaluation, and shorter than the call.
     #[inline(always)]
     pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
         let arm = |anchor: &Anchor| motion[anchor.body].rotation * anchor.offset;
         [arm(&self.ball), arm(&self.socket)]
     }
 
-    /// e and de/dt, m and m/s, of the centres at these arms.
-    // Every evaluation needs it for every contact: a call of its own would cost a few per cent.
+    /// e and de/dt, m and m/s, given the arms of both centres.
+    // Inlined: every evaluation needs it for every contact, and a call would cost a few per cent.
     #[inline(always)]
     pub fn opening(&self, motion: &[Kinematics], [ball, socket]: &[Vec3; 2]) -> (Vec3, Vec3) {
         let (b, s) = (&motion[self.ball.body], &motion[self.socket.body]);
@@ -123,9 +123,9 @@ impl BallJoint {
 /// Force and torque about a body's centroid.
 #[derive(Clone, Copy, Debug)]
 pub struct Wrench {
-    /// N.
+    /// Force, N.
     pub force: Vec3,
-    /// N m.
+    /// Torque, N m.
     pub torque: Vec3,
 }
 
@@ -154,7 +154,7 @@ pub fn free_rate(&[.., w, x, y, z]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64;
     [vx, vy, vz, -a * x - b * y - c * z, a * w + b * z - c * y, b * w + c * x - a * z, c * w + a * y - b * x]
 }
 
-/// Turns the quaternion at `q` by the small world rotation vector `turn` and normalises it.
+/// Rotates the quaternion `q` by the small world rotation vector `turn` and normalises it.
 pub fn turn_quaternion(q: &mut [f64], turn: &Vec3) {
     let angle = turn.norm();
     let (s, c) = libm::sincos(0.5 * angle);
@@ -165,7 +165,7 @@ pub fn turn_quaternion(q: &mut [f64], turn: &Vec3) {
     (q[0], q[1], q[2], q[3]) = (new.w / norm, new.i / norm, new.j / norm, new.k / norm);
 }
 
-/// Scales the quaternion at `q` to length 1.
+/// Scales the quaternion `q` to length 1.
 #[inline]
 pub fn normalise_quaternion(q: &mut [f64]) {
     let s = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
@@ -179,7 +179,7 @@ pub fn quaternion_of(rotation: &Mat3) -> Quat {
     Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation))
 }
 
-/// Moves body `b`, a child of another, to its joint coordinate `q`.
+/// Moves body `b`, a child of another body, to its joint coordinate `q`.
 #[inline]
 pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bool, q: Jet) {
     let Ok([child, parent]) = motion.get_disjoint_mut([b, body.parent]) else {
@@ -222,7 +222,7 @@ pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bo
     }
 }
 
-/// Completes a body's acceleration with its own coordinate's acceleration and its parent's full acceleration.
+/// Completes a body's acceleration from its own joint acceleration and its parent's full acceleration.
 #[inline]
 pub fn accelerate(child: &mut Kinematics, parent: &Kinematics, revolute: bool, rate: f64, acceleration: f64) {
     let offset = child.position - parent.position;
@@ -246,9 +246,9 @@ pub struct Driven {
     time: Option<f64>,
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
-    /// The motion in closed form, where the scene follows one.
+    /// Closed-form motion, if the scene has one.
     pub closed: Option<ClosedMotion>,
-    /// Those bodies, parents before children.
+    /// Bodies that depend on time alone, parents before children.
     bodies: Vec<usize>,
 }
 
@@ -269,7 +269,7 @@ impl Driven {
         [value, rate]
     }
 
-    /// Stops moving bodies from now on: their motion is part of the state.
+    /// From now on moves no bodies: their motion is part of the state.
     pub fn only_coordinates(&mut self) {
         self.bodies.clear();
     }
@@ -296,11 +296,11 @@ impl Driven {
             return;
         }
         if model.closed_form.is_some() {
-            // All its coordinates are computed at once.
+            // A closed form computes all its coordinates at once.
             self.update(model, t, motion);
             return;
         }
-        // Part of it is at this instant, part of it still at another.
+        // Only part of the coordinates now belong to this instant.
         self.time = None;
         for &i in &path.drives {
             self.coordinates[i] = model.drive(i, t, None);
@@ -314,7 +314,7 @@ impl Driven {
     fn move_body(&self, model: &Model, b: BodyIndex, motion: &mut [Kinematics]) {
         let body = &model.bodies[b];
         match body.motion {
-            // A slider on the world moves only along its line.
+            // A slider on the world moves along its line only.
             Motion::Driven { drive, revolute: false } if body.parent == model.world() => {
                 let q = self.coordinates[drive];
                 let arm = body.axis * q.value + body.fixed * body.to_centroid;

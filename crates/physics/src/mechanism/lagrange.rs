@@ -1,5 +1,5 @@
 //! The paper's formulation (44)-(58): six velocity coordinates per body, constraints with Lagrange multipliers, Baumgarte
-//! stabilisation. Orientations are unit quaternions, so there are no singularities; gyroscopic terms are kept.
+//! stabilisation. Orientations are unit quaternions, so there are no singularities; gyroscopic terms are included.
 //!
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
@@ -16,14 +16,14 @@ use std::ops::Range;
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
 const BAUMGARTE: (f64, f64) = (5.0, 5.0);
 
-/// Pivot ratio of the rows below which a step ends on the constraints. In a pose in which rows become dependent, what stabilisation
-/// has not yet taken back would be divided by the pivot, and throw the mechanism onto another branch.
+/// Pivot ratio below which a step ends with a projection onto the constraints. In a pose in which rows become dependent, the
+/// drift not yet removed by stabilisation would be divided by the pivot and throw the mechanism onto another branch.
 const NEAR_SINGULAR: f64 = 1e-2;
-/// Corrections of the positions at most, and the violation that is rounding, m or rad.
+/// Maximum number of position corrections, and the violation at rounding level, m or rad.
 const CORRECTIONS: usize = 8;
 const CLOSED: f64 = 1e-14;
 
-/// Rows of one joint, between a child and a parent.
+/// Rows of one joint between a child and a parent.
 pub struct Group {
     rows: Rows,
     pub child: BodyIndex,
@@ -42,7 +42,7 @@ impl Group {
 #[derive(Clone, Copy, Default)]
 struct Row {
     j: JacobianRow,
-    /// Inverse inertia of child and parent times its angular parts; zero for the world.
+    /// Inverse inertias of child and parent times the angular parts; zero for the world.
     turned: [Vec3; 2],
 }
 
@@ -57,7 +57,7 @@ pub struct Lagrange {
     groups: Vec<Group>,
     /// Row of each driven coordinate.
     driver_row: Vec<usize>,
-    /// First row of each ideal ball joint, and the rows of each joint that closes a loop.
+    /// First row of each ideal ball joint, and the rows of each other loop-closing joint.
     ideal_row: Vec<usize>,
     closure_rows: Vec<Range<usize>>,
     rows: Vec<Row>,
@@ -74,7 +74,7 @@ pub struct Lagrange {
     drift: f64,
     /// Smallest pivot ratio of the latest factorisation.
     least_pivot: f64,
-    /// The latest step was taken back onto the constraints; the state before the latest correction.
+    /// Whether the latest step was projected onto the constraints, and the state before the latest correction.
     projected: bool,
     kept: Vec<f64>,
 }
@@ -84,14 +84,14 @@ pub struct Layout {
     pub groups: Vec<Group>,
     /// Number of rows.
     rows: usize,
-    /// First row of each driven coordinate and of each ideal ball joint, and the rows of each joint that closes a loop.
+    /// First row of each driven coordinate and of each ideal ball joint, and the rows of each other loop-closing joint.
     driver_row: Vec<usize>,
     ideal_row: Vec<usize>,
     closure_rows: Vec<Range<usize>>,
 }
 
 impl Layout {
-    /// For `scene` compiled as `model`.
+    /// For `machine` compiled as `model`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
         let mut groups: Vec<Group> = Vec::new();
         let mut rows = 0;
@@ -115,7 +115,7 @@ impl Layout {
             for rows in pair.rows().into_iter().flatten() {
                 add(rows, b, parent);
             }
-            // Of two degrees the first belongs to the link.
+            // The first of two coordinates belongs to the link.
             let link = model.linked_at(b).map(|_| body.parent);
             for (part, of) in link.into_iter().chain([b]).enumerate() {
                 if let Motion::Driven { drive, .. } = model.bodies[of].motion {
@@ -145,7 +145,7 @@ impl Layout {
 }
 
 impl Lagrange {
-    /// For `scene` compiled as `model`.
+    /// For `machine` compiled as `model`.
     pub fn new(machine: &Machine, model: &Model) -> Self {
         let Layout { groups, rows, driver_row, ideal_row, closure_rows } = Layout::new(machine, model);
         let group_of: Vec<usize> =
@@ -158,7 +158,7 @@ impl Lagrange {
             }
         }
         let n = model.massive;
-        // Bodies that depend on time alone are part of the state here too.
+        // Here, bodies that depend on time alone are part of the state, too.
         let mut driven = Driven::new(model);
         driven.only_coordinates();
         Self {
@@ -223,14 +223,14 @@ impl Lagrange {
         self.least_pivot = self.matrix.factor();
     }
 
-    /// Takes positions and then velocities back onto the constraints, in the metric of the masses.
+    /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
     fn take_back(&mut self, model: &Model, t: f64, y: &mut [f64]) {
         let nq = 7 * model.massive;
         let mut before = f64::INFINITY;
         for _ in 0..CORRECTIONS {
             self.violate(model, t, y, |[phi, _, _]| -phi);
-            // In the pose itself no correction closes them; elsewhere rows that are dependent keep what the parts' dimensions
-            // contradict.
+            // In the singular pose itself, no correction closes the rows; elsewhere, dependent rows retain the inconsistency of
+            // the dimensions.
             if self.drift > before {
                 y.copy_from_slice(&self.kept);
             }
@@ -257,7 +257,7 @@ impl Lagrange {
         });
     }
 
-    /// Factors the rows at (t, y), with what `of` makes of each one's violation, its rate and its acceleration as the residual.
+    /// Factors the rows at (t, y). The residual of each row is `of` its violation with first and second derivatives.
     fn violate(&mut self, model: &Model, t: f64, y: &[f64], of: impl Fn([f64; 3]) -> f64) {
         self.update_kinematics(model, t, y);
         for (b, body) in model.bodies[..model.massive].iter().enumerate() {
@@ -268,7 +268,7 @@ impl Lagrange {
         self.factor(model);
     }
 
-    /// M^-1 J^T times the solution in the residual, by body: displacement, m, and turn, rad, or their rates.
+    /// M^-1 J^T times the solution in the residual, by body: displacement, m, and rotation, rad, or their rates.
     fn visit_corrections(&self, model: &Model, mut visit: impl FnMut(BodyIndex, Vec3, Vec3)) {
         for (row, (group, x)) in self.rows.iter().zip(self.group_of.iter().zip(&self.residual)) {
             let group = &self.groups[*group];
@@ -287,7 +287,7 @@ impl Lagrange {
         self.linearise_with(|[phi, rate, acceleration]| stabilised(phi, rate, acceleration));
     }
 
-    /// Jacobian rows, with what `of` makes of the violation of each, its rate and its acceleration as the residual.
+    /// Jacobian rows. The residual of each is `of` its violation with first and second derivatives.
     fn linearise_with(&mut self, of: impl Fn([f64; 3]) -> f64) {
         self.drift = 0.0;
         for group in &self.groups {
@@ -414,7 +414,7 @@ impl Equations for Lagrange {
         }
     }
 
-    /// Nothing to do: [`Self::accelerate`] has already written them.
+    /// Does nothing: [`Self::accelerate`] has already written the accelerations.
     fn complete_motion(&mut self, _: &Model, _: &[f64], _: &[f64]) {}
 
     fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
@@ -562,7 +562,7 @@ impl Equations for Lagrange {
         }
     }
 
-    /// From the multipliers of the joints' rows, which come before those of the joints that close loops.
+    /// From the multipliers of tree joints, whose rows precede those of loop-closing joints.
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
         self.wrench.fill(Wrench::zero());
         let closures = self.closure_rows.iter().map(|rows| rows.start);
@@ -598,13 +598,13 @@ impl Equations for Lagrange {
     }
 }
 
-/// Angle, rad, or displacement, m, of a joint from the poses of the two bodies it connects.
+/// Angle, rad, or displacement, m, of a joint from the poses of the two connected bodies.
 fn position_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     let body = &model.bodies[b];
     let (child, parent) = (&motion[b], &motion[body.parent]);
     match body.motion {
         Motion::Revolute { .. } => {
-            // The three parts of the relative rotation are orthogonal matrices.
+            // The three parts of the relative rotation are mutually orthogonal matrices.
             let turn = parent.rotation.transpose() * child.rotation;
             libm::atan2(turn.dot(&body.sine), turn.dot(&body.cosine))
         }
@@ -616,7 +616,7 @@ fn position_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     }
 }
 
-/// Rate of a joint from the motion of the two bodies it connects.
+/// Rate of a joint from the motion of the two connected bodies.
 fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     let body = &model.bodies[b];
     let (child, parent) = (&motion[b], &motion[body.parent]);
@@ -626,7 +626,7 @@ fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
             axis.dot(&(child.angular_velocity - parent.angular_velocity))
         }
         _ => {
-            // Relative to the parent's point that currently coincides with the child's joint point.
+            // Relative to the parent's point that coincides with the child's joint point.
             let arm = child.rotation * -body.to_centroid;
             let at = child.position + arm - parent.position;
             axis.dot(&(child.point_velocity(&arm) - parent.point_velocity(&at)))
@@ -634,7 +634,7 @@ fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     }
 }
 
-/// Pairs of each row with the rows at or before it that share a body with it, in order.
+/// Pairs of each row with itself and the earlier rows that share a body with it, in order.
 fn pairs_of(groups: &[Group], world: BodyIndex) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     // Groups that act on each body so far.
@@ -665,7 +665,7 @@ fn stabilised(phi: f64, rate: f64, acceleration: f64) -> f64 {
     -(acceleration + 2.0 * alpha * rate + beta * beta * phi)
 }
 
-/// Scales of the body coordinates: those of a free body in the tree, from the model's length scale.
+/// Scales of the body coordinates, as for a free body in the tree, from the model's length scale.
 fn body_scales(model: &Model) -> Vec<f64> {
     let n = model.massive;
     let (length, speed) = (model.length_scale, model.length_scale / 0.1);

@@ -1,31 +1,31 @@
-//! Linear systems that are mostly zero, of a size known beforehand at most. Allocates nothing after `new`.
+//! Sparse linear systems up to a given size. Allocates nothing after `new`.
 
 use nalgebra::ComplexField;
 use std::ops::Range;
 
-/// With fewer rows, telling zeros apart costs more than multiplying them.
+/// Below this number of rows, dense elimination is faster than testing for zeros.
 const LEAST_SPARSE: usize = 16;
 
-/// LU factorisation with partial pivoting, for real and complex numbers, that skips zeros: its cost follows the order of the
-/// rows, and is linear along a band or a border.
+/// LU factorisation with partial pivoting, for real and complex numbers, that skips zeros. Its cost depends on the row order and
+/// is linear for banded and bordered matrices.
 pub struct Lu<X> {
-    /// Most rows.
+    /// Maximum number of rows.
     most: usize,
     /// Rows in use.
     n: usize,
     rows: Vec<X>,
     pivots: Vec<usize>,
-    /// Columns of each row outside of which it is zero.
+    /// Column range of each row that may be nonzero.
     extents: Vec<Range<usize>>,
-    /// Last row that starts at or left of each column.
+    /// Last row whose extent starts at or left of each column.
     lowest: Vec<usize>,
-    /// Nonzero factors left and right of the diagonal, row by row: where those of each row start, their columns and values.
+    /// Nonzero factors left and right of the diagonal, row by row: start of each row, columns, values.
     starts: Vec<usize>,
     columns: Vec<u32>,
     factors: Vec<X>,
     /// Nonzero columns of a pivot row.
     filled: Vec<usize>,
-    /// Products that the latest elimination took, where it looks for zeros.
+    /// Multiplications in the latest sparse elimination.
     pub products: usize,
 }
 
@@ -47,7 +47,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         }
     }
 
-    /// Factors the matrix of `n` rows with these entries (row, column), and `diagonal` added to its diagonal.
+    /// Factors the `n` x `n` matrix with these entries (row, column, value) plus `diagonal` on its diagonal.
     pub fn factor(&mut self, n: usize, entries: impl Iterator<Item = (usize, usize, X)>, diagonal: X) {
         self.clear();
         self.n = n;
@@ -81,7 +81,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         if self.n < LEAST_SPARSE { self.n } else { self.most }
     }
 
-    /// Zeroes what the latest matrix filled.
+    /// Zeroes the entries of the latest matrix.
     fn clear(&mut self) {
         let n = self.n;
         if n < LEAST_SPARSE {
@@ -93,7 +93,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         }
     }
 
-    /// Eliminates as if nothing were zero but what is left of the diagonal.
+    /// Dense elimination that skips rows with a zero factor.
     fn eliminate_all(&mut self) {
         let n = self.n;
         let a = &mut self.rows[..n * n];
@@ -127,7 +127,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         }
     }
 
-    /// Eliminates where rows may differ from zero.
+    /// Elimination restricted to the extents of the rows.
     fn eliminate_filled(&mut self) {
         let (n, stride) = (self.n, self.most);
         let (a, extents) = (&mut self.rows[..], &mut self.extents[..n]);
@@ -165,7 +165,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             self.filled.clear();
             let filled = span.clone().filter(|&j| !pivot_row[j].is_zero());
             self.filled.extend(filled);
-            // What lies side by side is taken several at a time.
+            // Contiguous ranges vectorise.
             let together = span.len() < 2 * self.filled.len();
             let width = if together { span.len() } else { self.filled.len() };
             for i in below {
@@ -214,7 +214,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         self.starts.push(self.columns.len());
     }
 
-    /// b[i] less the products of the factors left (`right` 0) or right (1) of the diagonal in row `i`.
+    /// b[i] minus the products of the factors left (`right` = 0) or right (1) of the diagonal in row `i`.
     #[inline]
     fn reduced(&self, i: usize, right: usize, b: &[X]) -> X {
         let mut x = b[i];
@@ -233,7 +233,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         x
     }
 
-    /// Solves with the factors in place.
+    /// Solves in place with the factors.
     pub fn solve(&self, b: &mut [X]) {
         let (n, stride) = (self.n, self.stride());
         for k in 0..n {
@@ -252,7 +252,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
 mod tests {
     use super::*;
 
-    /// Blocks of three along the diagonal, each coupled to a border, which is the first or the last block.
+    /// Diagonal blocks of three, each coupled to a border, which is the first or the last block.
     fn arrow(blocks: usize, border: usize) -> Vec<(usize, usize, f64)> {
         let mut entries = Vec::new();
         let mut seed = 7_u32;
@@ -292,7 +292,7 @@ mod tests {
             }
             filled.push(lu.factors.len());
         }
-        // A block of 3, its row and its column of the border, and the last block, off the diagonal.
+        // Off-diagonal entries: one block of 3 with its row and column of the border, and the last block.
         let border = |blocks: usize| (blocks - 1) * (6 + 18) + 6;
         assert_eq!(filled, [0, border(8), border(16), 48 * 47]);
     }

@@ -1,8 +1,8 @@
 //! Equations of motion of a scene.
 //!
-//! Ball joints are always cut joints: without them and the joints that say so, every scene is a forest of trees. Each ball joint
-//! then adds either three constraint rows (ideal) or one contact force (clearance), any other cut joint up to six rows. A scene
-//! pays only for what it contains.
+//! Ball joints, and other joints marked as loop-closing, are cut, so that every scene is a forest of trees. Each ball joint then
+//! adds either three constraint rows (ideal) or one contact force (clearance), any other cut joint up to six rows. A scene pays
+//! only for what it contains.
 
 mod band;
 mod bounds;
@@ -64,43 +64,43 @@ use path::Path;
 use settled::Settled;
 use tree::Tree;
 
-/// Why a scene's equations cannot be set up.
+/// Error in setting up the equations of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MechanismError {
-    /// A machine whose parts do not fit together.
+    /// A machine with inconsistent parts.
     #[error("{0}")]
     Machine(#[from] MachineFault),
     /// A rod cannot reach its slider somewhere along the trajectory.
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
-    /// A joint that closes a loop, left open by the scene's values, which are to be used as given.
+    /// A loop-closing joint that is open although the start values are to be used as given.
     #[error(
         "{given} as given, and {} may be open by at most {}: correct the start values, or let start = \"ideal\" close it",
         .given.kind(), .given.most()
     )]
     Open {
-        /// How far it is open.
+        /// Its opening.
         given: OpenJoint,
     },
     /// Loops that cannot be closed near the initial guess.
     #[error("{given} as given and cannot be closed{}", unclosed(.stays))]
     NoClosure {
-        /// The widest gap as given.
+        /// Widest gap as given.
         given: OpenJoint,
-        /// Joints still open where assembly converged. No admissible motion of the mechanism makes these gaps smaller. Empty if
+        /// Joints still open where assembly converged: no admissible motion of the mechanism reduces these gaps. Empty if
         /// assembly did not converge.
         stays: Vec<OpenJoint>,
     },
-    /// Loops that close, but that the drives open again at once.
+    /// Loops that close but that the drives open again immediately.
     #[error(
         "{}: the drives ask for speeds at which it {}; no motion that the mechanism has follows both",
         .rate.title(), .rate.opens()
     )]
     InconsistentDrives {
-        /// The joint, with m/s and rad/s.
+        /// The joint, with opening rates in m/s and rad/s.
         rate: OpenJoint,
     },
-    /// A ball that starts deeper in its socket wall than is plausible for a contact.
+    /// A ball that starts implausibly deep in its socket wall.
     #[error(
         "ball joint {joint}: ball and socket centres are {} apart as given, \
          deeper in the wall than the clearance {} and a hundredth of the ball radius allow",
@@ -114,7 +114,7 @@ pub enum MechanismError {
         /// c, m.
         clearance: f64,
     },
-    /// The loops closed at the start, but on another branch than that of the drives' closed form.
+    /// Loops that close on a different branch from the drives' closed form.
     #[error("the loops close on another branch than the drives ask for: start poses are too far off")]
     OtherBranch,
     /// A start pose in which the ideal joints do not determine the velocities.
@@ -123,29 +123,29 @@ pub enum MechanismError {
          move the start of the trajectory away from it"
     )]
     Singular,
-    /// Too many coordinates for a method that solves with a dense matrix.
+    /// Too many coordinates for a method with a dense matrix.
     #[error(
         "this scene has {velocities} velocity coordinates; the implicit methods take at most {most}: \
          choose solver.method = automatic or dopri5"
     )]
     TooLarge {
-        /// Velocity coordinates.
+        /// Number of velocity coordinates.
         velocities: usize,
-        /// Most that are accepted.
+        /// Maximum accepted.
         most: usize,
     },
-    /// Equations that would take more memory or time than is allowed.
+    /// Equations that exceed the limits on memory or time.
     #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
     TooCostly {
-        /// What is too costly.
+        /// The task that is too costly.
         of: CostOf,
-        /// What was counted.
+        /// The quantity limited.
         what: Counted,
         /// Amount needed.
         needed: u64,
-        /// Most that is allowed.
+        /// Maximum allowed.
         most: u64,
-        /// What to do instead.
+        /// Remedy.
         advice: Advice,
     },
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
@@ -160,30 +160,29 @@ pub enum MechanismError {
     },
 }
 
-/// Largest gap of a joint that closes a loop where start values are used as given, m, and by how much its bodies may then be turned
-/// against what it holds, rad.
+/// Maximum gap of a loop-closing joint if start values are used as given, m, and maximum angular misalignment of its bodies, rad.
 const OPEN_AS_GIVEN: f64 = 1e-5;
 const TURNED_AS_GIVEN: f64 = 1e-4;
 
-/// How far a joint that closes a loop is open.
+/// Opening of a cut joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenJoint {
-    /// Its name.
+    /// Joint name.
     pub joint: String,
-    /// Whether it is a ball joint: e = Z_j - Z_i then is all.
+    /// Whether it is a ball joint, whose opening is e = Z_j - Z_i alone.
     pub ball: bool,
-    /// In the world's axes, m and rad.
+    /// World axes, m and rad.
     pub opening: Opening,
 }
 
 impl OpenJoint {
-    /// The joint, at the beginning of a sentence.
+    /// The joint, for the beginning of a sentence.
     fn title(&self) -> String {
         let kind = if self.ball { "ball joint" } else { "joint" };
         format!("{kind} {}", self.joint)
     }
 
-    /// What may be open by [`Self::most`].
+    /// Kind of joint to which the limit [`Self::most`] applies.
     fn kind(&self) -> &'static str {
         if self.ball { "an ideal joint" } else { "a joint that closes a loop" }
     }
@@ -252,7 +251,7 @@ fn unclosed(stays: &[OpenJoint]) -> String {
     format!(": remaining gaps: {} (no joint can move that way)", each.join(", "))
 }
 
-/// Identifies the equations of a mechanism: two are equal if their states are interchangeable.
+/// Identifies the equations of a mechanism: states of mechanisms with equal structures are interchangeable.
 #[derive(Clone, Debug)]
 pub struct Structure {
     model: Arc<Model>,
@@ -262,12 +261,12 @@ pub struct Structure {
 /// The equations of motion of one scene in one formulation.
 pub struct Mechanism {
     model: Arc<Model>,
-    /// Rank of the constraint rows of joints that close loops, if some are dependent.
+    /// Rank of the rows of loop-closing joints, if some are dependent.
     rank: Option<usize>,
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
-    /// What moves the gap of each ball joint; `None` for nearly everything.
+    /// Bodies that determine the gap of each ball joint; `None` if nearly all do.
     paths: Vec<Option<Path>>,
     /// The scene's elements in its order, then the pulling hand, if any.
     elements: Vec<Box<dyn SceneElement>>,
@@ -275,30 +274,30 @@ pub struct Mechanism {
     pull: Option<Pull>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
-    /// Of the joints at which trees are cut: ball joints, then joints that close loops.
+    /// Names of the cut joints: ball joints, then other joints that close loops.
     joint_names: Vec<String>,
-    /// Linearisation; allocated if an implicit method is chosen.
+    /// Linearisation, allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
-    /// The same of friction alone.
+    /// Linearisation of friction alone.
     friction: Option<Box<friction::Friction>>,
     sources: power::Sources,
-    /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once they have been overwritten.
+    /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once overwritten.
     evaluated: Option<f64>,
     /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
     assembly: Assembly,
     settled: Option<Settled>,
-    /// ns, as by [`bounds::evaluation_time`].
+    /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
     evaluation_time: f64,
     free_flight_bodies: Vec<FreeFlightBody>,
     moving: ActiveRanges,
 }
 
 impl Mechanism {
-    /// Sets up the equations of `scene`.
+    /// Sets up the equations of `machine`.
     ///
     /// # Errors
-    /// A trajectory that the rods cannot reach; equations that would be too costly; for a settled start, a machine that does not
+    /// The rods cannot reach the trajectory, the equations would be too costly, or, for a settled start, the machine does not
     /// start without play.
     pub fn new(machine: &Machine) -> Result<Self, MechanismError> {
         machine.check()?;
@@ -349,8 +348,8 @@ impl Mechanism {
         mechanism
     }
 
-    /// For resuming from a state that belongs to `structure`, without computing a start state. What live changes do not
-    /// reach is shared: the scales of the tolerance are those of the start.
+    /// For resuming from a state of `structure` without computing a start state. Data unaffected by live changes is shared:
+    /// tolerance scales are those of the start.
     pub fn resumed(machine: &Machine, structure: &Structure) -> Self {
         let mut mechanism = Self::with_model(machine, structure.model.clone());
         mechanism.rank = structure.rank;
@@ -360,7 +359,7 @@ impl Mechanism {
         mechanism
     }
 
-    /// What a snapshot stores about the equations.
+    /// The part of a snapshot that concerns the equations.
     pub fn structure(&self) -> Structure {
         Structure { model: self.model.clone(), rank: self.rank }
     }
@@ -370,7 +369,7 @@ impl Mechanism {
         Arc::ptr_eq(&self.model, &structure.model)
     }
 
-    /// Whether positions and velocities are projected back onto constraints after a step.
+    /// Whether positions and velocities are projected onto the constraints after a step.
     pub fn projects(&self) -> bool {
         self.equations.projects()
     }
@@ -380,13 +379,13 @@ impl Mechanism {
         self.equations.is_kinematic(&self.model)
     }
 
-    /// Longest step where the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
+    /// Maximum step if the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
         let loads = self.elements.iter().map(|element| element.period());
         loads.fold(self.model.shortest_period, f64::min) / 50.0
     }
 
-    /// Whether derivatives of the motion that drives prescribe jump at ends of steps.
+    /// Whether derivatives of prescribed motions jump at ends of steps.
     pub fn has_broken_drives(&self) -> bool {
         !self.model.bounding.is_empty()
     }
@@ -397,14 +396,14 @@ impl Mechanism {
         of_elements.fold(self.model.step_end(t), f64::min)
     }
 
-    /// Where the motion is a function of time alone: the determinant of the loops' Jacobian, whose sign tells the side of a
-    /// singular pose. True elsewhere.
+    /// If the motion is a function of time alone: whether the determinant of the loops' Jacobian is positive. Its sign changes
+    /// across a singular pose. Otherwise true.
     pub fn is_determinant_positive(&mut self) -> bool {
         !self.is_kinematic() || self.equations.is_determinant_positive(&self.model)
     }
 
-    /// Where the motion is a function of time alone and known in closed form: distance of the output body from that motion
-    /// at the latest evaluation, m. 0 elsewhere.
+    /// Distance of the output body from its closed-form motion at the latest evaluation, m, if the motion is a function of time
+    /// alone and known in closed form; otherwise 0.
     pub fn distance_from_ideal(&self) -> f64 {
         let Some(ideal) = self.closed_motion().filter(|_| self.is_kinematic()) else {
             return 0.0;
@@ -415,7 +414,7 @@ impl Mechanism {
         (origin - Vec3::from_fn(|i, _| ideal.position[i].value)).norm()
     }
 
-    /// Predicts the state after a step `h` where the motion is a function of time alone: second order in positions.
+    /// Predicts the state after a step `h`, s, to second order in positions, if the motion is a function of time alone.
     pub fn predict(&self, h: f64, y: &[f64], k: &[f64], step: &mut [f64], out: &mut [f64]) {
         let nq = self.model.nq;
         out.copy_from_slice(y);
@@ -439,12 +438,12 @@ impl Mechanism {
         self.contacts.measure(t, self.equations.motion());
     }
 
-    /// Components of a state that [`Self::measure_one`] reads for ball joint `j`; `None` if it reads all.
+    /// Components of the state read by [`Self::measure_one`] for ball joint `j`; `None` if it reads all.
     pub fn measured(&self, j: usize) -> Option<&[Range<usize>]> {
         self.paths[j].as_ref().map(|path| &path.parts[..])
     }
 
-    /// OpenJoint of ball joint `j` at (t, y), and the motion of the bodies that decide it.
+    /// Measures the gap of ball joint `j` at (t, y), and the motion of the bodies that determine it.
     pub fn measure_one(&mut self, j: usize, t: f64, y: &[f64]) {
         self.evaluated = None;
         match &self.paths[j] {
@@ -495,15 +494,15 @@ impl Mechanism {
         self.equations.driven().closed.as_ref()
     }
 
-    /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` if the joint has clearance.
+    /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` for a joint with clearance.
     pub fn reaction(&self, j: usize) -> Option<Vec3> {
         let k = self.model.joints[j].ideal?;
         Some(self.equations.reaction(k))
     }
 
-    /// Whether the reaction of joint `j` is unique at the latest evaluation: a ball joint, or after them a joint that closes a
-    /// loop. Where such joints constrain a direction redundantly, [`Self::reaction`] is the one with the least sum of squares over
-    /// all of them, in N and N m.
+    /// Whether the reaction of cut joint `j` is unique at the latest evaluation; ball joints come first, then other loop-closing
+    /// joints. If a direction is constrained redundantly, [`Self::reaction`] minimises the sum of squares over all such joints,
+    /// in N and N m.
     pub fn is_reaction_unique(&self, j: usize) -> bool {
         match self.model.joints.get(j) {
             Some(joint) => joint.ideal.is_none_or(|k| self.equations.is_reaction_unique(k)),
@@ -514,14 +513,13 @@ impl Mechanism {
         }
     }
 
-    /// Of each joint that closes a loop, the force, N, at the child's point and the torque, N m, that it exerts on its child at the
-    /// latest evaluation.
+    /// Force, N, at the child's point and torque, N m, exerted on its child by each loop-closing joint at the latest evaluation.
     pub fn closing_loads(&self) -> impl Iterator<Item = [Vec3; 2]> {
         let all = 0..self.model.closures.len();
         all.map(|c| self.equations.closure_load(c))
     }
 
-    /// Number of joints at which trees are cut: ball joints, then joints that close loops.
+    /// Number of cut joints: ball joints, then other joints that close loops.
     pub fn cut_joints(&self) -> usize {
         self.model.joints.len() + self.model.closures.len()
     }
@@ -536,12 +534,12 @@ impl Mechanism {
         self.equations.drift()
     }
 
-    /// Whether rows of the constraint matrix were dependent at the latest evaluation, up to rounding.
+    /// Whether constraint rows were dependent, up to rounding, at the latest evaluation.
     pub fn has_dependent_rows(&self) -> bool {
         self.equations.least_pivot() < LEAST_PIVOT
     }
 
-    /// Whether they were so nearly dependent there that steps cannot pass: the pose is singular.
+    /// Whether the rows were so nearly dependent that steps cannot pass: the pose is singular.
     pub fn is_nearly_singular(&self) -> bool {
         self.equations.least_pivot() < NEARLY_DEPENDENT
     }
@@ -561,11 +559,11 @@ impl Mechanism {
         self.equations.actuators(&self.model, &self.gravity, out);
     }
 
-    /// Force, N, and torque about the child's joint point, N m, that every fixed, sliding or turning joint exerts on its child,
-    /// its drive's included, in the order of the scene, after [`Self::actuators`]. World axes.
+    /// Force, N, and torque about the child's joint point, N m, exerted on its child by every fixed, sliding or turning joint,
+    /// drive included, in scene order, after [`Self::actuators`]. World axes.
     pub fn joint_reactions(&mut self) -> impl Iterator<Item = [Vec3; 2]> {
         let (motion, loads) = self.equations.joint_loads();
-        // The massless links of joints of two degrees pass on what their parents exert.
+        // Massless links only transmit the loads of their parents.
         let bodies = &self.model.bodies[..self.model.massive];
         let bodies = bodies.iter().zip(motion).zip(loads);
         bodies.filter_map(|((body, m), load)| {
@@ -575,8 +573,8 @@ impl Mechanism {
         })
     }
 
-    /// Coordinates of all joints that slide or turn, with their rates, after an evaluation at `y`: those that bodies hang on, in
-    /// the order of the scene, then those that close loops.
+    /// Coordinates and rates of all sliding or turning joints after an evaluation at `y`: tree joints in scene order, then joints
+    /// that close loops.
     pub fn coordinates(&self, y: &[f64]) -> impl Iterator<Item = [f64; 2]> {
         let all = self.model.order.iter();
         let hung = all.filter_map(move |&b| self.equations.coordinate(&self.model, y, b));
@@ -595,7 +593,7 @@ impl Mechanism {
         (kinetic, potential)
     }
 
-    /// Energy stored in contacts and springs at the gaps last measured, those at `t`, J.
+    /// Energy stored in contacts and springs at the gaps last measured, at `t`, J.
     pub fn elastic_energy(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         let mut energy = 0.0;
@@ -605,40 +603,40 @@ impl Mechanism {
         energy + self.energy_in_elements(t)
     }
 
-    /// Energy stored in springs at the latest evaluation, that at `t`, J.
+    /// Energy stored in springs at the latest evaluation, at `t`, J.
     pub fn energy_in_elements(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         self.elements.iter().map(|e| e.stored(t, motion)).sum()
     }
 
-    /// Reports of the force elements at `t`, the time of the latest evaluation, in the order of the scene.
+    /// Reports of the force elements in scene order; `t`, s, is the time of the latest evaluation.
     pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
         let motion = self.equations.motion();
         let of_scene = self.elements[..self.of_scene].iter();
         of_scene.map(move |e| e.report(t, motion))
     }
 
-    /// How deep every element that has edges is pressed in, and that or, where it has let go meanwhile, not above 0: two numbers each, in
-    /// any unit, at `t`, s, the time of the motion last measured.
+    /// Two numbers per one-sided element, in any unit: depth of contact, and the smaller of that and an indicator that falls to 0
+    /// when contact is lost while compressed. `t`, s, is the time of the motion last measured.
     pub fn pressed(&self, t: f64) -> impl Iterator<Item = f64> {
         let motion = self.equations.motion();
         self.elements.iter().filter_map(move |e| e.pressed(t, motion)).flatten()
     }
 
-    /// Whether any element has edges.
+    /// Whether any element is one-sided.
     pub fn has_edges(&self) -> bool {
         self.pressed(0.0).next().is_some()
     }
 
-    /// Whether any element that presses, by `pressed` as of [`Self::pressed`], has a force whose slope begins vertically.
+    /// Whether the force of any element in contact, by `pressed` from [`Self::pressed`], has a vertical slope at first contact.
     pub fn presses_vertically(&self, pressed: &[f64]) -> bool {
         let motion = self.equations.motion();
         let with_edges = self.elements.iter().filter(|e| e.pressed(0.0, motion).is_some());
         pressed.chunks_exact(2).zip(with_edges).any(|(own, element)| own[1] > 0.0 && element.begins_vertically())
     }
 
-    /// Lets the elements that have edges follow their laws as if they pressed, or not, wherever they are, as `pressed` says, as of
-    /// [`Self::pressed`]; if it is empty, as the motion has it.
+    /// Freezes the contact state of the one-sided elements according to `pressed` from [`Self::pressed`], regardless of the
+    /// motion; unfreezes it if `pressed` is empty.
     pub fn hold_elements(&mut self, pressed: &[f64]) {
         let motion = self.equations.motion();
         let with_edges = self.elements.iter_mut().filter(|e| e.pressed(0.0, motion).is_some());
@@ -652,7 +650,7 @@ impl Mechanism {
         self.pull
     }
 
-    /// Sets or removes the hand's pull on a body of `scene`, whose equations these are.
+    /// Sets or removes the hand's pull on a body of `machine`, which these equations must belong to.
     pub fn set_pull(&mut self, machine: &Machine, pull: Option<Pull>) {
         self.elements.truncate(self.of_scene);
         self.pull = pull;
@@ -664,18 +662,18 @@ impl Mechanism {
         self.sources = power::Sources::new(&self.model, &*self.equations, elements);
     }
 
-    /// Whether any element's force depends on motion in a way that can be stiff.
+    /// Whether the force of any element depends on motion in a possibly stiff way.
     pub fn has_couplings(&self) -> bool {
         let motion = self.equations.motion();
         self.elements.iter().any(|e| e.ends(motion).is_some())
     }
 
-    /// Origin of body `b`'s scene frame from its centroid, body axes, m.
+    /// Origin of the scene frame of body `b` from its centroid, body axes, m.
     pub fn frame_origin(&self, b: usize) -> Vec3 {
         self.model.bodies[b].origin
     }
 
-    /// Allocates what [`linearise`](crate::integrate::StiffSystem::linearise) needs, so that no step has to.
+    /// Allocates the workspace of [`linearise`](crate::integrate::StiffSystem::linearise), so that steps do not allocate.
     pub fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
@@ -690,10 +688,10 @@ impl Mechanism {
         }
     }
 
-    /// Allocates what the linearisation of friction alone needs.
+    /// Allocates the linearisation of friction alone.
     ///
     /// # Errors
-    /// Contacts that couple too widely for it.
+    /// The contacts are coupled too widely.
     pub fn prepare_friction(&mut self) -> Result<(), MechanismError> {
         if self.friction.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
@@ -705,43 +703,43 @@ impl Mechanism {
         Ok(())
     }
 
-    /// Whether friction can be linearised alone.
+    /// Whether the linearisation of friction alone is prepared.
     pub fn has_friction_alone(&self) -> bool {
         self.friction.is_some()
     }
 
-    /// Largest rate at which friction damps the sliding of a contact, 1/s, by its latest linearisation.
+    /// Largest rate at which friction damps the sliding of a contact, 1/s, in its latest linearisation.
     pub fn friction_rate(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, |f| f.fastest())
     }
 
-    /// Largest angular frequency at which a ball rings on its wall, rad/s, by that linearisation.
+    /// Largest angular frequency of a ball vibrating on its wall, rad/s, in that linearisation.
     pub fn friction_ringing(&self) -> f64 {
         self.friction.as_ref().map_or(0.0, |f| f.ringing())
     }
 
-    /// Approximate cost of the latest implicit step's linear algebra, in evaluations.
+    /// Approximate cost of linear algebra in the latest implicit step, in evaluations.
     pub fn implicit_algebra(&self) -> f64 {
         let stiff = self.stiff.as_ref();
         let [coordinates, products] = stiff.map_or([0; 2], |stiff| stiff.size());
         bounds::implicit_time(coordinates, products) / self.evaluation_time
     }
 
-    /// The same of the latest step with friction alone implicit.
+    /// The same for the latest step with only friction implicit.
     pub fn friction_algebra(&self) -> f64 {
         let touching = self.friction.as_ref().map_or(0, |f| f.touching());
         bounds::FRICTION_TIME * touching as f64 / self.evaluation_time
     }
 
-    /// Most velocity coordinates with which the automatic choice steps implicitly, too.
+    /// Maximum number of velocity coordinates for which the automatic choice considers implicit steps.
     pub fn largest_implicit(&self) -> usize {
         if self.equations.is_block_diagonal() { LARGEST_DENSE } else { bounds::LARGEST_COUPLED }
     }
 
-    /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.
+    /// Allocates the workspace of [`ContactSystem`](crate::integrate::ContactSystem), so that steps do not allocate.
     ///
     /// # Errors
-    /// Contacts that are coupled too widely.
+    /// The contacts are coupled too widely.
     pub fn prepare_implicit_contacts(&mut self) -> Result<(), MechanismError> {
         if self.implicit.is_none() {
             let velocities = self.dimension() - self.positions();
@@ -752,7 +750,7 @@ impl Mechanism {
         Ok(())
     }
 
-    /// What the scene contains, what will be computed and what not.
+    /// Contents of the scene, and the computations it needs.
     pub fn summary(&self) -> Summary {
         Summary::new(self)
     }

@@ -1,4 +1,4 @@
-//! A scene compiled for the equations of motion: centroid frames, coordinate numbers, trees, drives.
+//! A scene compiled for the equations of motion: centroid frames, coordinate numbering, trees, drives.
 
 use std::sync::Arc;
 
@@ -9,20 +9,20 @@ use super::spcmm::SliderTrajectory;
 use crate::jet::Jet;
 use crate::machine::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Quat, StartRule, Vec3};
 
-/// Index of a body: those of the scene, then massless links; one past the last stands for the world.
+/// Index of a body: the scene's bodies, then massless links; one past the last is the world.
 pub type BodyIndex = usize;
 
 /// A body in its centroid frame: axes of the scene's body frame, origin at the centroid.
 ///
-/// A joint of two degrees is two of one degree in series: between them hangs a massless link, whose frame lies at the joint
-/// point with the parent's axes where its coordinate is 0.
+/// A joint of two degrees of freedom is compiled as two joints of one degree in series, connected by a massless link. The link's
+/// frame is at the joint point, with the parent's axes at coordinate 0.
 #[derive(Clone, Debug)]
 pub struct Body {
     pub mass: f64,
-    /// About the centroid, body axes, kg m^2.
+    /// Inertia about the centroid, body axes, kg m^2.
     pub inertia: Mat3,
     pub inertia_inverse: Mat3,
-    /// Parent body; the world's index if it is attached to the world.
+    /// Parent body, or the world's index.
     pub parent: BodyIndex,
     pub motion: Motion,
     /// Joint point from the parent's centroid, parent axes (world: absolute), m.
@@ -35,17 +35,17 @@ pub struct Body {
     pub fixed: Mat3,
     pub cosine: Mat3,
     pub sine: Mat3,
-    /// Scene body frame's origin from the centroid, body axes, m.
+    /// Origin of the scene's body frame from the centroid, body axes, m.
     pub origin: Vec3,
     /// Whether its motion depends on time alone.
     pub driven_only: bool,
     /// Whether it has a child whose motion does not depend on time alone.
     pub carries: bool,
-    /// Inertia is diagonal in body axes.
+    /// Whether the inertia is diagonal in body axes.
     pub diagonal: bool,
 }
 
-/// How a body moves relative to its parent.
+/// Motion of a body relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
     Fixed,
@@ -80,7 +80,7 @@ pub struct TreeBlock {
     pub n: usize,
     /// Which of its coordinates couple.
     pub pattern: Pattern,
-    /// The free body of this block, if it is the block's only body: its mass matrix is block diagonal.
+    /// The free body of this block if it is the only one: the mass matrix is then block diagonal.
     pub lone: Option<BodyIndex>,
 }
 
@@ -97,18 +97,19 @@ pub struct Anchor {
 pub struct BallJoint {
     pub socket: Anchor,
     pub ball: Anchor,
-    /// Index among the ideal joints, if it is one.
+    /// Index among the ideal joints; `None` with clearance.
     pub ideal: Option<usize>,
 }
 
-/// A joint between two bodies, whether the child hangs on it or it closes a loop.
+/// A joint between two bodies, in the tree or closing a loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     pub kind: JointKind,
-    /// Its points.
+    /// Joint points.
     pub child: Anchor,
     pub parent: Anchor,
-    /// Its axis and two directions across, parent axes; the same in the child's axes where the coordinates are 0.
+    /// Joint axis and two directions perpendicular to it, in the parent's axes, and the same at zero coordinates in the child's
+    /// axes.
     pub axes: [Vec3; 3],
     pub seen: [Vec3; 3],
     /// Second axis of a universal joint, child axes.
@@ -116,7 +117,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Of `joint` between these points.
+    /// Pair for `joint` between these points.
     pub fn new(joint: &Joint, child: Anchor, parent: Anchor) -> Self {
         let x = joint.axis;
         let across = if x.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
@@ -144,44 +145,44 @@ pub struct DriveLaw {
 #[derive(Clone, Debug)]
 pub struct Model {
     pub bodies: Vec<Body>,
-    /// How many of them are the scene's; the rest are massless links.
+    /// Number of bodies from the scene; the rest are massless links.
     pub massive: usize,
-    /// All bodies, parents before children; and the place of each there.
+    /// All bodies, parents before children, and the position of each in that order.
     pub order: Vec<BodyIndex>,
     pub place: Vec<usize>,
-    /// The joints of two degrees, by their links.
+    /// Joints of two degrees of freedom, by link.
     pub linked: Vec<Pair>,
     /// Joints that close loops.
     pub closures: Vec<Pair>,
-    /// Position coordinates.
+    /// Number of position coordinates.
     pub nq: usize,
-    /// Velocity coordinates.
+    /// Number of velocity coordinates.
     pub nv: usize,
     pub blocks: Vec<TreeBlock>,
-    /// Block of each body; meaningless where it has no coordinate.
+    /// Block of each body; unspecified for a body without coordinates.
     pub block_of: Vec<usize>,
     pub joints: Vec<BallJoint>,
     pub ideal_joints: Vec<usize>,
     pub drives: Vec<DriveLaw>,
     pub closed_form: Option<Arc<dyn ClosedForm>>,
     pub start: StartRule,
-    /// Position and velocity coordinates at t = 0 as the scene gives them.
+    /// Position and velocity coordinates at t = 0 as specified in the scene.
     pub start_state: Vec<f64>,
-    /// Scale by which the tolerance is multiplied for each coordinate of (q, v).
+    /// Factor on the tolerance for each coordinate of (q, v).
     pub scale: Vec<f64>,
     /// Length from which the position scales are derived, m.
     pub length_scale: f64,
     pub output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
     pub probe: Option<Vec3>,
-    /// Shortest swing of a drive, s; infinite where none swings.
+    /// Shortest period of oscillation of a drive, s; infinite if none oscillates.
     pub shortest_period: f64,
-    /// Laws that bound steps.
+    /// Drive laws that bound steps.
     pub bounding: Vec<Arc<dyn Law>>,
 }
 
 impl Model {
-    /// Compiles `scene`.
+    /// Compiles `machine`.
     pub fn new(machine: &Machine) -> Self {
         let massive = machine.bodies.len();
         let of_two = |joint: &&Joint| joint.kind.freedoms().len() == 2;
@@ -331,14 +332,14 @@ impl Model {
         model
     }
 
-    /// The joint of two degrees that body `b` belongs to as its link or its child, and which of its coordinates moves `b`.
+    /// The two-degree joint whose link or child is body `b`, and which of its coordinates moves `b`.
     pub fn linked_at(&self, b: BodyIndex) -> Option<(&Pair, usize)> {
         let link = |b: BodyIndex| self.linked.get(b.checked_sub(self.massive)?);
         let own = link(b).map(|pair| (pair, 0));
         own.or_else(|| Some((link(self.bodies[b].parent)?, 1)))
     }
 
-    /// Coordinate and rate at t = 0 of the joint of one degree above body `b`, as the scene gives them.
+    /// Coordinate and rate at t = 0 of the one-degree joint above body `b`, as specified in the scene.
     fn start_of(&self, machine: &Machine, b: BodyIndex) -> [f64; 2] {
         let (joint, part) = match self.linked_at(b) {
             Some((pair, part)) => (pair.child.body, part),
@@ -351,7 +352,7 @@ impl Model {
         }
     }
 
-    /// A point of `scene`.
+    /// Anchor of a point of `machine`.
     pub fn anchor(&self, machine: &Machine, point: &Attachment) -> Anchor {
         Anchor {
             body: point.body.unwrap_or(self.bodies.len()),
@@ -359,7 +360,7 @@ impl Model {
         }
     }
 
-    /// Numbers the coordinates tree by tree, so that each tree's are contiguous, and fills in start state and scales.
+    /// Numbers the coordinates tree by tree, so that those of a tree are contiguous, and sets start state and scales.
     fn number_coordinates(&mut self, machine: &Machine, root: &[usize]) {
         let scales = Scales::of(machine);
         let mut start_q: Vec<f64> = Vec::new();
@@ -377,7 +378,7 @@ impl Model {
                 trees[self.block_of[b]].push(b);
             }
         }
-        // Last coordinate, within its tree, on the path from the root to each body.
+        // Last coordinate within its tree on the path from the root to each body.
         let mut last = vec![NONE; self.bodies.len()];
         for bodies in trees {
             let (tree, count) = (bodies[0], bodies.len());
@@ -415,7 +416,7 @@ impl Model {
                         start_v.extend((velocity + spin.cross(&centre)).iter());
                         start_v.extend(spin.iter());
                         scale_q.extend([scales.length; 3]);
-                        // A quaternion component moves by half the angle.
+                        // A quaternion component changes by half the angle.
                         scale_q.extend([0.5 * scales.angle; 4]);
                         scale_v.extend([scales.speed; 3]);
                         scale_v.extend([scales.angular_speed; 3]);
@@ -461,15 +462,15 @@ impl Model {
         }
     }
 
-    /// Latest end of an adaptive step that starts at `t`, s: none passes over what a drive only begins within it.
+    /// Latest end of an adaptive step that starts at `t`, s, to resolve features of drive laws.
     pub fn step_end(&self, t: f64) -> f64 {
         let ends = self.bounding.iter().map(|law| law.step_end(t));
         ends.fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Relative rotation of a joint for coordinate q: Rot(axis, q) R0 = (a a^T + cos q (1 - a a^T) + sin q [a]x) R0 if it `turns`,
-/// else R0.
+/// Relative rotation of a joint for coordinate q in constant, cosine and sine parts: Rot(axis, q) R0 =
+/// (a a^T + cos q (1 - a a^T) + sin q [a]x) R0 if it `turns`, else R0.
 fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
     if !turns {
         return [rest, Mat3::zeros(), Mat3::zeros()];
@@ -478,8 +479,8 @@ fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
     [along * rest, (Mat3::identity() - along) * rest, axis.cross_matrix() * rest]
 }
 
-/// The massless link of a joint of two degrees: on a slide of a cylindrical joint, on the first hinge of a universal one, which
-/// makes this motion.
+/// The massless link of a two-degree joint: on the slide of a cylindrical joint or the first hinge of a universal joint, whose
+/// motion is `motion`.
 fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) -> Body {
     let slides = joint.kind == JointKind::Cylindrical;
     let [fixed, cosine, sine] = turning(&joint.axis, Mat3::identity(), !slides);
@@ -502,7 +503,7 @@ fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) 
     }
 }
 
-/// The closed form that `scene` follows, if any.
+/// Closed form of `machine`, if any.
 fn closed_form_of(machine: &Machine) -> Option<Arc<dyn ClosedForm>> {
     let spcmm = machine.spcmm.as_ref()?;
     Some(Arc::new(SliderTrajectory::new(spcmm)))
@@ -519,7 +520,7 @@ fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
     }
 }
 
-/// Scales that the relative tolerance multiplies: documented in `docs/numerics.md`.
+/// Scales multiplied by the relative tolerance; see `docs/numerics.md`.
 struct Scales {
     length: f64,
     speed: f64,

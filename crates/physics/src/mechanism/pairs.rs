@@ -1,22 +1,22 @@
-//! What a joint holds between two bodies, in terms of the motion of both: constraint rows, coordinates, and how far it is open.
-//! The same in every formulation.
+//! Joints as constraints between two bodies, in terms of their motion: constraint rows, coordinates and constraint violation. The
+//! same in every formulation.
 
 use super::kinematics::Kinematics;
 use super::model::Pair;
 use crate::jet::Jet;
 use crate::machine::{JointKind, Vec3};
 
-/// Kinds of constraint rows between a child and a parent.
+/// Constraint rows between a child and a parent.
 #[derive(Clone, Copy, Debug)]
 pub enum Rows {
     /// Two points coincide: 3 rows, (45) and the first three of (47).
     Point { child: Vec3, parent: Vec3 },
-    /// A vector of the child stays perpendicular to one of the parent: 1 row, as in (46), (47).
+    /// A vector of the child is perpendicular to one of the parent: 1 row, as in (46), (47).
     Perpendicular { child: Vec3, parent: Vec3 },
-    /// The child's point stays at `parent + s along`, s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
+    /// The child's point lies at `parent + s along`, where s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
     Offset { child: Vec3, parent: Vec3, along: Vec3, drive: Option<usize> },
-    /// Angle from the parent's `zero` to the child's `child` about `axis`, of the parent or `in_child`, is the driven coordinate:
-    /// 1 row.
+    /// The angle from the parent's `zero` to the child's `child` about `axis` (fixed in the parent, or in the child if
+    /// `in_child`) equals the driven coordinate: 1 row.
     Angle { child: Vec3, zero: Vec3, axis: Vec3, in_child: bool, drive: usize },
 }
 
@@ -33,13 +33,13 @@ impl Rows {
         if matches!(self, Self::Point { .. }) { 3 } else { 1 }
     }
 
-    /// Whether it is about orientation, not points.
+    /// Whether it constrains orientation rather than points.
     pub fn turns(&self) -> bool {
         matches!(self, Self::Perpendicular { .. } | Self::Angle { .. })
     }
 
-    /// Calls `found` with each row's number, its Jacobian, and its violation with the first and second time derivatives, for the
-    /// motion of child and parent and the driven coordinates.
+    /// Calls `found` with each row's number, Jacobian, and violation with its first and second time derivatives, for the motion
+    /// of child and parent and the driven coordinates.
     #[inline(always)]
     pub fn linearise(
         &self,
@@ -106,18 +106,18 @@ impl Rows {
     }
 }
 
-/// How far a joint is open.
+/// Constraint violation of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Opening {
-    /// How far its points are from where it holds them together, world axes: m, or m/s.
+    /// Separation of the joint's points, world axes: m, or m/s.
     pub apart: Vec3,
-    /// By how much its bodies are turned against what it holds: rad, or rad/s.
+    /// Angular misalignment of its bodies: rad, or rad/s.
     pub turned: f64,
 }
 
 impl Pair {
-    /// The rows that it holds, no drive: of its points, then of its orientation. Those of one part have their directions
-    /// perpendicular to each other.
+    /// Its constraint rows without drives: position rows, then orientation rows. The directions within each part are mutually
+    /// perpendicular.
     pub fn rows(&self) -> [Vec<Rows>; 2] {
         let [x, y, z] = self.axes;
         let [seen_x, seen_y, _] = self.seen;
@@ -135,7 +135,7 @@ impl Pair {
         [points.to_vec(), orientation.iter().map(perpendicular).collect()]
     }
 
-    /// The row that prescribes its coordinate `part`.
+    /// The row that prescribes coordinate `part`.
     pub fn driven_row(&self, part: usize, drive: usize) -> Rows {
         let about_axis =
             |child: Vec3, zero: Vec3| Rows::Angle { child, zero, axis: self.axes[0], in_child: false, drive };
@@ -149,7 +149,7 @@ impl Pair {
         }
     }
 
-    /// The second axis of a universal joint where both angles are 0, as the parent sees it.
+    /// Second axis of a universal joint at zero angles, in the parent's axes.
     fn second_at_zero(&self) -> Vec3 {
         let [x, y, z] = self.seen.map(|seen| seen.dot(&self.second));
         self.axes[0] * x + self.axes[1] * y + self.axes[2] * z
@@ -163,7 +163,7 @@ impl Pair {
         Rows::Offset { child: self.child.offset, parent: self.parent.offset, along: *along, drive }
     }
 
-    /// Whether the child's point moves along the axis.
+    /// Whether the child's point slides along the axis.
     pub fn slides(&self) -> bool {
         matches!(self.kind, JointKind::Prismatic | JointKind::Cylindrical)
     }
@@ -173,8 +173,8 @@ impl Pair {
         [&motion[self.child.body], &motion[self.parent.body]]
     }
 
-    /// The child's and the parent's point from the centroids of their bodies, m; of one that slides, the child's point as one of
-    /// either body.
+    /// Joint points of child and parent relative to the centroids of their bodies, m. For a sliding joint, both arms lead to the
+    /// child's point.
     pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
         let [c, p] = self.ends(motion);
         let arm = c.rotation * self.child.offset;
@@ -182,7 +182,7 @@ impl Pair {
         [arm, other]
     }
 
-    /// Its coordinates with their rates, m or rad, in the order of [`JointKind::freedoms`]; angles between -pi and pi.
+    /// Coordinates with their rates, m or rad, in the order of [`JointKind::freedoms`]; angles between -pi and pi.
     pub fn coordinates(&self, motion: &[Kinematics]) -> impl Iterator<Item = [f64; 2]> + use<> {
         let [c, p] = self.ends(motion);
         let axis = p.rotation * self.axes[0];
@@ -214,7 +214,7 @@ impl Pair {
         both.into_iter().flatten()
     }
 
-    /// How far it is open, m and rad. Its rows do not tell an axis from its opposite; this does.
+    /// Constraint violation, m and rad. Unlike the rows, it distinguishes an axis from its opposite.
     pub fn opening(&self, motion: &[Kinematics]) -> Opening {
         let [c, p] = self.ends(motion);
         let axes = self.axes.map(|axis| p.rotation * axis);
@@ -232,7 +232,7 @@ impl Pair {
                 libm::atan2(sine, cosine).abs()
             }
             JointKind::Fixed | JointKind::Prismatic => {
-                // Of a rotation by an angle about n: the sums are 2 sin n and 1 + 2 cos.
+                // For a rotation by an angle about n, the sums are 2 sin n and 1 + 2 cos.
                 let pairs = || axes.iter().zip(&seen);
                 let sine = pairs().map(|(a, b)| a.cross(b)).sum::<Vec3>().norm();
                 let cosine = pairs().map(|(a, b)| a.dot(b)).sum::<f64>() - 1.0;
@@ -242,7 +242,7 @@ impl Pair {
         Opening { apart, turned }
     }
 
-    /// At what speeds it opens, m/s and rad/s.
+    /// Rate of constraint violation, m/s and rad/s.
     pub fn opening_rate(&self, motion: &[Kinematics]) -> Opening {
         let [c, p] = self.ends(motion);
         let rates = self.rows().map(|rows| {

@@ -1,26 +1,26 @@
-//! What moves the gap of one ball joint: few bodies of many, so that a search for the instant of an event looks at no others.
+//! The few bodies that determine the gap of one ball joint, so that event location need not evaluate the others.
 
 use super::model::{BallJoint, BodyIndex, Model, Motion};
 use std::ops::Range;
 
-/// Longer paths are not worth keeping.
+/// Maximum path length: longer paths save too little.
 const LONGEST: usize = 16;
 
-/// Bodies that decide a gap, each after its parent, and where their coordinates stand.
+/// Bodies that determine a gap, parents before children, and their components of the state.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
-    /// Those whose motion depends on time alone.
+    /// Bodies whose motion depends on time alone.
     pub driven: Vec<BodyIndex>,
-    /// The others.
+    /// All other bodies on the path.
     pub dynamic: Vec<BodyIndex>,
     /// Driven coordinates of both.
     pub drives: Vec<usize>,
-    /// Components of a state.
+    /// Their components of the state.
     pub parts: Vec<Range<usize>>,
 }
 
 impl Path {
-    /// Path of `joint` in tree coordinates; `None` if it is long.
+    /// Path of `joint` in tree coordinates; `None` if it is too long.
     pub fn of(model: &Model, joint: &BallJoint) -> Option<Self> {
         let mut bodies = Vec::with_capacity(LONGEST);
         for mut b in [joint.ball.body, joint.socket.body] {
@@ -51,7 +51,7 @@ impl Path {
         Some(path)
     }
 
-    /// Path of `joint` where each body has its own seven positions and six velocities.
+    /// Path of `joint` if each body has its own seven positions and six velocities.
     pub fn of_bodies(model: &Model, joint: &BallJoint) -> Self {
         let mut path = Self::default();
         for b in [joint.ball.body, joint.socket.body] {
@@ -103,7 +103,7 @@ mod tests {
                     let t = 0.013 * f64::from(step);
                     whole.measure(t, &y);
                     for j in 0..scene.machine.ball_joints.len() {
-                        // What is not on the path does not matter.
+                        // Components off the path must not be read.
                         let mut known = vec![f64::NAN; y.len()];
                         for part in along.measured(j).unwrap() {
                             known[part.clone()].copy_from_slice(&y[part.clone()]);
@@ -113,7 +113,7 @@ mod tests {
                         assert_eq!(format!("{one:?}"), format!("{all:?}"), "{name} {j}");
                         assert_eq!(along.slip_speed(j), whole.slip_speed(j), "{name} {j}");
                     }
-                    // The whole mechanism at the same instant after that.
+                    // Then the whole mechanism at the same instant.
                     along.measure(t, &y);
                     for (one, all) in along.contacts.gaps().zip(whole.contacts.gaps()) {
                         assert_eq!(format!("{one:?}"), format!("{all:?}"), "{name}");

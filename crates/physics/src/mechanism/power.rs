@@ -1,5 +1,4 @@
-//! Powers of all energy sources and sinks, each from its force and the velocity of the point where it acts. Allocates
-//! nothing.
+//! Powers of all energy sources and sinks, each from a force and the velocity of its point of application. Allocates nothing.
 
 use super::Mechanism;
 use super::elements::{ForceElement, Powers, Touch};
@@ -8,16 +7,16 @@ use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
 use crate::machine::Vec3;
 
-/// Which parts of a scene can have power.
+/// Parts of a scene that can have power.
 pub(super) struct Sources {
     /// Neither drives, nor contacts, nor force elements: every power is zero.
     pub none: bool,
-    /// No drive force depends on an acceleration that the equations of motion have to be solved for: forces are enough.
+    /// No drive force depends on an unknown acceleration, so that the loads alone suffice.
     pub forces_suffice: bool,
 }
 
 impl Sources {
-    /// Of a scene and its equations.
+    /// For a scene with this number of force elements.
     pub(super) fn new(model: &Model, equations: &dyn Equations, elements: usize) -> Self {
         let n = model.bodies.len();
         let drives = !model.drives.is_empty();
@@ -51,7 +50,7 @@ impl Mechanism {
         self.evaluated = None;
     }
 
-    /// Powers at the latest evaluation; `dy` is its derivative, needed where accelerations enter.
+    /// Powers at the latest evaluation; `dy` is its derivative, needed if accelerations enter.
     pub(super) fn powers_of_latest(&mut self, t: f64, y: &[f64], dy: &[f64]) -> Powers {
         let mut powers = Powers::default();
         let motion = self.equations.motion();
@@ -72,20 +71,20 @@ impl Mechanism {
         powers
     }
 
-    /// Contact of the ball of joint `j` with its socket wall at the latest evaluation; `None` if it does not press on it.
+    /// Contact between the ball of joint `j` and its socket wall at the latest evaluation; `None` without contact force.
     pub fn touch(&self, j: usize) -> Option<Touch> {
         self.contacts.joint(j).touch(self.motion())
     }
 
-    /// Unit vector from the socket centre of joint `j` to the ball centre, which must differ from it, at the latest evaluation,
-    /// in the axes of the socket's body: towards the point of the wall nearest to the ball.
+    /// Unit vector from the socket centre of joint `j` to the ball centre at the latest evaluation, in the axes of the socket's
+    /// body. It points to the point of the wall nearest to the ball; the two centres must differ.
     pub fn wall_direction(&self, j: usize) -> Vec3 {
         self.contacts.joint(j).wall_direction(self.motion())
     }
 }
 
-/// Drive forces required for the accelerations in `motion` under the loads in `wrench`, which are overwritten, from the
-/// bodies selected by `moved`: calls `found(drive, force)` for each.
+/// Drive forces required for the accelerations in `motion` under the loads in `wrench` (overwritten), from the bodies selected by
+/// `moved`. Calls `found(drive, force)` for each.
 pub(super) fn inverse_dynamics(
     model: &Model,
     motion: &[Kinematics],

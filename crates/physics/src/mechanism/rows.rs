@@ -1,44 +1,45 @@
-//! The symmetric system J M^-1 J^T of constraint rows. Plain Cholesky where the rows are independent; where they are not
-//! (a planar loop closed by a ball joint, two ball joints that make a hinge), Cholesky with pivoting up to the rank.
+//! The symmetric system J M^-1 J^T of constraint rows. Plain Cholesky if the rows are independent; otherwise (a planar loop
+//! closed by a ball joint, two ball joints that make a hinge) Cholesky with pivoting up to the rank.
 
 use super::factor::Skyline;
 use std::ops::Range;
 
 /// Scaled pivots at or below this are rounding.
 const ROUNDING: f64 = 1e-12;
-/// Regularisation near a pose in which one more row becomes dependent: for scaled pivots far below this the multiplier
-/// shrinks instead of growing, so that such a pose is passed in finite steps, with an error of its square.
+/// Regularisation near a pose in which another row becomes dependent. For scaled pivots far below this, the multiplier shrinks
+/// instead of growing, so that finite steps pass through such a pose with an error of the order of its square.
 const WEAK: f64 = 1e-10;
-/// Fraction of a null vector's largest component below which a component counts as zero.
+/// Components of a null vector below this fraction of its largest count as zero.
 const NO_PART: f64 = 1e-7;
 
 /// The coupled constraint rows.
 pub struct RowSystem {
     skyline: Skyline,
-    /// Where rows begin that have a unit of their own: what an entry on their diagonal would be without the others, if that is
-    /// known; else 0. Rows that nothing moves do not tell it themselves.
+    /// For the first row of each group with its own unit: reference value of its diagonal entries without the other constraints,
+    /// or 0 if unknown. Rows that nothing can move do not reveal it themselves.
     reference: Vec<f64>,
     dependent: Option<Box<Dependent>>,
 }
 
 impl RowSystem {
-    /// For rows that couple with these `columns` before their own.
+    /// For rows that couple with these `columns` before the diagonal.
     pub fn new(columns: Vec<Vec<usize>>) -> Self {
         Self { reference: vec![0.0; columns.len()], skyline: Skyline::new(columns), dependent: None }
     }
 
-    /// Says what an entry on the diagonal of the rows from `first` on would be, could their sides move freely in their unit.
+    /// Sets the reference diagonal entry of the rows from `first` on: its value if their sides could move freely.
     pub fn refer(&mut self, first: usize, diagonal: f64) {
         self.reference[first] = diagonal;
     }
 
-    /// Treats the rows as dependent from now on, with a rank of at most `rank`. Among the possible solutions, the multipliers
-    /// from `counted` on have the smallest sum of squares. Rows from `group[i]` on have the same unit as row i.
+    /// From now on treats the rows as dependent, with a rank of at most `rank`. Among the solutions, the multipliers from
+    /// `counted` on have the smallest sum of squares. Row i belongs to the group with the same unit that starts at row
+    /// `group[i]`.
     pub fn treat_as_dependent(&mut self, rank: usize, counted: usize, group: Vec<usize>) {
         self.dependent = Some(Box::new(Dependent::new(rank, counted, group)));
     }
 
-    /// Number of independent rows: as found by the latest factorisation if they are treated as dependent, else all.
+    /// Number of independent rows: that of the latest factorisation if rows are treated as dependent, else all.
     pub fn rank(&self) -> usize {
         let all = self.skyline.len();
         self.dependent.as_ref().map_or(all, |rows| rows.rank)
@@ -61,7 +62,7 @@ impl RowSystem {
         }
     }
 
-    /// Null vectors, one for each dropped row: multipliers that load nothing, so that any multiple may be added to a solution.
+    /// Null vectors, one per dropped row: multipliers without net load, any multiple of which may be added to a solution.
     pub fn null_multipliers(&self) -> impl Iterator<Item = &[f64]> {
         let rows = self.dependent.iter();
         rows.flat_map(|rows| rows.null.chunks_exact(rows.n).take(rows.n - rows.rank))
@@ -88,14 +89,14 @@ impl RowSystem {
         self.skyline.add(i, j, value);
     }
 
-    /// Adds to the entries of rows 3 i.. and columns 3 j.., j <= i, where rows couple by threes.
+    /// Adds a block at row 3 i and column 3 j, j <= i, if rows couple in groups of three.
     #[inline]
     pub fn add_block(&mut self, i: usize, j: usize, block: &[[f64; 3]; 3]) {
         self.skyline.add_block(i, j, block);
     }
 
-    /// Factors in place. Returns the smallest pivot ratio, without the rows known to be dependent: near rounding level,
-    /// further rows are dependent.
+    /// Factors in place. Returns the smallest pivot ratio, excluding rows known to be dependent: near rounding level, further
+    /// rows are dependent.
     #[inline]
     pub fn factor(&mut self) -> f64 {
         match &mut self.dependent {
@@ -104,8 +105,8 @@ impl RowSystem {
         }
     }
 
-    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of the rows of its joint, which
-    /// `joints` lists, or to what was referred to. For a row that is zero up to rounding, the ratio to its own diagonal entry
+    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry among the rows of its joint,
+    /// listed in `joints`, or to the reference entry. For a row that is zero up to rounding, the ratio to its own diagonal entry
     /// would be meaningless.
     pub fn least_joint_pivot(&self, joints: impl Iterator<Item = Range<usize>>) -> f64 {
         let mut least = f64::INFINITY;
@@ -134,11 +135,11 @@ impl RowSystem {
     }
 }
 
-/// Rows of which some are dependent. With S A S scaled to diagonal entries of at most 1 and P its pivot order,
+/// Rows of which some are dependent. With S A S scaled to diagonal entries of at most 1, and P its pivot order,
 /// P^T S A S P = L L^T over the first `rank` columns; the remaining rows give the null vectors of A.
 struct Dependent {
     n: usize,
-    /// Upper bound on the rank: close to the constraints, but not on them, more rows appear independent.
+    /// Upper bound on the rank: near the constraint manifold, but not on it, more rows appear independent.
     most: usize,
     counted: usize,
     group: Vec<usize>,
@@ -179,7 +180,7 @@ impl Dependent {
             let largest = &mut self.scale[self.group[i]];
             *largest = largest.max(entries.get(i, i));
         }
-        // A group that nothing moves has no scale; all its entries are 0.
+        // A group that nothing can move has no scale; all its entries are 0.
         for i in (0..n).rev() {
             let largest = self.scale[self.group[i]];
             self.scale[i] = if largest > 0.0 { 1.0 / largest.sqrt() } else { 1.0 };
@@ -199,8 +200,7 @@ impl Dependent {
         least
     }
 
-    /// Right-looking Cholesky with diagonal pivoting; returns the smallest pivot, 0 if fewer rows than asked for are
-    /// independent.
+    /// Right-looking Cholesky with diagonal pivoting. Returns the smallest pivot; 0 if fewer rows than `most` are independent.
     fn eliminate(&mut self) -> f64 {
         let (n, a) = (self.n, &mut self.factor);
         let mut least = f64::INFINITY;
@@ -248,7 +248,7 @@ impl Dependent {
         let l = &self.factor;
         for (dropped, null) in (rank..n).zip(self.null.chunks_exact_mut(n)) {
             null.fill(0.0);
-            // L1^T x = -(row of L2), then back to original order and units.
+            // L1^T x = -(row of L2), then back to the original order and units.
             for k in (0..rank).rev() {
                 let mut x = -l[dropped * n + k];
                 for i in k + 1..rank {
@@ -294,7 +294,7 @@ impl Dependent {
             work[k] = sum / l[k * n + k];
             x[self.order[k]] = work[k] * self.scale[self.order[k]];
         }
-        // Subtract the null vectors' part, so that the counted multipliers are as small as possible.
+        // Subtract the null-space component that minimises the counted multipliers.
         let free = n - rank;
         for i in 0..free {
             let null = &self.null[i * n..][..n];
@@ -327,7 +327,7 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
     use std::iter::once;
 
-    /// Row i of B, the last two of which depend on the first three.
+    /// Row i of B; the last two rows depend on the first three.
     fn rows() -> DMatrix<f64> {
         let mut b = DMatrix::from_fn(5, 7, |i, j| libm::sin(((2 * i + 3) * (j + 2)) as f64));
         let (first, second) = (b.row(0) * 2.0 - b.row(2), b.row(1) * 0.5);
@@ -364,7 +364,7 @@ mod tests {
             let pseudo = a.clone().pseudo_inverse(1e-10).unwrap() * &right;
             assert!((x - pseudo).norm() < 1e-9);
         }
-        // Only the last four count: no idle set can make them smaller.
+        // Only the last four count: no null vector can reduce them.
         let mut system = system(&a);
         system.treat_as_dependent(3, 1, vec![0, 1, 2, 3, 4]);
         system.factor();

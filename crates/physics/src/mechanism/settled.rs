@@ -1,24 +1,24 @@
-//! The settled start: every ball rests on the wall of its socket where the same machine without play presses it, so that a run
-//! does not begin with a drop.
+//! Settled start: every ball rests on its socket wall where the reaction of the same machine without play presses it, so that a
+//! run does not begin with a drop.
 
 use super::start::Assembly;
 use super::{ActiveSet, Mechanism, MechanismError};
 use crate::contact::{Coefficients, Parameters, settled_penetration};
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
 
-/// Times that reactions and places of the balls are found from each other. The places move reactions by the clearance over the
-/// size of the machine, a thousandth or so, and each time leaves that share of what was wrong before.
+/// Fixed-point iterations between reactions and ball positions. The positions change the reactions by about the ratio of
+/// clearance to machine size, typically a thousandth, and each iteration reduces the error by that factor.
 const ROUNDS: usize = 4;
 
 /// A settled start.
 pub(super) struct Settled {
     /// Positions and velocities in the coordinates of the tree.
     pub state: Vec<f64>,
-    /// How the machine without play was assembled before balls were moved by their play.
+    /// Assembly of the machine without play, before the balls were displaced by their play.
     pub assembly: Assembly,
 }
 
-/// Of `scene` at t = 0. Velocities are those of the machine without play.
+/// Settled start of `machine` at t = 0, with the velocities of the machine without play.
 ///
 /// # Errors
 /// That machine does not start.
@@ -39,7 +39,7 @@ pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
             if joint.contact.clearance == 0.0 {
                 continue;
             }
-            // Balls that share a load, it is not known how, stay in the middle: the loops could not close with both on a wall.
+            // Balls that share a load in an indeterminate way stay centred: the loops could not close with both on a wall.
             let force = mechanism.reaction(j).filter(|_| mechanism.is_reaction_unique(j));
             let force = force.unwrap_or_default();
             let eccentricity = resting_place(&joint.contact, force);
@@ -47,7 +47,7 @@ pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
                 Some(body) => mechanism.motion()[body].rotation.tr_mul(&eccentricity),
                 None => eccentricity,
             };
-            // Without play, the point of the ball that lies in the socket's centre.
+            // Without play, this point of the ball's body coincides with the socket centre.
             twin.ball_joints[j].ball.point = joint.ball.point - turned_back;
         }
         mechanism = Mechanism::new(&twin)?;
@@ -56,7 +56,7 @@ pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
     Ok(Settled { state, assembly })
 }
 
-/// Ball centre from the socket's, m, where the wall pushes the ball with `force`, N. A ball without a load stays in the middle.
+/// Ball centre relative to the socket centre, m, where the wall exerts `force`, N, on the ball. An unloaded ball stays centred.
 fn resting_place(contact: &Parameters, force: Vec3) -> Vec3 {
     let (size, clearance) = (force.norm(), contact.clearance);
     if size > 0.0 {

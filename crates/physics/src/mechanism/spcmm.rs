@@ -19,9 +19,9 @@ pub struct Unreachable {
     pub slider: u8,
     /// Time, s.
     pub time: f64,
-    /// Length that the rod would need, m.
+    /// Required rod length, m.
     pub needs: f64,
-    /// L2, m.
+    /// Actual rod length L2, m.
     pub has: f64,
 }
 
@@ -44,7 +44,7 @@ pub struct SliderTrajectory {
 }
 
 impl SliderTrajectory {
-    /// For these dimensions and amplitudes.
+    /// From dimensions and amplitudes.
     pub fn new(parameters: &Spcmm) -> Self {
         let (sin_gamma, cos_gamma) = libm::sincos(parameters.gamma);
         Self {
@@ -56,13 +56,13 @@ impl SliderTrajectory {
         }
     }
 
-    /// Period of the drive, s; infinite where nothing moves.
+    /// Period of the drive, s; infinite if nothing moves.
     pub fn period(&self) -> f64 {
         1.0 / self.p.frequency
     }
 
-    /// Squared length that each of the three rods has left along its slider direction: L2^2 minus the squared transverse
-    /// offset, m^2 (of the third a quarter of the discriminant), with the intermediate results. Negative if the rod is too short.
+    /// For each of the three rods, L2^2 minus the squared offset transverse to its slider direction, m^2 (for the third, a
+    /// quarter of the discriminant), with intermediate results. Negative if the rod is too short.
     fn evaluate(&self, t: f64) -> ([Jet; 3], Parts) {
         let p = &self.p;
         let omega = std::f64::consts::TAU * p.frequency;
@@ -93,8 +93,8 @@ impl SliderTrajectory {
 }
 
 impl ClosedForm for SliderTrajectory {
-    /// Sliders f1, f2, f3, positive outward; the platform is turned by R = Rx(0) Rz(beta) Ry(gamma), gamma constant, so that
-    /// it turns at the rate of beta about Z. NaN where a rod is too short.
+    /// Sliders f1, f2, f3, positive outward. The platform orientation is R = Rx(0) Rz(beta) Ry(gamma) with constant gamma, so
+    /// that its angular velocity is the rate of beta about Z. NaN if a rod is too short.
     fn at(&self, t: f64) -> ClosedMotion {
         let (left, parts) = self.evaluate(t);
         let Parts { x_relative, y, sb, cb, beta, c_, lead, half, wz } = parts;
@@ -114,7 +114,7 @@ impl ClosedForm for SliderTrajectory {
         }
     }
 
-    /// Searches one whole period for a rod that is too short, and names the one that is by the most.
+    /// Samples one whole period and reports the rod with the largest shortfall, if any is too short.
     fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
         let period = if self.p.frequency > 0.0 { self.period() } else { 0.0 };
@@ -127,7 +127,7 @@ impl ClosedForm for SliderTrajectory {
                 if square.value > 0.0 {
                     continue;
                 }
-                // Slider 3 sees a slanted line: its quarter discriminant is `lead` times the missing square.
+                // Slider 3 meets a slanted line: its quarter discriminant is `lead` times the missing square.
                 let missing = if i == 2 { square.value / parts.lead.value } else { square.value };
                 let needs = (has * has - missing).sqrt();
                 if worst.is_none_or(|w| needs > w.needs) {

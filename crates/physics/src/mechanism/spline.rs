@@ -1,15 +1,15 @@
-//! Cubic splines through points: the first two derivatives have no jump between the first point and the last.
+//! Cubic splines through points, with continuous first and second derivatives between the first point and the last.
 
 use crate::jet::Jet;
 
-/// What a spline does at its first and last point.
+/// End conditions of a spline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ends {
-    /// Its slope is 0 at both.
+    /// Zero slope at both ends.
     Level,
-    /// Its second derivative is 0 at both: a straight line goes on from it without a jump.
+    /// Zero second derivative at both ends: a straight line continues it smoothly.
     Straight,
-    /// First and second derivative are the same at both: the points are a period.
+    /// Equal first and second derivatives at both ends: the points span one period.
     Joined,
 }
 
@@ -18,12 +18,12 @@ pub enum Ends {
 pub struct Spline {
     /// Abscissas of the points.
     pub knots: Vec<f64>,
-    /// Coefficients of the cubic from each point to the next, in the distance from that point, lowest first.
+    /// Coefficients of the cubic on each interval, in the distance from its left point, lowest power first.
     pub cubics: Vec<[f64; 4]>,
 }
 
 impl Spline {
-    /// Through two or more `points`, whose abscissas rise.
+    /// Interpolates two or more `points` (x, y) with increasing x.
     pub fn new(points: &[[f64; 2]], ends: Ends) -> Self {
         let widths: Vec<f64> = points.windows(2).map(|p| p[1][0] - p[0][0]).collect();
         let rises: Vec<f64> = points.windows(2).map(|p| p[1][1] - p[0][1]).collect();
@@ -48,7 +48,7 @@ impl Spline {
         self.knots.partition_point(|knot| *knot <= x)
     }
 
-    /// Value, slope and second derivative at `x`; beyond the points, those of the first or last cubic.
+    /// Value, slope and second derivative at `x`; outside the points, those of the first or last cubic.
     pub fn at(&self, x: f64) -> Jet {
         let i = self.next(x).clamp(1, self.cubics.len()) - 1;
         let [a, b, c, d] = self.cubics[i];
@@ -81,14 +81,14 @@ fn curvatures(widths: &[f64], rises: &[f64], ends: Ends) -> Vec<f64> {
     right
 }
 
-/// The same for a period, given the rows of its inner points.
+/// The same for a periodic spline, given the rows of its inner points.
 fn joined(
     widths: &[f64],
     slope: impl Fn(usize) -> f64,
     [below, mut on, mut above, mut right]: [Vec<f64>; 4],
 ) -> Vec<f64> {
     let n = widths.len();
-    // The unknowns are m[0] to m[n - 1]; row 0 reaches around to m[n - 1], and row n - 1 to m[0]: Sherman and Morrison.
+    // The unknowns are m[0] to m[n - 1]. Rows 0 and n - 1 wrap around to m[n - 1] and m[0]: Sherman and Morrison.
     let corner = widths[n - 1];
     on[0] = 2.0 * (widths[n - 1] + widths[0]);
     above[0] = widths[0];

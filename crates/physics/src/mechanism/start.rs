@@ -1,4 +1,4 @@
-//! Start of a mechanism: assembly from the scene's values, how far it moved the bodies, and the rank of the constraints.
+//! Start of a mechanism: assembly from the scene's values, displacement of the bodies, and rank of the constraints.
 
 use super::closed_form::ClosedForm;
 use super::constraints::Constraints;
@@ -13,42 +13,42 @@ use crate::machine::{StartRule, Vec3};
 const DEPENDENT_ROWS: f64 = 1e-13;
 /// Largest gap at which a loop counts as closed at the start, m or rad.
 pub(super) const CLOSED: f64 = 1e-9;
-/// With dependent rows, largest speed at which a joint may open at the start, m/s or rad/s: rounding of the drives.
+/// With dependent rows, maximum speed at which a joint may open at the start, m/s or rad/s: rounding of the drives.
 pub(super) const HELD: f64 = 1e-8;
-/// Distance of the neighbouring poses at which the rank is checked, as a time at the scales' speeds, s: a tenth of the
-/// length scale, 0.01 rad.
+/// Displacement to the neighbouring poses at which the rank is checked, as a time at the scales' speeds, s: a tenth of the length
+/// scale, 0.01 rad.
 const BESIDE: f64 = 0.01;
-/// Assembly has come to rest once it moves by less than this fraction of the scales.
+/// Assembly has converged once it moves by less than this fraction of the scales.
 const AT_REST: f64 = 1e-9;
 
-/// How assembly at the start changed the scene's values. In a scene that follows a closed form the guess comes from it.
+/// Changes to the scene's values made by assembly at the start. In a scene with a closed form, the guess comes from it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assembly {
-    /// How far each body was moved from the guess.
+    /// Displacement of each body from the guess.
     pub bodies: Vec<Placement>,
-    /// Of the joints that start closed, the one with the widest gap in the guess, and that gap (|Z_j - Z_i| of a ball joint), m.
-    /// Joints that close loops count after the ball joints.
+    /// Closed joint with the widest gap in the guess, and that gap (|Z_j - Z_i| of a ball joint), m. Other loop-closing joints
+    /// are numbered after the ball joints.
     pub widest: Option<(usize, f64)>,
-    /// Of the joints that close loops, the one whose bodies are turned most against what it holds in the guess, rad.
+    /// Loop-closing joint with the largest angular misalignment in the guess, and that angle, rad.
     pub most_turned: Option<(usize, f64)>,
-    /// Whether the loops closed in another assembly mode than that of the guess, with a singular pose between the two. Known
-    /// only if closed joints and drives leave no degree of freedom.
+    /// Whether the loops closed in a different assembly mode from the guess, across a singular pose. Known only if closed joints
+    /// and drives leave no degree of freedom.
     pub other_mode: bool,
     /// Whether the guess comes from the closed form.
     pub closed_form: bool,
 }
 
-/// How far assembling moved a body.
+/// Displacement of a body by assembly.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placement {
-    /// Distance of its frame's origin from that in the guess, m.
+    /// Distance of the origin of its frame from the guess, m.
     pub moved: f64,
     /// Angle from its orientation in the guess, rad.
     pub turned: f64,
 }
 
 impl Mechanism {
-    /// How [`Self::start`] changed the scene's values.
+    /// Changes to the scene's values made by [`Self::start`].
     pub fn assembly(&self) -> &Assembly {
         &self.assembly
     }
@@ -56,7 +56,7 @@ impl Mechanism {
     /// State at t = 0: positions, then velocities.
     ///
     /// # Errors
-    /// Ball joints that do not close.
+    /// Joints that do not close, or a singular start pose.
     pub fn start(&mut self) -> Result<Vec<f64>, MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
@@ -81,7 +81,7 @@ impl Mechanism {
             let joint = || self.joint_names[j].clone();
             let clearance = self.contacts.clearance(j);
             if all.contains(&j) {
-                // An assembled start only needs a rough guess, which Newton's method then closes.
+                // An assembled start needs only a rough guess, from which Newton's method closes the joints.
                 if d > OPEN_AS_GIVEN && !assembled {
                     let given = self.gap_of(j, model.joints[j].eccentricity(&guess));
                     return Err(MechanismError::Open { given });
@@ -146,7 +146,7 @@ impl Mechanism {
         if error <= CLOSED && constraints.least_joint_pivot() >= DEPENDENT_ROWS {
             return self.check_sides(constraints, tree, &guess, y);
         }
-        // Rows are dependent here or were on the way here: try again with the independent ones.
+        // Rows are dependent here or were on the way: retry with the independent rows.
         constraints.treat_as_dependent(constraints.rows());
         y.clone_from(&guess);
         let error = constraints.project(model, tree, T, y);
@@ -154,14 +154,14 @@ impl Mechanism {
         if !(error <= CLOSED) {
             return Err(self.no_closure(constraints, tree, &guess, y));
         }
-        // In a singular pose of a closed form the drives do not determine the velocities, with clearance or without.
+        // In a singular pose of a closed form, the drives do not determine the velocities, with or without clearance.
         if model.closed_form.is_some() && rank_around(model, constraints, tree, y).is_none() {
             return Err(MechanismError::Singular);
         }
         self.check_sides(constraints, tree, &guess, y)
     }
 
-    /// Checks that no joint closed the wrong way round: its rows do not tell an axis from its opposite.
+    /// Checks that no joint closed with its axis reversed: its rows do not distinguish an axis from its opposite.
     fn check_sides(
         &self,
         constraints: &mut Constraints,
@@ -177,12 +177,12 @@ impl Mechanism {
         Err(self.no_closure(constraints, tree, guess, y))
     }
 
-    /// A joint at which trees are cut: ball joints, then joints that close loops.
+    /// A cut joint: `joint` counts ball joints, then other joints that close loops.
     fn gap(&self, joint: usize, opening: Opening) -> OpenJoint {
         OpenJoint { joint: self.joint_names[joint].clone(), ball: joint < self.model.joints.len(), opening }
     }
 
-    /// Ball joint `joint` with e = Z_j - Z_i, or its rate.
+    /// Ball joint `joint`, given e = Z_j - Z_i or its rate.
     fn gap_of(&self, joint: usize, apart: Vec3) -> OpenJoint {
         self.gap(joint, Opening { apart, turned: 0.0 })
     }
@@ -197,8 +197,8 @@ impl Mechanism {
         balls.chain(others).collect()
     }
 
-    /// Checks that no ideal joint opens at the velocities in `y`: where directions are constrained more than once, for
-    /// example by drives, these may contradict one another.
+    /// Checks that no ideal joint opens at the velocities in `y`: redundant constraints, for example by drives, may contradict
+    /// one another.
     fn check_speeds(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
         tree.update_kinematics(&self.model, 0.0, y);
         for &j in &self.model.ideal_joints {
@@ -273,8 +273,8 @@ impl Mechanism {
     }
 }
 
-/// Rank of `constraints`, treated as dependent, at the assembled state `y` if it is the same in neighbouring poses; `None`
-/// if it is larger there: the pose is singular.
+/// Rank of `constraints`, treated as dependent, at the assembled state `y`; `None` if it is larger in neighbouring poses, so that
+/// the pose is singular.
 fn rank_around(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y: &[f64]) -> Option<usize> {
     const T: f64 = 0.0;
     factor_at(model, constraints, tree, T, y);
@@ -282,7 +282,7 @@ fn rank_around(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y:
     if rank == model.nv {
         return Some(rank);
     }
-    // The rows looked dependent only because a singular pose is narrowly missed.
+    // The rows appeared dependent only because of a nearby singular pose.
     if rank == constraints.rows() {
         return None;
     }
@@ -320,8 +320,8 @@ fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f
     constraints.prepare(model, tree, t, &y[..model.nq], &Vec3::zeros());
 }
 
-/// Whether closed joints leave no degree of freedom and a singular pose lies between the guess and the assembled state
-/// `y`: the determinant of as many independent rows as coordinates then has opposite signs at the two.
+/// Whether closed joints leave no degree of freedom and a singular pose lies between the guess and the assembled state `y`: the
+/// determinant of a full set of independent rows then differs in sign.
 fn is_other_mode(model: &Model, constraints: &mut Constraints, tree: &mut Tree, guess: &[f64], y: &[f64]) -> bool {
     let mut sign_at = |y: &[f64], places: Option<&[usize]>| {
         factor_at(model, constraints, tree, 0.0, y);
@@ -347,7 +347,7 @@ fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placemen
     Placement { moved: (origin(to) - origin(from)).norm(), turned: libm::atan2(sine.norm(), turn.trace() - 1.0) }
 }
 
-/// Places the free output body as in the ideal mechanism at t = 0, so that assembly has little left to do.
+/// Places the free output body as in the ideal mechanism at t = 0, close to the assembled pose.
 fn place_output_body(model: &Model, form: &dyn ClosedForm, y: &mut [f64]) {
     let ideal = form.at(0.0);
     let body = &model.bodies[model.output_body];
@@ -364,8 +364,8 @@ fn place_output_body(model: &Model, form: &dyn ClosedForm, y: &mut [f64]) {
     }
 }
 
-/// Turns every hinged body that carries a ball so that the ball is closest to its socket and loops close on the branch of
-/// the closed form.
+/// Turns every hinged body that carries a ball to bring the ball closest to its socket, so that loops close on the branch of the
+/// closed form.
 fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
     for joint in &model.joints {
         let motion_of = |b: usize| model.bodies.get(b).map(|body| body.motion);

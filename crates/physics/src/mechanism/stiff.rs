@@ -1,10 +1,10 @@
 //! The stiff part of the equations of motion, linearised analytically: derivatives of the forces of contacts and force
 //! elements with respect to displacement and velocity.
 //!
-//! A W-method keeps its order with any approximation of the Jacobian, so non-stiff terms (gravity, gyroscopic terms,
-//! rotation of lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
-//! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s,
-//! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
+//! A W-method keeps its order with any approximation of the Jacobian, so non-stiff terms (gravity, gyroscopic terms, rotation of
+//! lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
+//! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s,
+//! where T maps velocities to position rates.
 
 use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
@@ -19,7 +19,7 @@ use crate::machine::Vec3;
 use nalgebra::Complex;
 use std::ops::Range;
 
-/// Partial time derivatives of the motion of one point relative to another, and of their bodies, at fixed coordinates.
+/// Partial time derivatives, at fixed coordinates, of the relative motion of two points and of their bodies.
 #[derive(Clone, Copy, Default)]
 struct Drift {
     eccentricity: Vec3,
@@ -32,19 +32,19 @@ struct Drift {
 /// The linearisation and its factors.
 pub struct Stiff {
     n: usize,
-    /// Velocity coordinates of each tree, those with many joints last: eliminated first, they would couple all their
+    /// Velocity coordinates of each tree. Trees with many joints come last: if eliminated first, they would couple all their
     /// neighbours.
     trees: Vec<Range<usize>>,
-    /// Tree of each coordinate, in that order.
+    /// Index in `trees` for each coordinate.
     tree_of: Vec<usize>,
-    /// Whether a coupling acts on both of two trees, row by row; and those that one acts on with another, scratch.
+    /// Whether a coupling acts on both trees of a pair, row by row; and scratch for the trees coupled with one.
     linked: Vec<bool>,
     partners: Vec<usize>,
-    /// Place of each coupled tree's first coordinate among the coordinates.
+    /// Elimination index of each coupled tree's first coordinate.
     first: Vec<usize>,
-    /// Coordinates that couplings act on, in the order of elimination.
+    /// Coordinates with couplings, in elimination order.
     coordinates: Vec<usize>,
-    /// Where M^-1 K or M^-1 D have an entry: row and column in that order, and its index in both.
+    /// Nonzero pattern of M^-1 K and M^-1 D: row and column in elimination order, and index into both matrices.
     entries: Vec<[u32; 3]>,
     /// M^-1 K and M^-1 D, column-major n x n.
     by_position: Vec<f64>,
@@ -52,13 +52,13 @@ pub struct Stiff {
     lu: Lu<f64>,
     lu_pair: Lu<Complex<f64>>,
     columns: Vec<Column>,
-    /// df/dt, positions and velocities: the stiff part, from the same matrices as J, because the two nearly cancel.
+    /// df/dt of positions and velocities: the stiff part, from the same matrices as J, because the two nearly cancel.
     pub time_derivative: Vec<f64>,
     /// Scratch for the derivative at the point of linearisation.
     pub derivative: Vec<f64>,
     /// Explicit time dependence of the points of each contact and element.
     drift: Vec<Drift>,
-    /// Positions at which the linearisation was taken.
+    /// Positions at the linearisation.
     y: Vec<f64>,
     shift: f64,
     shift_pair: Complex<f64>,
@@ -69,13 +69,13 @@ pub struct Stiff {
     packed: Vec<f64>,
     pair: Vec<Complex<f64>>,
     moved: Vec<Complex<f64>>,
-    /// No contact or element carries a force: J is taken as zero except for q' = T v.
+    /// Whether no contact or element carries a force: J is then zero except for q' = T v.
     empty: bool,
 }
 
 impl Stiff {
     /// For `velocities` velocity coordinates in a state of `dimension`, with `couplings` ball joints and elements. With
-    /// `separate`, a force accelerates only the coordinates of the trees that it acts on.
+    /// `separate`, a force accelerates only the trees it acts on.
     pub fn new(model: &Model, velocities: usize, dimension: usize, couplings: usize, separate: bool) -> Self {
         let n = velocities;
         let trees = if separate { trees_of(model) } else { std::iter::once(0..n).collect() };
@@ -161,12 +161,12 @@ impl Stiff {
         }
     }
 
-    /// Whether a coupling acts on the tree in this place.
+    /// Whether a coupling acts on tree `place`.
     fn is_coupled(&self, place: usize) -> bool {
         self.linked[place * (self.trees.len() + 1)]
     }
 
-    /// Notes which trees the coupling with these columns acts on.
+    /// Records the trees that the coupling in `columns` acts on.
     fn link(&mut self) {
         self.partners.clear();
         for column in &self.columns {
@@ -182,7 +182,7 @@ impl Stiff {
         }
     }
 
-    /// Records the explicit time dependence of the points of contacts and elements, from a motion with all coordinates at rest.
+    /// Records the explicit time dependence of contact and element points, from a motion with all coordinates at rest.
     pub fn observe_drift(
         &mut self,
         contacts: &Contacts,
@@ -209,7 +209,7 @@ impl Stiff {
         }
     }
 
-    /// dQ_k/dt of one coupling. Sliding of driven bodies' surfaces due to their rotation is not stiff and is left out.
+    /// dQ_k/dt of one coupling. Sliding due to the rotation of driven bodies is not stiff and is left out.
     fn add_drift(&mut self, coupling: &Coupling, i: usize) {
         let (s, drift) = (&coupling.stiffness, self.drift[i]);
         let force = s.by_displacement * drift.eccentricity + (s.by_rate + s.by_slip) * drift.rate + s.by_clearance;
@@ -257,7 +257,7 @@ impl Stiff {
         }
     }
 
-    /// Converts forces to accelerations.
+    /// Converts generalised forces to accelerations.
     pub fn apply_inverse_mass(&mut self, model: &Model, equations: &mut dyn Equations) {
         if self.empty {
             return;
@@ -301,9 +301,9 @@ impl Stiff {
         equations.apply_inverse_mass(model, &mut self.time_derivative[positions..]);
     }
 
-    /// Coupled coordinates, and the products that their latest elimination with a real shift took; 0 where nothing is coupled.
+    /// Number of coupled coordinates, and of products in their latest elimination with a real shift; 0 without couplings.
     pub fn size(&self) -> [usize; 2] {
-        // What an earlier one left behind is no part of a snapshot.
+        // Leftovers of an earlier linearisation must not enter a snapshot.
         if self.empty { [0; 2] } else { [self.coordinates.len(), self.lu.products] }
     }
 
@@ -336,7 +336,7 @@ impl Stiff {
         self.lu_pair.factor(self.coordinates.len(), entries, shift);
     }
 
-    /// Solves (s I - J) x = b in place, for the components that move.
+    /// Solves (s I - J) x = b in place for the active components.
     pub fn solve(&mut self, b: &mut [f64], moving: &ActiveRanges, equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let s = self.shift;
@@ -412,7 +412,7 @@ impl Stiff {
     }
 }
 
-/// `by` (`re` + i `im`), in these `parts`.
+/// Multiplies `re` + i `im` by `by` in the ranges `parts`.
 fn multiply(parts: &[Range<usize>], re: &mut [f64], im: &mut [f64], by: Complex<f64>) {
     for part in parts {
         for (re, im) in re[part.clone()].iter_mut().zip(&mut im[part.clone()]) {
@@ -422,7 +422,7 @@ fn multiply(parts: &[Range<usize>], re: &mut [f64], im: &mut [f64], by: Complex<
     }
 }
 
-/// Velocity coordinates of the trees of `model`, those with more joints than two after the others.
+/// Velocity coordinates of the trees of `model`; trees with more than two joints come last.
 fn trees_of(model: &Model) -> Vec<Range<usize>> {
     let mut joints = vec![0; model.blocks.len()];
     for joint in &model.joints {
@@ -447,7 +447,7 @@ mod tests {
     use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
-    /// The memory of each contact holds `remembered`, m/s.
+    /// `remembered` is the approach speed of each contact state, m/s.
     fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [Memory; 3]) {
         let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load("spcmm", &changes).unwrap();
@@ -455,7 +455,7 @@ mod tests {
         let mut y = mechanism.start().unwrap();
         y[0] += 0.3e-3 + 2e-7;
         let v = mechanism.positions();
-        // At the start every ball moves with its socket.
+        // Initially every ball moves with its socket.
         for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
             y[v + i] += slip;
         }
@@ -465,7 +465,7 @@ mod tests {
 
     #[test]
     fn jacobian_is_that_of_central_differences_in_everything_stiff() {
-        // In the last case the rate is the largest so far: the damping term does not depend on it.
+        // In the last case the rate is the largest so far, so that the damping term does not depend on it.
         for (surface, approach, remembered) in [
             ("centres", "start", 1e-3),
             ("printed", "start", 1e-3),
@@ -484,7 +484,7 @@ mod tests {
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
-            // Rounding of the differences and what a W-method may leave out stay below 1e-3 of the stiffest entry.
+            // Rounding of the differences and terms that a W-method may omit stay below 1e-3 of the stiffest entry.
             let compare = |name: &str, got: &[f64], plus: &[f64], minus: &[f64], scale: f64, width: f64| {
                 for k in 0..n {
                     let want = (plus[nq + k] - minus[nq + k]) / (2.0 * width);
@@ -525,8 +525,8 @@ mod tests {
         }
     }
 
-    /// Bodies in a row from a free one: a hinge, a slide and a fixed joint, and a hinge on a slide that is driven; moving, and
-    /// loaded by `elements`.
+    /// A serial chain from a free body, with a hinge, a slide, a fixed joint, and a hinge on a driven slide; moving, and loaded
+    /// by `elements`.
     fn linked(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
         let body =
             |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n");
@@ -615,7 +615,7 @@ mod tests {
                 }
                 m.evaluator(ActiveSet::Nothing).derivative(t + 1e-6, &y, &mut plus);
                 m.evaluator(ActiveSet::Nothing).derivative(t - 1e-6, &y, &mut minus);
-                // Speeds are some mm/s.
+                // Speeds are a few mm/s.
                 let rates = 1e-2 * stiffest;
                 check("ft".to_owned(), &stiff.time_derivative[nq..], &plus, &minus, rates);
             }
@@ -640,7 +640,7 @@ mod tests {
              target = { law = \"harmonic\", amplitude = \"0.5 mrad\", frequency = \"1 Hz\" }\n",
         ),
         (
-            // Near the lengths at which they carry little: large forces turn with the bodies, which is left out.
+            // Near the lengths of small tension: rotation of large forces with the bodies is left out.
             "curves",
             "[[spring]]\nname = \"s\"\nfrom = { body = \"world\", at = \"-50 90 20 mm\" }\nto = { body = \"rod\" }\nlength = \"1009.2 mm\"\n\
              characteristic = [[\"-0.2 mm\", \"-150 N\"], [0, \"-40 N\"], [\"0.1 mm\", \"60 N\"], [\"0.4 mm\", \"500 N\"]]\n\

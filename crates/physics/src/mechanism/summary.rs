@@ -1,8 +1,8 @@
-//! What a scene contains and what will be computed for it.
+//! Contents of a scene, and the computations it needs.
 
 use super::Mechanism;
 
-/// Counts for `jointplay check` and for tests that a scene pays only for what it has.
+/// Counts for `jointplay check`, and for tests that a scene pays only for what it contains.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// Moving bodies.
@@ -29,9 +29,9 @@ pub struct Summary {
     pub contacts: usize,
     /// Contacts with friction.
     pub frictional_contacts: usize,
-    /// Blocks of the mass matrix that are a single free body each.
+    /// Blocks of the mass matrix that consist of a single free body.
     pub lone_bodies: usize,
-    /// Most velocity coordinates with which the method `automatic` steps implicitly, too.
+    /// Maximum number of velocity coordinates for which the method `automatic` also considers implicit steps.
     pub largest_implicit: usize,
     /// Whether a differential equation is solved at all.
     pub solves_differential_equation: bool,

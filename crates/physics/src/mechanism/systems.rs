@@ -1,4 +1,4 @@
-//! The equations of motion in the form required by the steppers.
+//! The equations of motion behind the interfaces of the steppers.
 
 use super::elements::{ActiveSet, Counts};
 use super::elements::{At, Loads};
@@ -8,34 +8,34 @@ use super::{Mechanism, Powers};
 use crate::integrate::{ContactSystem, FrictionSystem, Rosenbrock, StiffSystem, System};
 use std::ops::Range;
 
-/// The equations of motion, with what decides over a step which contacts carry a force.
+/// The equations of motion, with the contacts that may carry a force during a step.
 pub struct Evaluator<'a> {
     mechanism: &'a mut Mechanism,
     touching: ActiveSet<'a>,
-    /// Counts of the evaluations made through it.
+    /// Evaluations made through it.
     pub counts: Counts,
 }
 
 impl Mechanism {
-    /// The equations of motion, with what decides which contacts carry a force.
+    /// Evaluator with `touching` as the active contacts.
     pub fn evaluator<'a>(&'a mut self, touching: ActiveSet<'a>) -> Evaluator<'a> {
         Evaluator { mechanism: self, touching, counts: Counts::default() }
     }
 }
 
 impl Evaluator<'_> {
-    /// Everything at (t, y): derivative into `dy`, true accelerations in [`Mechanism::motion`], gaps of all joints,
+    /// Evaluates everything at (t, y): derivative into `dy`, true accelerations in [`Mechanism::motion`], gaps of all joints,
     /// reactions and actuator forces.
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
         let Mechanism { model, equations, contacts, evaluated, .. } = &mut *self.mechanism;
         *evaluated = None;
         equations.complete_motion(model, y, &dy[equations.positions(model)..]);
-        // Forces stay those of the derivative; only the geometry of ideal joints is missing.
+        // Forces are those of the derivative; only the geometry of ideal joints is missing.
         contacts.measure(t, equations.motion());
     }
 
-    /// Motion and contact forces at (t, y), no accelerations.
+    /// Motion and contact forces at (t, y), without accelerations.
     fn load(&mut self, t: f64, y: &[f64]) {
         let Mechanism { model, equations, contacts, elements, evaluated, .. } = &mut *self.mechanism;
         *evaluated = None;
@@ -50,8 +50,7 @@ impl Evaluator<'_> {
         }
     }
 
-    /// Powers at (t, y). `dy` holds the derivative there if the latest evaluation was at this instant, and is scratch
-    /// otherwise.
+    /// Powers at (t, y). `dy` must hold the derivative if the latest evaluation was at this instant; otherwise it is scratch.
     pub fn powers(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Powers {
         let sources = &self.mechanism.sources;
         if sources.none {
@@ -109,7 +108,7 @@ impl StiffSystem for Evaluator<'_> {
             return;
         };
         let mut scratch = std::mem::take(&mut stiff.derivative);
-        // Only prescribed motion moves contacts by time alone; bodies in the state are at rest in that sense.
+        // Only prescribed motion gives contacts an explicit time dependence; other bodies are taken at rest.
         scratch[..positions].copy_from_slice(&y[..positions]);
         scratch[positions..].fill(0.0);
         let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
@@ -156,7 +155,7 @@ impl StiffSystem for Evaluator<'_> {
     }
 }
 
-/// The equations of motion of which friction alone is linearised.
+/// The equations of motion with only friction linearised.
 pub struct FrictionJacobian<'e, 'a>(&'e mut Evaluator<'a>);
 
 impl<'a> FrictionSystem for Evaluator<'a> {
@@ -246,10 +245,10 @@ impl ContactSystem for Evaluator<'_> {
 
     fn contact_velocity_change(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool {
         let positions = self.positions();
-        // Close ideal joints first: contact forces already depend on distances smaller than the gaps these may have.
+        // Close ideal joints first: contact forces depend on distances smaller than the drift of these joints.
         self.mechanism.project(t, y);
         self.mechanism.measure(t, y);
-        // An error was already reported when the method was chosen.
+        // Any error was reported when the method was chosen.
         let _ = self.mechanism.prepare_implicit_contacts();
         let Mechanism { model, equations, contacts, implicit, .. } = &mut *self.mechanism;
         let Some(implicit) = implicit else {

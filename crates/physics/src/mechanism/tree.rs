@@ -1,4 +1,4 @@
-//! The tree formulation: coordinates of the spanning forest that remains when every ball joint is cut.
+//! The tree formulation: coordinates of the spanning forest that remains once every ball joint is cut.
 //!
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
@@ -28,7 +28,7 @@ impl Composite {
         torque: Vec3::new(0.0, 0.0, 0.0),
     };
 
-    /// Adds one about the same centroid.
+    /// Adds a composite about the same centroid.
     #[inline]
     fn add(&mut self, other: &Self) {
         self.mass += other.mass;
@@ -38,7 +38,7 @@ impl Composite {
         self.torque += other.torque;
     }
 
-    /// Adds one whose centroid lies `d` from this one's.
+    /// Adds a composite whose centroid is displaced by `d` from this one's.
     #[inline]
     fn add_shifted(&mut self, c: &Self, d: &Vec3) {
         self.mass += c.mass;
@@ -59,7 +59,7 @@ pub struct Tree {
     pub driven: Driven,
     composite: Vec<Composite>,
     dynamic: Vec<usize>,
-    /// Of those, the ones that evaluations move and accelerate, and the others.
+    /// Subsets of these: bodies that evaluations move and accelerate, and suspended bodies.
     awake: Vec<usize>,
     asleep: Vec<usize>,
     sleeps: Vec<bool>,
@@ -82,7 +82,7 @@ impl Tree {
         tree
     }
 
-    /// For `model`, if only its motion is needed: [`Self::update_kinematics`].
+    /// For use without mass matrices: only [`Self::update_kinematics`] is available.
     pub fn without_masses(model: &Model) -> Self {
         let n = model.bodies.len();
         let moves = |&b: &usize| !model.bodies[b].driven_only;
@@ -102,15 +102,15 @@ impl Tree {
         }
     }
 
-    /// Poses, velocities and bias accelerations (those with zero coordinate accelerations) at (t, y).
+    /// Poses, velocities and bias accelerations (for zero coordinate accelerations) at (t, y).
     #[inline]
     pub fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.update_awake(model, t, y);
-        // They carry nothing, so that they may come last.
+        // Suspended bodies have no descendants, so that they may come last.
         self.update_asleep(model, y);
     }
 
-    /// Lets evaluations leave out the free bodies, each a tree of its own, for which `asleep` holds.
+    /// Lets evaluations skip the bodies for which `asleep` holds: free bodies that are trees of their own.
     pub fn suspend(&mut self, asleep: impl Fn(BodyIndex) -> bool) {
         self.awake.clear();
         self.asleep.clear();
@@ -124,7 +124,7 @@ impl Tree {
         }
     }
 
-    /// As [`Self::update_kinematics`] for the bodies that are awake.
+    /// As [`Self::update_kinematics`] for the active bodies.
     #[inline]
     pub fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
@@ -134,7 +134,7 @@ impl Tree {
         }
     }
 
-    /// As [`Self::update_kinematics`] for the others, after [`Self::update_awake`] at this instant.
+    /// As [`Self::update_kinematics`] for the suspended bodies, after [`Self::update_awake`] at this instant.
     pub fn update_asleep(&mut self, model: &Model, y: &[f64]) {
         let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
         for &b in &self.asleep {
@@ -151,7 +151,8 @@ impl Tree {
         }
     }
 
-    /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`; those of sleeping bodies stay.
+    /// Factored mass matrices, and generalised forces (loads, gravity, bias) in `out`; those of suspended bodies are left
+    /// unchanged.
     #[inline]
     pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
         let Self { motion, wrench, composite, mass, mass_offset, awake, .. } = self;
@@ -164,7 +165,7 @@ impl Tree {
             let block_index = model.block_of[b];
             let block = &model.blocks[block_index];
             if let (Motion::Free { v, .. }, Some(_)) = (body.motion, block.lone) {
-                // It carries nothing, and its bias accelerations are zero.
+                // A lone body has no descendants, and its bias accelerations are zero.
                 let force = load.force + gravity * body.mass;
                 let torque = load.torque - w.cross(&(inertia * w));
                 out[v..v + 6].copy_from_slice(&six_of(&force, &torque));
@@ -178,7 +179,7 @@ impl Tree {
                 torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
             };
             if body.carries {
-                // All descendants of this body have been added up by now.
+                // All descendants of this body have been accumulated.
                 c.add(&composite[b]);
                 composite[b] = Composite::EMPTY;
             }
@@ -243,7 +244,7 @@ impl Tree {
         }
     }
 
-    /// x = M^-1 x for all coordinates; those of sleeping bodies stay.
+    /// x = M^-1 x for all coordinates; those of suspended bodies are left unchanged.
     #[inline]
     pub fn solve(&self, model: &Model, x: &mut [f64]) {
         for (index, block) in model.blocks.iter().enumerate() {
@@ -264,7 +265,7 @@ impl Tree {
         }
     }
 
-    /// Replaces the bias accelerations of the bodies by the true ones for coordinate accelerations `vdot`.
+    /// Replaces the bodies' bias accelerations with the true ones for the coordinate accelerations `vdot`.
     pub fn accelerate(&mut self, model: &Model, y: &[f64], vdot: &[f64]) {
         let vs = &y[model.nq..];
         for &b in &self.dynamic {
@@ -287,7 +288,7 @@ impl Tree {
         }
     }
 
-    /// dq/dt from the velocities in `y`; that of sleeping bodies stays.
+    /// dq/dt from the velocities in `y`; that of suspended bodies is left unchanged.
     #[inline]
     pub fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
         let (qs, vs) = y.split_at(model.nq);
@@ -303,7 +304,7 @@ impl Tree {
         }
     }
 
-    /// Velocities that give the bodies that are awake the position rates `rate` at the positions in `y`.
+    /// Velocities of the active bodies for the position rates `rate` at the positions in `y`.
     pub fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
         for &b in &self.awake {
             match model.bodies[b].motion {
@@ -345,7 +346,7 @@ impl Tree {
     }
 }
 
-/// Moves body `b` after its parent.
+/// Moves body `b` relative to its parent.
 #[inline(always)]
 fn move_body(model: &Model, b: BodyIndex, y: &[f64], driven: &[Jet], motion: &mut [Kinematics]) {
     let (qs, vs) = y.split_at(model.nq);
@@ -375,7 +376,7 @@ fn move_body(model: &Model, b: BodyIndex, y: &[f64], driven: &[Jet], motion: &mu
     }
 }
 
-/// Both vectors, one after the other.
+/// Concatenates both vectors.
 #[inline(always)]
 fn six_of(linear: &Vec3, angular: &Vec3) -> [f64; 6] {
     let (l, a) = (linear, angular);
@@ -402,8 +403,8 @@ fn world_inertia(r: &Mat3, inertia: &Mat3, diagonal: bool) -> Mat3 {
     Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-/// Adds to `sum` the inertia of a composite (inertia about its own reference, mass, first moment) about a reference from
-/// which its own lies at `d`: I + m (d.d 1 - d d^T) + 2 (d.k) 1 - d k^T - k d^T.
+/// Adds to `sum` the inertia of a composite (inertia about its own reference, mass, first moment) about another reference, with
+/// its own at `d` from that: I + m (d.d 1 - d d^T) + 2 (d.k) 1 - d k^T - k d^T.
 #[inline]
 fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &Vec3) {
     // With h = k + m d / 2 the whole shift is 2 (d.h) 1 - d h^T - h d^T.
@@ -438,7 +439,7 @@ fn fill_free(h: &mut [f64], n: usize, c: &Composite) {
     }
 }
 
-/// Couples coordinate `row` (momentum, angular momentum about body `b`'s centroid for unit rate) with its ancestors.
+/// Couples coordinate `row` with its ancestors, given the momentum and angular momentum about body `b`'s centroid for unit rate.
 #[inline]
 fn fill_row(
     model: &Model,
@@ -475,8 +476,8 @@ fn fill_row(
     }
 }
 
-/// Column-wise walk over the coordinates that move body `b`: calls `visit(coordinate within block, point velocity,
-/// angular velocity)`, both per unit rate, for a point at `point` (world).
+/// Visits the coordinates that move body `b` column by column: calls `visit(coordinate within block, point velocity, angular
+/// velocity)`, both per unit rate, for the point `point` (world).
 #[inline]
 pub fn visit_columns(
     model: &Model,

@@ -4,7 +4,7 @@ use super::Pose;
 use super::frame::BodyMotion;
 use crate::machine::{Mat3, Vec3};
 
-/// Closer to beta = +-pi/2 than this (in cos beta), alpha is set to 0 and gamma takes the rest.
+/// Closer to beta = +-pi/2 than this (in cos beta), alpha is set to 0 and gamma represents the remaining rotation.
 const NEAR_SINGULAR: f64 = 1e-9;
 
 /// (alpha, beta, gamma) of a rotation, rad.

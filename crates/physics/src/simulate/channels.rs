@@ -1,4 +1,4 @@
-//! Which values of a frame are recorded for a scene: plot channels and columns of `run`, all laid out from one table.
+//! Values recorded for a scene: plot channels and columns of `run`, all laid out from one table.
 
 mod choice;
 mod table;
@@ -11,10 +11,10 @@ use super::Frame;
 use crate::machine::{Freedom, Joint, JointKind, Machine};
 use table::{Each, Signal, TABLE, Take};
 
-/// Ball joints and drives that are recorded; in a longer chain the rest would cost more memory than it is worth.
+/// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
 pub const RECORDED_JOINTS: usize = 12;
 
-/// Channels that are recorded because they were picked by name, at most: each costs as much memory as any other.
+/// Largest number of channels picked by name: each costs as much memory as any other.
 pub const MOST_PICKED: usize = 32;
 
 /// Where a value is found in a frame.
@@ -32,7 +32,7 @@ impl Reading {
         self.take.value(frame, self.part, self.component)
     }
 
-    /// Lets `frame` ask for it, where frames have it only if asked.
+    /// Requests the value from `frame`, if frames contain it only on request.
     pub fn ask(&self, frame: &mut Frame) {
         if matches!(self.take, Take::Reaction(_)) {
             frame.reactions.get_or_insert_default();
@@ -73,7 +73,7 @@ pub struct Channels {
 }
 
 impl Channels {
-    /// The channels that `scene` has.
+    /// The channels of `machine`.
     pub fn of(machine: &Machine) -> Self {
         let mut list = Vec::new();
         let in_plots = |signal: &Signal| signal.plot.map(|_| 0);
@@ -88,7 +88,7 @@ impl Channels {
         Self { list, picked: Vec::new() }
     }
 
-    /// Picks the channels of `scene` that match `patterns`, in place of those picked before; `first` as in [`run_columns`].
+    /// Picks the channels of `machine` that match `patterns`, replacing earlier picks; `first` as in [`run_columns`].
     pub fn pick(&mut self, machine: &Machine, first: &Frame, patterns: &[String]) {
         self.picked.clear();
         if patterns.is_empty() {
@@ -110,12 +110,12 @@ impl Channels {
         &self.list
     }
 
-    /// Number of these.
+    /// Number of channels, without the picked ones.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no channels, apart from picked ones.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
@@ -126,25 +126,25 @@ impl Channels {
         self.list.iter().position(own)
     }
 
-    /// Index of the error of the output point, which frames do not contain.
+    /// Index of the tip error, which frames do not contain.
     pub fn tip_error(&self) -> usize {
         let own = |c: &Channel| c.quantity == Quantity::TipError;
         self.list.iter().position(own).unwrap_or_default()
     }
 
-    /// Makes `frame` one that asks for the picked channels, and for nothing else.
+    /// Makes `frame` request the picked channels and nothing else.
     pub fn ask(&self, frame: &mut Frame) {
         frame.reactions = None;
         self.picked.iter().for_each(|channel| channel.reading.ask(frame));
     }
 
-    /// Appends the picked channels to `out`, as [`Self::read`] does the others.
+    /// Appends the values of the picked channels to `out`, in the manner of [`Self::read`].
     pub fn read_picked(&self, frame: &Frame, out: &mut Vec<f64>) {
         let value = |channel: &Listed| channel.reading.read(frame).unwrap_or(f64::NAN);
         out.extend(self.picked.iter().map(value));
     }
 
-    /// Reads every channel but the picked ones from `frame` into `out`, SI units; NaN where the frame has no value.
+    /// Reads every channel except the picked ones from `frame` into `out`, SI units; NaN where the frame has no value.
     pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
         out.clear();
         let value = |channel: &Channel| channel.reading.read(frame).unwrap_or(f64::NAN);
@@ -152,8 +152,8 @@ impl Channels {
     }
 }
 
-/// Columns of the rows of `run` in order, each with its name and where it is read; `first` shows whether the scene has a
-/// tip error and a ledger, and what its elements report.
+/// Names and readings of the columns of `run`, in order. The frame `first` shows whether the machine has a tip error and a
+/// ledger, and what its elements report.
 pub fn run_columns(machine: &Machine, first: &Frame) -> (Vec<String>, Vec<Reading>) {
     let (mut names, mut readings) = (Vec::new(), Vec::new());
     let in_run = |signal: &Signal| signal.run;
@@ -173,8 +173,8 @@ struct Found<'a> {
     reading: Reading,
 }
 
-/// Calls `add` with the values of all signals that have a place, in order of place; signals that share a place and are
-/// repeated for the same parts go part by part. Only the first `most` parts are used.
+/// Calls `add` with the values of all signals that have a place, in order of place. Signals that share a place and are repeated
+/// for the same parts are laid out part by part. Only the first `most` parts are used.
 fn lay_out(
     machine: &Machine,
     first: Option<&Frame>,
@@ -207,7 +207,7 @@ fn lay_out(
     }
 }
 
-/// Names of the parts a signal is repeated for; for a coordinate of a joint also what it measures.
+/// Names of the parts for which a signal is repeated; for a joint coordinate also the freedom that it measures.
 fn parts_of(machine: &Machine, each: Each) -> Vec<(&str, Option<Freedom>)> {
     let joints = machine.ball_joints.iter().map(|joint| joint.name.as_str());
     let elements = machine.elements.iter().map(|element| element.name.as_str());
@@ -232,7 +232,7 @@ fn parts_of(machine: &Machine, each: Each) -> Vec<(&str, Option<Freedom>)> {
     }
 }
 
-/// Whether `scene` has `signal` for part `part`; without a `first` frame, whether it may have it.
+/// Whether `machine` has `signal` for part `part`; without a `first` frame, whether it may have it.
 fn has(machine: &Machine, first: Option<&Frame>, signal: &Signal, part: usize, freedom: Option<Freedom>) -> bool {
     let take = signal.take;
     let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());

@@ -1,4 +1,4 @@
-//! Reasons to doubt a result: numbers, and their wording.
+//! Reasons to doubt a result, as numbers, and their wording.
 
 use std::fmt;
 
@@ -53,78 +53,78 @@ impl LedgerTerm {
     }
 }
 
-/// Why a result is not to be trusted. Its `Display` is a sentence for the user.
+/// Why a result may be unreliable. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
     /// Follows from the machine's settings, whatever happened in the run.
     Machine(machine::Doubt),
     /// Contacts that lasted fewer fixed steps than needed to resolve their forces.
     Unresolved {
-        /// Where.
+        /// Affected joints.
         joints: Joints,
-        /// How many of the worst joint's contacts.
+        /// Number of such contacts of the worst joint.
         short: u64,
-        /// Contacts of the worst joint.
+        /// All contacts of the worst joint.
         contacts: u64,
-        /// Steps that an impact needs.
+        /// Fewest steps that resolve an impact.
         steps: u64,
     },
-    /// A contact whose beginning was found only at the end of a step that locates them.
+    /// A contact found only at the end of a step, by a method that should have located its beginning.
     Late {
-        /// Where.
+        /// Affected joints.
         joints: Joints,
         /// Penetration there, m.
         depth: f64,
     },
-    /// An undisturbed impact that rebounded faster than its law says.
+    /// An undisturbed impact that rebounded faster than its law predicts.
     Rebound {
-        /// Where.
+        /// Affected joints.
         joints: Joints,
         /// When it ended, s.
         time: f64,
         /// Separation speed over approach speed.
         achieved: f64,
-        /// The same by its law.
+        /// Restitution that its law predicts.
         law: f64,
     },
-    /// Contacts that ended after they began slower than `impact_speed_floor` or existed at the start.
+    /// Finished contacts that began slower than `impact_speed_floor` or existed at the start.
     Floored {
-        /// Where.
+        /// Affected joints.
         joints: Joints,
-        /// How many of the worst joint's contacts.
+        /// Number of such contacts of the worst joint.
         slow: u64,
-        /// Contacts of the worst joint.
+        /// All contacts of the worst joint.
         contacts: u64,
     },
-    /// A stop that is deeper than its own depth when the run starts.
+    /// A stop compressed beyond its nominal depth when the run starts.
     StartsInside {
         /// Its name.
         stop: String,
-        /// On a hinge: angle and torque, not length and force.
+        /// Whether it acts on a hinge: depth and force are then an angle and a torque.
         turns: bool,
-        /// m or rad.
+        /// Compression, m or rad.
         depth: f64,
-        /// The depth at which it exerts the force given, m or rad.
+        /// Nominal depth, at which it exerts its specified force, m or rad.
         usual: f64,
         /// N or N m.
         force: f64,
     },
     /// A contact patch that is not small compared with its ball.
     Patch {
-        /// Where.
+        /// Affected joints.
         joints: Joints,
         /// Radius of the patch over that of the ball.
         radii: f64,
     },
-    /// More damping than the law gives an undisturbed impact.
+    /// More damping than in an undisturbed impact under the same law.
     Damping {
-        /// Where.
+        /// Affected joints.
         joints: Joints,
         /// When, s.
         time: f64,
         /// Damping over elastic force.
         ratio: f64,
-        /// The same in an undisturbed impact: chi.
+        /// This ratio in an undisturbed impact: chi.
         usual: f64,
     },
     /// Constraints of the `lagrange` form that drifted.
@@ -132,14 +132,14 @@ pub enum Doubt {
         /// Largest violation, m.
         distance: f64,
     },
-    /// Unaccounted energy, compared with what the machine held at once and lost.
+    /// Unaccounted energy, compared with the energy held and lost.
     Energy {
         /// J.
         residual: f64,
         /// As a fraction of [`super::Ledger::scale`].
         share: f64,
     },
-    /// A loss that is negative: energy appeared there.
+    /// A negative loss: it created energy.
     Gain {
         /// The loss.
         work: LedgerTerm,
@@ -167,7 +167,7 @@ pub enum Doubt {
 }
 
 impl Doubt {
-    /// What each kind of doubt is about, in a word or two for files; [`Self::kind`] is the index.
+    /// Short names of the kinds of doubt for files, indexed by [`Self::kind`].
     pub const KINDS: [&str; 12] = [
         "settings",
         "unresolved impacts",

@@ -1,4 +1,4 @@
-//! One instant of a simulation as plain data: what the outputs write and the view draws.
+//! One instant of a simulation as plain data, for the outputs and the view.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ pub use crate::mechanism::ElementReport;
 pub struct Frame {
     /// Simulated time, s.
     pub time: f64,
-    /// From where positions are measured, world axes, m: zero, unless the view has moved it.
+    /// Origin of all positions, world axes, m: zero, unless the view has moved it.
     pub origin: Vec3,
     /// Bodies in scene order.
     pub bodies: Vec<BodyMotion>,
@@ -21,15 +21,15 @@ pub struct Frame {
     pub closing: Vec<[Vec3; 2]>,
     /// Force elements in scene order.
     pub elements: Vec<ElementReport>,
-    /// The hand that pulls, if any: force from the hand on the grasped point. Only set in the displayed frame.
+    /// The pulling hand, if any: force from the hand on the grasped point. Only set in the displayed frame.
     pub pull: Option<ElementReport>,
-    /// Coordinates of the joints that slide or turn, m or rad, each with its rate: joints that bodies hang on in scene order, then
-    /// joints that close loops. The angles of these, and in the `lagrange` form of all that are not driven, lie between -pi and pi.
+    /// Coordinates of the joints that slide or turn, m or rad, each with its rate: tree joints in scene order, then joints that
+    /// close loops. Angles of the latter, and in the `lagrange` form of all undriven joints, lie between -pi and pi.
     pub coordinates: Vec<[f64; 2]>,
-    /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
+    /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis.
     pub actuators: Vec<f64>,
     /// Fixed, sliding and turning joints in scene order: force, N, and torque about the child's joint point, N m, on the child,
-    /// its drive's included. Filled only in a frame that asks for it: one that has a list here.
+    /// including its drive's. Filled only on request, that is, if there is a list here.
     pub reactions: Option<Vec<[Vec3; 2]>>,
     /// The output body.
     pub pose: Pose,
@@ -80,14 +80,14 @@ pub struct Pose {
     pub angle_accelerations: Vec3,
 }
 
-/// What a ball joint's contact is doing.
+/// Contact state of a ball joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactState {
     /// The ball touches nothing.
     #[default]
     Free,
-    /// In contact, sliding slower than `slip_speed_high`, where friction is below its full value: under any load along the wall
-    /// a ball creeps, and none sticks.
+    /// In contact, sliding slower than `slip_speed_high`, where friction is below its full value: any tangential load makes the
+    /// ball creep; it never sticks.
     Creep,
     /// In contact and sliding.
     Slip,
@@ -104,7 +104,7 @@ pub struct JointReport {
     pub ball_centre: Vec3,
     /// e = Z_j - Z_i, m (5).
     pub eccentricity: Vec3,
-    /// Clearance in force now (a live change ramps it at a bounded rate), m.
+    /// Current clearance (a live change ramps it at a bounded rate), m.
     pub clearance: f64,
     /// delta = |e| - c, m (10); 0 for an ideal joint.
     pub penetration: f64,
@@ -118,7 +118,7 @@ pub struct JointReport {
     pub contact_point: Vec3,
     /// Sliding speed used by the friction law, m/s.
     pub slip_speed: f64,
-    /// What the contact is doing.
+    /// Contact state.
     pub state: ContactState,
 }
 

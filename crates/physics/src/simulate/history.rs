@@ -1,13 +1,12 @@
-//! The recorded past of some channels, thinned without losing extremes: bins of doubling width, each with the least and the
-//! greatest value that fell into it.
+//! Record of channels over time, decimated without losing extremes: bins of doubling width with their least and greatest values.
 
-/// Bins kept per level: more than a wide plot has columns of pixels.
+/// Bins per level: more than a wide plot has columns of pixels.
 const BINS: usize = 2048;
-/// Levels: the widest bin is `finest * 2^(LEVELS - 1)`.
+/// Number of levels: the widest bin is `finest * 2^(LEVELS - 1)`.
 const LEVELS: usize = 23;
 /// Empty slot.
 const EMPTY: i64 = i64::MIN;
-/// Nothing recorded for a channel.
+/// Range of a channel without values.
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
 /// Fixed-size record of `channels` quantities over time. Nothing is allocated after [`History::new`].
@@ -15,21 +14,22 @@ const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 pub struct History {
     channels: usize,
     finest: f64,
-    /// Index (time / width) of the bin that each slot holds; level by level.
+    /// Bin index (time / width) of each slot, level by level.
     indices: Vec<i64>,
     /// Newest index per level.
     newest: [i64; LEVELS],
     /// Greatest index ever reached per level: anything more than `BINS` older has been overwritten.
     reached: [i64; LEVELS],
-    /// First value per channel, NaN before there is one in a channel that came later. Differences from it are stored, so that a small motion far from zero keeps its digits.
+    /// First value per channel; NaN until a channel added later has one. Values are stored as differences from it, so that a
+    /// small motion far from zero keeps its digits.
     base: Vec<f64>,
-    /// (least, greatest) per channel less its base, slot by slot, level by level.
+    /// (least, greatest) per channel relative to its base, slot by slot, level by level.
     ranges: Vec<(f32, f32)>,
     start: Option<f64>,
     end: f64,
 }
 
-/// What was recorded from `from` to `to`, s: the least and the greatest value.
+/// Least and greatest value of a channel between the times `from` and `to`, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Bin {
@@ -43,7 +43,7 @@ pub struct Bin {
 #[derive(Clone, Debug)]
 pub struct Mark {
     newest: [i64; LEVELS],
-    /// Of the newest bin of each level.
+    /// Ranges of the newest bin of each level.
     ranges: Vec<(f32, f32)>,
     span: Option<(f64, f64)>,
 }
@@ -54,13 +54,13 @@ impl Mark {
         size_of::<Self>() + std::mem::size_of_val(self.ranges.as_slice())
     }
 
-    /// The same position in a record that was rearranged, as by [`History::rearranged`], from one of `channels`.
+    /// The same position in a record of `channels` channels after [`History::rearranged`].
     pub fn rearranged(&self, channels: usize, from: &[Option<usize>]) -> Self {
         Self { newest: self.newest, ranges: rearranged(&self.ranges, channels, from), span: self.span }
     }
 }
 
-/// The ranges in slots of `channels`, in slots of the channels `from`.
+/// Rearranges ranges from slots of `channels` channels to slots of the channels `from`.
 fn rearranged(ranges: &[(f32, f32)], channels: usize, from: &[Option<usize>]) -> Vec<(f32, f32)> {
     let slots = ranges.chunks_exact(channels.max(1));
     let slot = |slot: &[(f32, f32)]| {
@@ -86,7 +86,7 @@ impl History {
         }
     }
 
-    /// The same record with other channels: each the one that `from` names, or one of which nothing is recorded so far.
+    /// The same record with other channels: `from` gives the old index of each, or `None` for a channel without values so far.
     pub fn rearranged(&self, from: &[Option<usize>]) -> Self {
         let base = |channel: &Option<usize>| channel.map_or(f64::NAN, |at| self.base[at]);
         Self {
@@ -151,8 +151,8 @@ impl History {
         }
     }
 
-    /// Records one instant, s; one value per channel, NaN where there is none. Instants that are not finite, or earlier
-    /// than the latest, are ignored.
+    /// Records one value per channel at `time`, s; NaN means no value. Times that are not finite, or earlier than the latest, are
+    /// ignored.
     pub fn push(&mut self, time: f64, values: &[f64]) {
         if !time.is_finite() || (self.start.is_some() && time < self.end) {
             return;
@@ -198,9 +198,8 @@ impl History {
         }
     }
 
-    /// Appends to `out` what was recorded of `channel` from `from` to `to`, s, in order of time, in at most `most_bins`
-    /// bins plus one beyond each end. The last bin ends where the record ends; a gap between bins means that nothing was
-    /// recorded there.
+    /// Appends the record of `channel` from `from` to `to`, s, to `out`, in order of time, in at most `most_bins` bins plus one
+    /// beyond each end. The last bin ends where the record ends; a gap between bins means that nothing was recorded there.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
         if channel >= self.channels || to <= from {
             return;
@@ -211,7 +210,7 @@ impl History {
         let (from, to) = (from.max(start), to.min(end));
         let level = self.level(from, to, most_bins);
         let (width, complete) = (self.width(level), self.complete(level));
-        // If the first bin is empty, go back to the last one before it that is not.
+        // If the first bin is empty, start from the last non-empty one before it.
         let (mut first, oldest) = (self.index(level, from), self.index(level, start));
         let gone = self.reached[level].saturating_sub(BINS as i64);
         while first > oldest.max(gone + 1) && self.range(level, first, complete, channel).is_none() {
@@ -231,8 +230,8 @@ impl History {
         }
     }
 
-    /// The whole record in at most `most_bins` rows: time of each bin's middle in s, then the least and the greatest value
-    /// of each channel; least above greatest where there was none.
+    /// The whole record in at most `most_bins` rows: midpoint of each bin, s, then (least, greatest) of each channel; least above
+    /// greatest if it has no value there.
     pub fn rows(&self, most_bins: usize) -> Vec<(f64, Vec<(f64, f64)>)> {
         let Some((start, end)) = self.span() else {
             return Vec::new();
@@ -288,8 +287,8 @@ impl History {
         above.min().unwrap_or(i64::MAX)
     }
 
-    /// Range of `channel` in one bin, including what finer levels have not yet merged into it; bins before `complete` need
-    /// no such look-up.
+    /// Range of `channel` in one bin, including values of finer levels not yet merged into it; bins before `complete` have none
+    /// of these.
     fn range(&self, level: usize, index: i64, complete: i64, channel: usize) -> Option<(f64, f64)> {
         let mut found: Option<(f32, f32)> = None;
         for below in if index < complete { level } else { 0 }..=level {
@@ -467,7 +466,7 @@ mod tests {
         history.rewind(&mark);
         assert_eq!(history.span(), Some((0.0, 3_332.0 * 1e-5)));
         assert!(history.rows(70) == rows);
-        // What the future overwrote is still available in wider bins.
+        // Bins overwritten after the mark are still available at coarser levels.
         let after = bins(&history, 0, 0.0, 1.0, 700);
         let ends = |bins: &[Bin]| (bins[0].from, bins[bins.len() - 1].to);
         assert_eq!(ends(&after), ends(&before));
@@ -522,13 +521,13 @@ mod tests {
             straight.push(at(n), &values(n));
         }
         let mark = history.mark();
-        // The second first, then a new one, and the first no more.
+        // The second channel comes first, then a new one; the first is dropped.
         let from = [Some(1), None];
         let (mut history, mark) = (history.rearranged(&from), mark.rearranged(2, &from));
         assert_eq!(history.channels(), 2);
         let push = |history: &mut History, straight: &mut History| {
             for n in 1000..3000 {
-                // Far from zero, and moving little.
+                // A small motion far from zero.
                 history.push(at(n), &[values(n)[1], 7.0 + 1e-9 * wave(n)]);
                 straight.push(at(n), &values(n));
             }

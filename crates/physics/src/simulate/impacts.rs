@@ -1,13 +1,13 @@
-//! The restitution check: for each impact the restitution asked for, the one its law gives, and the one that resulted.
+//! Restitution check: for each impact, the requested restitution, the one that its law predicts, and the one achieved.
 
 use serde::{Deserialize, Serialize};
 
 use super::peaks::PenetrationCubic;
 use crate::contact::{Coefficients, undisturbed_restitution};
 
-/// How many of the latest impacts are kept.
+/// Number of latest impacts stored.
 const KEPT: usize = 64;
-/// Work of what pushes besides the contact, over an impact's energy, beyond which its law alone does not set its restitution.
+/// Work of other forces during an impact, relative to its energy, beyond which its law alone does not determine its restitution.
 const SOFT: f64 = 0.01;
 
 /// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
@@ -26,12 +26,12 @@ pub struct Impact {
     pub separation_speed: f64,
     /// The joint's restitution setting when it began.
     pub asked: f64,
-    /// Restitution that its normal-force law gives for an undisturbed impact not slower than the floor.
+    /// Restitution that its normal-force law predicts for an undisturbed impact not slower than the floor.
     pub law: f64,
-    /// Began slower than `impact_speed_floor`: it rebounds higher than asked.
+    /// Whether it began slower than `impact_speed_floor`: it then rebounds higher than requested.
     pub floored: bool,
-    /// Another ball joint was in contact meanwhile, or a live change altered the contact: the law alone does not set its
-    /// restitution.
+    /// Whether another ball joint was in contact meanwhile, or a live change altered the contact: the law alone then does not
+    /// determine its restitution.
     pub disturbed: bool,
     /// Accepted steps from its beginning to its end; with fixed steps, including those in which it begins and ends.
     pub steps: u64,
@@ -39,7 +39,7 @@ pub struct Impact {
     pub deepest: f64,
     /// Largest normal force in continuous time, N.
     pub peak: f64,
-    /// How the penetration rate changed over the step before it, m/s^2: what pushes besides the contact.
+    /// Mean rate of change of the penetration rate over the step before it, m/s^2: the effect of other forces.
     pub push: f64,
     /// Largest ratio of damping to elastic force: the damping factor at its start, unless it is hit again or began slower
     /// than the floor.
@@ -52,19 +52,19 @@ impl Impact {
         self.separation_speed / self.approach_speed
     }
 
-    /// By how much its restitution exceeds that of its law, which friction and what it drives only lower; 0 where that says
-    /// nothing: it was disturbed, slow, or so soft that what pushes besides the contact changes it.
+    /// Excess of its restitution over its law's prediction, which friction and the motion it causes can only lower; 0 if the two
+    /// cannot be compared, as in [`Self::has_own_restitution`].
     pub fn astray(&self) -> f64 {
         if self.has_own_restitution() { (self.achieved() - self.law).max(0.0) } else { 0.0 }
     }
 
-    /// Whether weight and drives do so much work during it that they change its restitution.
+    /// Whether other forces, such as weight and drives, do enough work during it to change its restitution.
     pub fn is_soft(&self) -> bool {
         let kinetic = self.approach_speed * self.approach_speed;
         !(2.0 * self.push.abs() * self.deepest <= SOFT * kinetic)
     }
 
-    /// Whether its restitution can be compared with that of its law: it was neither disturbed nor slow nor soft.
+    /// Whether its restitution can be compared with its law's prediction: it was neither disturbed nor slow nor soft.
     pub fn has_own_restitution(&self) -> bool {
         !(self.disturbed || self.floored || self.is_soft())
     }
@@ -90,8 +90,8 @@ impl Impacts {
         &self.finished
     }
 
-    /// For `joints` ball joints. A step finishes at most one impact per joint, so that all of them can be collected between
-    /// two steps.
+    /// A record for `joints` ball joints. A step finishes at most one impact per joint, so that all of them can be collected
+    /// between two steps.
     pub(super) fn new(joints: usize) -> Self {
         Self {
             under_way: vec![None; joints],
@@ -102,7 +102,7 @@ impl Impacts {
         }
     }
 
-    /// Whether they are of a scene with `joints` ball joints.
+    /// Whether they fit a scene with `joints` ball joints.
     pub(super) fn fits(&self, joints: usize) -> bool {
         let own = Self::new(joints);
         let mut known = self.under_way.iter().flatten().chain(&self.finished);
@@ -113,8 +113,8 @@ impl Impacts {
             && known.all(|impact| impact.joint < joints.max(1))
     }
 
-    /// A contact of `joint` begins at `time` with the penetration rate `speed`, which changed at `push` (m/s^2) before;
-    /// `touching`: another joint is in contact.
+    /// Records that a contact of `joint` begins at `time` with penetration rate `speed` (m/s), which was changing at `push`
+    /// (m/s^2); `touching` if another joint is in contact.
     pub(super) fn begin(
         &mut self,
         joint: usize,
@@ -145,8 +145,8 @@ impl Impacts {
         });
     }
 
-    /// Follows the contact of `joint` over a step in which it was, or became, active: the course of its penetration, its
-    /// largest normal force (N) and its largest ratio of damping to elastic force.
+    /// Updates the contact of `joint` over a step in which it was, or became, active, from its penetration, its largest normal
+    /// force (N) and its largest ratio of damping to elastic force.
     pub(super) fn follow(&mut self, joint: usize, course: &PenetrationCubic, force: f64, damping: f64) {
         if let Some(impact) = &mut self.under_way[joint] {
             impact.steps += 1;
@@ -156,13 +156,13 @@ impl Impacts {
         }
     }
 
-    /// Largest normal force so far of the impact of `joint` under way, N; infinite without one.
+    /// Largest normal force so far in the current impact of `joint`, N; infinite without one.
     pub(super) fn peak_under_way(&self, joint: usize) -> f64 {
         let impact = &self.under_way[joint];
         impact.as_ref().map_or(f64::INFINITY, |impact| impact.peak)
     }
 
-    /// The contact of `joint` ends at `time` with the penetration rate `rate`. Returns the impact that it was, if it was one.
+    /// Ends the contact of `joint` at `time` with the penetration rate `rate`. Returns the impact, if it was one.
     pub(super) fn end(&mut self, joint: usize, time: f64, rate: f64) -> Option<Impact> {
         let mut impact = self.under_way[joint].take()?;
         impact.end = time;
@@ -173,7 +173,7 @@ impl Impacts {
         Some(impact)
     }
 
-    /// A live change altered the contact of `joint`, ending it if `touching` is false.
+    /// Records that a live change altered the contact of `joint`, or ended it if `touching` is false.
     pub(super) fn change(&mut self, joint: usize, touching: bool) {
         let impact = &mut self.under_way[joint];
         if touching {
@@ -197,7 +197,7 @@ impl Impacts {
         (0..most).map(move |n| &self.finished[((first + n as u64) % length) as usize])
     }
 
-    /// Appends those not yet handed out.
+    /// Appends the impacts not yet handed out.
     pub(super) fn hand_out(&mut self, out: &mut Vec<Impact>) {
         let oldest = self.count.saturating_sub(self.finished.len() as u64);
         out.extend(self.since(self.handed_out.max(oldest)));

@@ -1,4 +1,4 @@
-//! Where the energy came from and where it went: works by quadrature of powers, compared with the change in energy.
+//! Energy ledger: works by quadrature of powers, compared with the change in energy.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,12 +32,12 @@ pub struct Ledger {
     /// Energy exchanged: half the sum of the magnitudes of all terms over all steps, as each joule leaves one term and
     /// enters another.
     pub exchanged: f64,
-    /// Largest kinetic energy with the elastic energy in contacts at the end of any step: what the machine holds at once.
+    /// Largest sum of kinetic energy and elastic energy in contacts at the end of any step.
     pub held: f64,
 }
 
 impl Ledger {
-    /// Unaccounted energy, J: positive where it came from nowhere.
+    /// Unaccounted energy, J: positive if energy was created.
     pub fn residual(&self) -> f64 {
         let given = self.drive_work + self.gravity_work + self.clearance_work + self.change_work + self.external_work;
         let taken = self.restitution_loss + self.friction_loss + self.damping_loss;
@@ -49,15 +49,15 @@ impl Ledger {
         if self.exchanged > 0.0 { self.residual() / self.exchanged } else { 0.0 }
     }
 
-    /// Magnitude of the residual over [`Self::scale`]; 0 where nothing was held.
+    /// Magnitude of the residual over [`Self::scale`]; 0 if that is 0.
     pub fn share(&self) -> f64 {
         let scale = self.scale();
         if scale > 0.0 { self.residual().abs() / scale } else { 0.0 }
     }
 
-    /// Energy against which a residual is small or not, J. A machine that exchanges its energy again and again without losing
-    /// any keeps every error: what it exchanged grows, what it holds does not. One that dissipates forgets errors with what is
-    /// lost. And at rest, or turning freely, hardly anything is exchanged.
+    /// Energy scale for judging a residual, J. A machine that repeatedly exchanges its energy without losses retains every error:
+    /// its exchanged energy grows, but the energy it holds does not. A dissipative machine loses errors with its energy. At rest,
+    /// or turning freely, a machine exchanges hardly any energy.
     pub fn scale(&self) -> f64 {
         let lost = [self.restitution_loss, self.friction_loss, self.damping_loss].map(|loss| loss.max(0.0));
         self.held.max(self.exchanged.min(self.held + lost.iter().sum::<f64>()))
@@ -70,7 +70,7 @@ pub(super) struct Energies {
     pub kinetic: f64,
     pub gravitational: f64,
     pub elastic: f64,
-    /// The part of it that is in contacts.
+    /// The part of `elastic` stored in contacts.
     pub in_contacts: f64,
 }
 
@@ -89,7 +89,7 @@ const EVEN: [f64; NODES] =
 /// Relative tolerance for treating instants as equidistant: the weights are then accurate to the same order.
 const EVENLY: f64 = 1e-9;
 
-/// Powers at some instants, and the polynomial through them.
+/// Powers at some instants, and their interpolating polynomial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct PowerInterpolant {
     times: [f64; NODES],
@@ -118,7 +118,7 @@ impl PowerInterpolant {
         self.count += 1;
     }
 
-    /// Adds an instant, after dropping stored ones less than `apart` before the latest stored.
+    /// Adds an instant, after dropping stored ones less than `apart` before the latest of them.
     pub(super) fn push_apart(&mut self, time: f64, powers: Powers, apart: f64) {
         while let [.., before, latest] = self.times[..self.count]
             && latest - before < apart
@@ -158,7 +158,7 @@ impl PowerInterpolant {
     }
 }
 
-/// Weights that turn values at `nodes`, at most six, into the integral from 0 to `end` of the polynomial through them.
+/// Quadrature weights at `nodes`, at most six, for the integral from 0 to `end` of the polynomial through the values there.
 pub(super) fn weights(nodes: &[f64], end: f64) -> [f64; NODES] {
     let mut weights = [0.0; NODES];
     for (i, x) in nodes.iter().enumerate() {
@@ -182,9 +182,9 @@ pub(super) fn weights(nodes: &[f64], end: f64) -> [f64; NODES] {
 /// The ledger of a running simulation, at both ends of the latest step: part of its state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Account {
-    /// Whether the ledger is kept.
+    /// Whether the ledger is enabled.
     pub on: bool,
-    /// Start and end of the latest step.
+    /// Ledger and energies at the start and end of the latest step.
     before: (Ledger, Energies),
     now: (Ledger, Energies),
     /// Powers over the latest step, in step time 0 to 1: the works are integrated from it.
@@ -202,18 +202,18 @@ impl Account {
         Self { on, before: entry, now: entry, ..Self::default() }
     }
 
-    /// Whether it holds no more than it can.
+    /// Whether the counts of stored instants are valid.
     pub(super) fn fits(&self) -> bool {
         self.course.count <= NODES && self.past.count <= NODES
     }
 
-    /// Books a step of size `h` that ends with `energies`, by the powers in `course`.
+    /// Records a step of size `h` that ends with `energies`, from the powers in `course`.
     pub(super) fn book(&mut self, h: f64, energies: Energies) {
         self.before = self.now;
         self.now = (self.within(1.0, h, energies), energies);
     }
 
-    /// Books a change of parameters that leaves the motion unchanged: `energies` are those with the new ones.
+    /// Records a change of parameters that leaves the motion unchanged; `energies` are those with the new parameters.
     pub(super) fn record_change(&mut self, energies: Energies) {
         let (ledger, before) = &mut self.now;
         let jump = energies.elastic - before.elastic;
@@ -233,7 +233,7 @@ impl Account {
         kinetic + gravitational.abs() + elastic.abs()
     }
 
-    /// At the end of the latest step.
+    /// Ledger at the end of the latest step.
     pub(super) fn ledger(&self) -> &Ledger {
         &self.now.0
     }
@@ -247,7 +247,7 @@ impl Account {
     }
 }
 
-/// `ledger` plus everything since the energies were `start`.
+/// `ledger` plus the exchanges since the energies were `start`.
 fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> Ledger {
     let gravity = start.gravitational - end.gravitational;
     let kinetic = end.kinetic - start.kinetic;
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_course_integrates_the_polynomial_through_its_instants() {
-        // Of degree 5 through six non-equidistant instants, four of them before the interval.
+        // A polynomial of degree 5 through six non-equidistant instants, four of them before the interval.
         let p = |t: f64| 1.0 + t * (2.0 - t * (3.0 - t * (0.5 + t * (0.25 - t))));
         let integral = |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
         let mut course = PowerInterpolant::default();
@@ -351,7 +351,7 @@ mod tests {
         let at = |kinetic: f64, gravitational: f64| Energies { kinetic, gravitational, ..Energies::default() };
         let mut account = Account::start(true, at(0.0, 1.0));
         account.course.push(0.0, drive(2.0));
-        // 2 J by the drive and 1 J by gravity, of which 2.75 J arrive.
+        // 2 J from the drive and 1 J from gravity, of which 2.75 J arrive.
         account.book(1.0, at(2.75, 0.0));
         let ledger = account.ledger();
         assert_eq!(ledger.residual(), -0.25);

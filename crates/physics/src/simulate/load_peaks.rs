@@ -1,19 +1,18 @@
-//! The largest loads of force elements and of all joints but ball joints.
+//! The largest loads of force elements and of all joints except ball joints.
 
 use serde::{Deserialize, Serialize};
 
 use crate::machine::{JointKind, Machine, Vec3};
 use crate::mechanism::Mechanism;
 
-/// The largest size of a force, N, or of a torque, N m, and when, s; `None` where there is no such load.
+/// Largest magnitude of a force, N, or of a torque, N m, and its time, s; `None` if there is no such load.
 pub type LoadPeak = Option<(f64, f64)>;
 
-/// Largest force and torque of each force element, each joint on which a body hangs, but free ones, and each joint that closes a
-/// loop, in the order of the scene.
+/// Largest force and torque of each force element, each tree joint except free ones, and each loop-closing joint, in scene order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadPeaks {
     parts: Vec<[LoadPeak; 2]>,
-    /// When the loads were last taken at the end of a step, s.
+    /// Time of the latest step end at which loads were recorded, s.
     seen: f64,
     actuators: Vec<f64>,
 }
@@ -30,24 +29,24 @@ impl LoadPeaks {
         &self.parts
     }
 
-    /// How long ago at `time` the loads were last taken at the end of a step, s.
+    /// Time since loads were last recorded at the end of a step, s.
     pub(super) fn age(&self, time: f64) -> f64 {
         time - self.seen
     }
 
-    /// Whether these are of a scene for which `own` are.
+    /// Whether these fit the same scene as `own`.
     pub(super) fn fits(&self, own: &Self) -> bool {
         self.parts.len() == own.parts.len() && self.actuators.len() == own.actuators.len()
     }
 
-    /// Takes the loads at the end `time` of a step, at which everything has just been evaluated.
+    /// Records the loads at the step end `time`, where everything has just been evaluated.
     pub(super) fn evaluate(&mut self, mechanism: &mut Mechanism, time: f64) {
         self.seen = time;
         mechanism.actuators(&mut self.actuators);
         self.take(mechanism, time);
     }
 
-    /// Takes the loads at `time` after [`Mechanism::actuators`].
+    /// Records the loads at `time` after [`Mechanism::actuators`].
     pub(super) fn take(&mut self, mechanism: &mut Mechanism, time: f64) {
         let mut parts = self.parts.iter_mut();
         let mut rise = |loads: [Option<Vec3>; 2]| {

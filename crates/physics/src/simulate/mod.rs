@@ -57,8 +57,8 @@ pub enum Effect {
     AtReset,
 }
 
-/// Forces that the motion does not determine, because ideal joints constrain a direction redundantly: the values reported
-/// are the least-squares reactions and what follows from them.
+/// Forces that the motion does not determine, because ideal joints constrain a direction redundantly. The values reported are the
+/// least-squares reactions and the forces that follow from them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Indeterminate {
     /// Ball joints, by index; joints that close loops count after them.
@@ -84,15 +84,15 @@ pub struct Statistics {
     pub corners: u64,
     /// Contacts begun, per ball joint.
     pub impacts: Vec<u64>,
-    /// Contacts that ended and had begun slower than the scene's `impact_speed_floor` or existed at the start, per ball joint:
-    /// they rebounded higher than asked.
+    /// Finished contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
+    /// rebounded higher than requested.
     pub floored: Vec<u64>,
-    /// Contacts that ended after fewer fixed steps than needed to resolve one, per ball joint; 0 with an adaptive method.
+    /// Contacts that lasted fewer fixed steps than needed to resolve one, per ball joint; 0 with an adaptive method.
     pub coarse: Vec<u64>,
-    /// Deepest penetration at which a contact was found whose beginning should have been located, per ball joint, m; 0 if all
-    /// were, or with fixed steps.
+    /// Deepest penetration at which a contact was found although its beginning should have been located, per ball joint, m; 0 if
+    /// all were, or with fixed steps.
     pub late: Vec<f64>,
-    /// The undisturbed impact whose restitution exceeds that of its law most, if any does, per ball joint.
+    /// The undisturbed impact whose restitution most exceeds its law's prediction, if any does, per ball joint.
     pub astray: Vec<Option<Impact>>,
     /// Largest continuous-time normal force (reaction of an ideal joint), per ball joint, N.
     pub peak_normal: Vec<f64>,
@@ -127,7 +127,7 @@ impl Statistics {
         }
     }
 
-    /// Whether they are of a scene with `joints` ball joints.
+    /// Whether they fit a scene with `joints` ball joints.
     fn fits(&self, joints: usize) -> bool {
         self.impacts.len() == joints
             && self.floored.len() == joints

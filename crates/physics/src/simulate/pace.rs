@@ -1,21 +1,20 @@
-//! Pacing against the wall clock: how far the simulation should be after each frame, how long it may step for that, and what keeps
-//! it from getting there. This module reads no clock; the caller measures and passes times in. How many steps a frame takes
-//! depends on them, the steps do not.
+//! Pacing against the wall clock: the target time of each frame, its stepping budget, and the bottleneck if the target is missed.
+//! This module reads no clock: the caller measures times and passes them in. They affect the number of steps per frame, but not
+//! the steps.
 
-/// Longest frame to catch up with, s, unless the one before was as long: after a hitch or a hidden window the simulation continues
-/// instead of racing.
+/// Longest frame to catch up with, s, unless the one before was as long: after a hitch or a hidden window the run does not race.
 pub const LONGEST_FRAME: f64 = 0.25;
 
-/// A longer gap, s, is a rest and no frame.
+/// A gap longer than this, s, is a pause, not a frame.
 pub const REST: f64 = 2.0;
 
 /// Stepping budget of a frame of 1/60 s, s.
 pub const USUAL_BUDGET: f64 = 0.012;
 
-/// Largest stepping budget, s, however slow drawing is: the interface still answers.
+/// Largest stepping budget, s, however slow drawing is, so that the interface stays responsive.
 pub const LARGEST_BUDGET: f64 = 0.25;
 
-/// Longest spell of stepping between two frames, s: what the user does meanwhile is seen to after it.
+/// Longest spell of stepping between two frames, s: user input waits until it ends.
 pub const SPELL: f64 = 0.008;
 
 /// Averaging time of the achieved time scale, s.
@@ -24,10 +23,10 @@ const AVERAGE: f64 = 0.5;
 /// Range of the time scale: from 1:10 000 slow motion to real time.
 pub const SCALE_RANGE: (f64, f64) = (1e-4, 1.0);
 
-/// Below this share of the asked time scale the run does not keep up.
+/// Fraction of the requested time scale below which the run does not keep up.
 const KEPT_UP: f64 = 0.97;
 
-/// What keeps the run below the asked time scale.
+/// Bottleneck that keeps the run below the requested time scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// Stepping.
@@ -36,8 +35,8 @@ pub enum Limit {
     Drawing,
 }
 
-/// Stepping budget, s, of a frame `dt` s after the last, of which drawing takes `drawing` s: as long as drawing does, with the same
-/// left over as in a frame of 1/60 s.
+/// Stepping budget, s, of a frame `dt` s after the last, of which drawing takes `drawing` s: the drawing time, less the margin
+/// left in a frame of 1/60 s.
 fn budget(dt: f64, drawing: f64) -> f64 {
     let usual = (0.75 * dt).clamp(0.002, USUAL_BUDGET);
     (drawing - (1.0 / 60.0 - USUAL_BUDGET)).clamp(usual, LARGEST_BUDGET)
@@ -48,16 +47,16 @@ fn budget(dt: f64, drawing: f64) -> f64 {
 pub struct Pacer {
     scale: f64,
     shown: f64,
-    /// What was displayed at the end of the latest frame, s.
+    /// Time displayed at the end of the latest frame, s.
     base: f64,
-    /// Stepping until the next frame, and of it within the latest one, s.
+    /// Stepping budget until the next frame, and its part within the latest frame, s.
     budget: f64,
     within: f64,
-    /// Length of the latest frame, stepping since it began, and all else in the one before, s.
+    /// Length of the latest frame, stepping time since it began, and non-stepping time of the frame before, s.
     frame: f64,
     spent: f64,
     drawing: f64,
-    /// The spells since the latest frame could not keep up.
+    /// Whether stepping between frames has not kept up since the latest frame.
     behind: bool,
     advanced: f64,
     elapsed: f64,
@@ -117,7 +116,7 @@ impl Pacer {
         let dt = if dt.is_finite() { dt.max(0.0) } else { 0.0 };
         let frame = if dt < REST { dt } else { 0.0 };
         let drawing = (frame - self.spent).max(0.0);
-        // One slow frame is a hitch: it takes two to tell.
+        // A single slow frame is a hitch: only two in a row raise the budget.
         self.budget = budget(dt, drawing.min(self.drawing));
         self.within = if std::mem::take(&mut self.behind) { self.budget.min(SPELL) } else { self.budget };
         let passed = dt.min(LONGEST_FRAME.max(self.frame));
@@ -130,8 +129,8 @@ impl Pacer {
         (self.base + passed * self.scale).max(self.shown)
     }
 
-    /// Starts a spell of stepping between two frames, `since` seconds after the first of them began; returns the simulated time to
-    /// reach, `None` where that frame lasts longer than can be caught up with.
+    /// Starts a spell of stepping between two frames, `since` seconds after the first of them began. Returns the simulated time
+    /// to reach, or `None` if that frame is already too long to catch up with.
     pub fn begin_between(&self, since: f64) -> Option<f64> {
         (since < LONGEST_FRAME.max(self.frame)).then(|| self.target(since))
     }
@@ -141,12 +140,12 @@ impl Pacer {
         spent < SPELL && self.has_budget(spent)
     }
 
-    /// Whether so much more may be spent before the next frame, s.
+    /// Whether the budget allows `more` seconds of stepping before the next frame.
     fn has_budget(&self, more: f64) -> bool {
         self.spent + more < self.budget
     }
 
-    /// Ends the spell: as [`Self::end`]. Returns whether another one may follow, and whether the simulation is still behind.
+    /// Ends the spell, like [`Self::end`]. Returns whether another one may follow, and whether the simulation is still behind.
     pub fn end_between(&mut self, target: f64, reached: f64, spent: f64) -> (bool, bool) {
         self.spent += spent;
         self.shown = target.min(reached).max(self.shown);
@@ -154,7 +153,7 @@ impl Pacer {
         (self.has_budget(0.0), self.behind)
     }
 
-    /// What the frame before the latest [`Self::begin`] took beyond stepping, s.
+    /// Non-stepping time of the frame before the latest [`Self::begin`], s.
     pub fn drawing(&self) -> f64 {
         self.drawing
     }
@@ -169,7 +168,7 @@ impl Pacer {
     pub fn end(&mut self, dt: f64, target: f64, reached: f64, spent: f64) {
         self.spent = spent;
         let shown = target.min(reached).max(self.shown);
-        // So long a pause was no frame: it says nothing about the machine.
+        // A longer pause is not a frame and says nothing about the machine's speed.
         if dt.is_finite() && dt < REST {
             let keep = libm::exp(-dt / AVERAGE);
             self.advanced = self.advanced * keep + (shown - self.base);
@@ -178,14 +177,14 @@ impl Pacer {
         (self.shown, self.base) = (shown, shown);
     }
 
-    /// Simulated seconds per second achieved lately; `None` before anything was measured.
+    /// Simulated seconds per second achieved recently; `None` before the first measurement.
     pub fn reached_scale(&self) -> Option<f64> {
         (self.elapsed > 0.05).then(|| self.advanced / self.elapsed)
     }
 
-    /// What keeps the run below the asked scale on a machine that simulates `capacity` seconds per second of stepping; `None` while it
-    /// keeps up. Stepping takes it from the asked scale down to the capacity, drawing from there to the one reached: the greater
-    /// of these ratios is the limit.
+    /// Bottleneck on a machine that simulates `capacity` seconds per second of stepping; `None` while the run keeps up. Stepping
+    /// reduces the requested scale to the capacity, and drawing reduces that to the achieved scale; the larger ratio is the
+    /// bottleneck.
     pub fn limit(&self, capacity: Option<f64>) -> Option<Limit> {
         let reached = self.reached_scale()?;
         let slow = capacity.is_some_and(|capacity| capacity * capacity < self.scale * reached);
@@ -280,8 +279,8 @@ mod tests {
         assert_eq!(pacer.shown(), 0.2);
     }
 
-    /// Runs `frames` frames in real time, of which drawing takes `drawing` s, on a machine that simulates `speed` seconds per second
-    /// of stepping, in steps of `step` s; returns the longest frame, s.
+    /// Runs `frames` frames in real time, with `drawing` s of drawing each, on a machine that simulates `speed` seconds per
+    /// second of stepping, in steps of `step` s; returns the longest frame, s.
     fn drawn(pacer: &mut Pacer, frames: usize, drawing: f64, speed: f64, step: f64) -> f64 {
         let (mut time, mut dt, mut longest) = (pacer.shown(), 1.0 / 60.0, 0.0_f64);
         for _ in 0..frames {
@@ -299,7 +298,7 @@ mod tests {
 
     #[test]
     fn where_drawing_is_slow_stepping_gets_as_long() {
-        // Three frames a second with the usual budget, of a chain that could run at 0.4 of real time.
+        // A chain that could run at 0.4 of real time, at three frames per second with the usual budget.
         let (drawing, speed, step) = (1.0 / 3.0 - USUAL_BUDGET, 0.4, 1e-4);
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
@@ -310,7 +309,7 @@ mod tests {
         assert!((reached / speed - share).abs() < 0.01, "{reached}");
         assert!(reached > 10.0 * speed * USUAL_BUDGET * 3.0, "{reached}");
         assert_eq!(pacer.limit(Some(speed)), Some(Limit::Computing));
-        // At less than the bound the shares are equal, but for what a usual frame leaves over.
+        // Below the bound the shares are equal, except for the margin of a usual frame.
         let mut pacer = Pacer::default();
         pacer.set_scale(1.0);
         drawn(&mut pacer, 100, 0.1, speed, step);
@@ -325,7 +324,7 @@ mod tests {
         drawn(&mut pacer, 20, 0.6, 1000.0, 1e-4);
         let before = pacer.shown();
         drawn(&mut pacer, 11, 0.6, 1000.0, 1e-4);
-        // The first frame of the second call is a short one, and the next slow one again the first.
+        // The first frame of the second call is short, so the next slow frame again counts as the first.
         let passed = pacer.shown() - before;
         assert!((passed - (1.0 / 60.0 + 0.25 + 9.0 * 0.6)).abs() < 0.02, "{passed}");
     }
@@ -350,8 +349,8 @@ mod tests {
         }
     }
 
-    /// Frames of which drawing takes `drawing` s, on a machine that simulates `speed` seconds per second of stepping and steps between
-    /// frames, too, while another processor waits for the screen `idle` s; returns the longest spell of stepping, s.
+    /// Runs frames with `drawing` s of drawing on a machine that simulates `speed` seconds per second of stepping and also steps
+    /// between frames, while another processor waits `idle` s for the screen; returns the longest spell of stepping, s.
     fn stepped_between(pacer: &mut Pacer, frames: usize, drawing: f64, idle: f64, speed: f64) -> f64 {
         let (mut time, mut dt, mut longest) = (pacer.shown(), drawing + idle, 0.0_f64);
         let step = 1e-5;
@@ -387,16 +386,16 @@ mod tests {
 
     #[test]
     fn between_slow_frames_it_steps_in_short_spells_and_as_far_as_within_them() {
-        // Half a second a second are possible, but for what drawing takes.
+        // At speed 0.5 at most half a second per second is possible, less the time for drawing.
         for (speed, wanted) in [(0.5, 0.1), (0.5, 1.0), (10.0, 1.0)] {
             let mut pacer = Pacer::default();
             pacer.set_scale(wanted);
-            // The first frames do not know yet that there is more to do than they have time for.
+            // The first frames do not know yet that they cannot keep up.
             stepped_between(&mut pacer, 20, 0.03, 0.12, speed);
             let longest = stepped_between(&mut pacer, 100, 0.03, 0.12, speed);
             assert!(longest <= SPELL + 1e-5 / speed + 1e-12, "{speed} {wanted}: {longest}");
             let reached = pacer.reached_scale().expect("measured");
-            // Nearly as much time goes into stepping as into all else.
+            // Stepping takes nearly as much time as everything else.
             let least = wanted.min(0.45 * speed);
             assert!(reached > 0.98 * least && reached < 1.01 * wanted, "{speed} {wanted}: {reached}");
         }
@@ -414,7 +413,7 @@ mod tests {
         assert_eq!(limit(1.0, 0.004, 0.2), Some(Limit::Computing));
         assert_eq!(limit(1.0, 0.1, 0.9), Some(Limit::Drawing));
         assert_eq!(limit(1.0, 0.1, 1.5), Some(Limit::Drawing));
-        // What is not computed at all cannot be the limit.
+        // Without a known capacity, stepping cannot be the limit.
         let mut pacer = Pacer::default();
         run(&mut pacer, 10, 1.0 / 60.0, 1e-3, 1e-5);
         assert_eq!(pacer.limit(None), Some(Limit::Drawing));

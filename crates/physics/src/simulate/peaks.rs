@@ -14,7 +14,7 @@ pub(super) struct Approach {
 }
 
 impl Approach {
-    /// Exactly at the wall, and moving into it.
+    /// Whether the ball is exactly at the wall and moving into it.
     pub(super) fn arrives(&self) -> bool {
         self.penetration == 0.0 && self.rate > 0.0
     }
@@ -34,7 +34,7 @@ impl Recent {
         (t0 == start && t1 == end && f0 > 0.0).then_some((f0, f1))
     }
 
-    /// Adds the value at a new instant; returns the largest value since the previous one, by the parabola through three.
+    /// Adds the value at a new instant; returns the largest value since the previous one, from the parabola through three.
     pub(super) fn rise(&mut self, time: f64, value: f64) -> f64 {
         let [(t0, f0), (t1, f1)] = self.before;
         self.before = [(t1, f1), (time, value)];
@@ -81,7 +81,7 @@ impl PenetrationCubic {
         )
     }
 
-    /// Where the penetration passes zero, given that it changes sign over the step.
+    /// Step fraction at which the penetration passes zero, given that it changes sign over the step.
     pub(super) fn crossing(&self) -> f64 {
         let (mut low, mut high) = (0.0, 1.0);
         let end_sign = self.end.penetration > 0.0;

@@ -1,4 +1,4 @@
-//! From the latest evaluation of the equations to a [`Frame`].
+//! Fills a [`Frame`] from the latest evaluation of the equations.
 
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactState, Frame, JointReport};

@@ -1,4 +1,4 @@
-//! A scene in motion: stepping, events, live changes, snapshots. Depends on no clock.
+//! A running simulation: stepping, events, live changes, snapshots. Reads no clock.
 
 mod adaptive;
 mod automatic;
@@ -37,43 +37,43 @@ use corners::LawBranch;
 use flights::{clear_flights, put_flights};
 use ideal::{IdealTip, ProbeFault};
 
-/// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
-/// gives a force of the order of the static ones.
+/// Rate at which a clearance shrinks when a jump would place the ball inside its socket wall, m/s: an impact at this speed gives
+/// a force of the order of the static ones.
 pub const CLEARANCE_SPEED: f64 = 2e-3;
 /// Longest step of an adaptive method, s.
 const LONGEST_STEP: f64 = 10e-3;
 /// Shortest step of an adaptive method, s.
 const SHORTEST_STEP: f64 = 1e-14;
-/// A step that ends this much of its length before a limit ends at the limit.
+/// A step that would end within this fraction of its length of a limit ends at the limit.
 const NEARLY: f64 = 1e-6;
-/// An ideal motion farther than this from its closed form has changed to another branch of it, m.
+/// Distance of an ideal motion from its closed form, m, beyond which it has switched to another branch.
 const OTHER_BRANCH: f64 = 1e-6;
-/// How closely a kinematic scene approaches a pose that it cannot pass, s.
+/// Shortest retry of a kinematic step, s: how closely it approaches a pose that it cannot pass.
 const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
 /// First step after a contact begins, before a workable one is known, s: a tenth of a typical impact.
 const FIRST_CONTACT_STEP: f64 = 1e-5;
 /// Loops still open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
 
-/// Shortest adaptive step at time `t`, s, that still advances it.
+/// Shortest adaptive step, s, that still advances the time `t`.
 fn shortest_step(t: f64) -> f64 {
     SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
 }
 
-/// A scene in motion.
+/// A running simulation of one machine.
 ///
-/// The same scene and the same calls give the same bits.
+/// The same machine and the same calls give the same bits.
 pub struct Simulation {
-    /// With the changes so far.
+    /// Includes the live changes so far.
     machine: Arc<Machine>,
     mechanism: Mechanism,
     stepper: AnyStepper,
     state: State,
-    /// What the probe is compared with.
+    /// Ideal tip with which the probe is compared.
     reference: IdealTip,
-    /// Largest force seen by a sample, and when, by joint: not part of the state, which sampling must not change.
+    /// Largest sampled force, N, and its time, s, by joint: not part of the state, which sampling must not change.
     sampled: Vec<(f64, f64)>,
-    /// Peaks of loads, if kept: not part of the state for the same reason.
+    /// Load peaks, if tracked: not part of the state for the same reason.
     loads: Option<LoadPeaks>,
     attempt: Attempt,
     scratch_y: Vec<f64>,
@@ -81,7 +81,7 @@ pub struct Simulation {
     scratch_memory: Vec<Memory>,
 }
 
-/// The end of a step, and the data that belong to it.
+/// Time, state, derivative, gaps and contact memory at the end of a step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct StepEnd {
     t: f64,
@@ -90,7 +90,7 @@ pub(super) struct StepEnd {
     /// Their derivative.
     k: Vec<f64>,
     gaps: Vec<Approach>,
-    /// Contact memory in force over the step that begins here.
+    /// Contact memory for the step that begins here.
     memory: Vec<Memory>,
 }
 
@@ -105,7 +105,7 @@ impl StepEnd {
         }
     }
 
-    /// Copies another of the same scene without allocating.
+    /// Copies `other`, of the same scene, without allocating.
     fn copy_from(&mut self, other: &Self) {
         self.t = other.t;
         self.y.copy_from_slice(&other.y);
@@ -120,22 +120,23 @@ struct Attempt {
     end: StepEnd,
     /// Joint whose contact starts or ends at the step's end.
     located: Option<usize>,
-    /// Joint that moves to another piece of a law there.
+    /// Joint that switches to another branch of a law there, and that branch.
     corner: Option<(usize, LawBranch)>,
-    /// If steps end at edges of elements, how the elements are pressed over it, as by [`Mechanism::pressed`].
+    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::pressed`]; empty if steps do
+    /// not end at edges of elements.
     sides: Vec<f64>,
-    /// It ends at an edge.
+    /// Whether it ends at an edge.
     edge: bool,
-    /// How they are pressed at both ends of a part of it.
+    /// Contact indicators at both ends of a part of the step.
     pressed: [Vec<f64>; 2],
-    /// Restarted on another piece.
+    /// Whether it was restarted on another branch.
     turned: bool,
-    /// The step that it was before an event cut it, if one did; and that which the next one is to be, beside another run.
+    /// The full step, if an event truncated it, and the full step that the next one must reproduce to follow another run.
     whole: Option<Whole>,
     beside: Option<Whole>,
-    /// It may hold the largest force of a contact.
+    /// Whether it may contain the largest force of a contact.
     near_peak: bool,
-    /// Largest normal force of each joint that was in contact over it, N, and at which fraction of it.
+    /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
     strongest: Vec<(f64, f64)>,
     /// Step size times the largest eigenvalue seen; 0 if unknown.
     stiffness: f64,
@@ -144,24 +145,24 @@ struct Attempt {
     factorisations: u32,
 }
 
-/// What a snapshot copies.
+/// Data copied by a snapshot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
-    /// The physical state, and the start of the latest step, between which samples lie.
+    /// Current physical state, and the start of the latest step; samples lie between them.
     now: StepEnd,
     before: StepEnd,
-    /// Clearance ramps under way, and clearances in force.
+    /// Active clearance ramps, and current clearances, m.
     ramps: Vec<Option<Ramp>>,
     clearances: Vec<f64>,
     /// The hand's pull, if any.
     pull: Option<Pull>,
-    /// Of the bodies that the latest step left out, by the mechanism's flyers.
+    /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
     flights: Vec<Option<Flight>>,
     control: Control,
     record: Record,
 }
 
-/// How the next step is chosen: not part of the physical state.
+/// Step control: not part of the physical state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Control {
     /// Next step of an adaptive method.
@@ -170,12 +171,12 @@ struct Control {
     h_contact: f64,
     /// A contact began at the latest event.
     contact_began: bool,
-    /// How densely corners of the friction law follow one another, and whether too densely to locate them.
+    /// Measure of how often corners of the friction law occur, and whether that is too often to locate them.
     chatter: u32,
     chatters: bool,
-    /// Which member of the automatic choice steps.
+    /// Active scheme of the automatic method.
     member: ActiveScheme,
-    /// What the automatic choice goes by.
+    /// Data for the automatic choice of scheme.
     choice: SchemeSelector,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
@@ -183,7 +184,7 @@ struct Control {
     grid_count: u64,
 }
 
-/// What is known of the run so far.
+/// Diagnostics of the run so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Record {
     account: Account,
@@ -192,14 +193,14 @@ struct Record {
     statistics: Statistics,
     /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
     reactions: Vec<Recent>,
-    /// Steps since the contact under way began.
+    /// Steps since the current contact began, by joint.
     contact_steps: Vec<u64>,
-    /// Of each ball joint since they were last taken.
+    /// Peaks of each ball joint since they were last taken.
     peaks: Vec<Peak>,
-    /// The stop that was pressed deepest at the start, compared with its own depth, if any was deeper: its index, how deep (m or
-    /// rad) and its force (N or N m).
+    /// The stop that starts deepest relative to its nominal depth, if any exceeds that: index, [depth, nominal depth] (m or rad),
+    /// force (N or N m).
     starts_inside: Option<(usize, [f64; 2], f64)>,
-    /// On which side of singular poses a kinematic scene started.
+    /// Side of singular poses on which a kinematic scene started.
     determinant_positive: bool,
 }
 
@@ -221,7 +222,7 @@ impl Control {
 }
 
 impl State {
-    /// At t = 0 with the coordinates and velocities `y`.
+    /// The state at t = 0 with coordinates and velocities `y`.
     fn new(machine: &Machine, mechanism: &Mechanism, y: Vec<f64>) -> Self {
         let joints = mechanism.contacts.len();
         let now = StepEnd::new(y, joints);
@@ -259,7 +260,7 @@ impl Simulation {
     /// Starts `machine` at t = 0.
     ///
     /// # Errors
-    /// Ball joints that do not close, a trajectory that the rods cannot reach.
+    /// If ball joints do not close, or the rods cannot follow the prescribed trajectory.
     pub fn new(machine: &Machine) -> Result<Self, StartError> {
         let mut mechanism = Mechanism::new(machine)?;
         let y = mechanism.start()?;
@@ -282,7 +283,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// As [`Record::starts_inside`], of the latest evaluation.
+    /// Computes [`Record::starts_inside`] from the latest evaluation.
     fn deepest_in_stop(&self) -> Option<(usize, [f64; 2], f64)> {
         let reports = self.mechanism.element_reports(self.state.now.t).enumerate();
         let inside = reports.filter_map(|(i, report)| {
@@ -292,7 +293,7 @@ impl Simulation {
         inside.max_by(|a, b| (a.1[0] / a.1[1]).total_cmp(&(b.1[0] / b.1[1])))
     }
 
-    /// Takes `state` as it is.
+    /// Assembles a simulation from its parts, with `state` unchanged.
     fn assembled(machine: &Arc<Machine>, mechanism: Mechanism, state: State, reference: IdealTip) -> Self {
         let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
@@ -330,7 +331,7 @@ impl Simulation {
         self.machine.solver.method.is_adaptive()
     }
 
-    /// Recomputes derivative and gaps after anything but a step changed the state; discards the previous step.
+    /// Recomputes derivative and gaps after a change of state other than a step; discards the previous step.
     fn refresh(&mut self) {
         self.end_flights();
         self.freeze_branches(true);
@@ -374,15 +375,15 @@ impl Simulation {
         &self.state.record.statistics
     }
 
-    /// One accepted step.
+    /// Takes one accepted step.
     ///
     /// # Errors
-    /// The divergence guard; the state is then the last good one.
+    /// If the divergence guard stops the run; the state is then the last good one.
     pub fn step(&mut self) -> Result<(), Stopped> {
         self.advance(f64::INFINITY)
     }
 
-    /// One step that ends no later than `end`, and exactly there if it would overshoot.
+    /// Takes one step that ends no later than `end`, and exactly there if it would overshoot.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -405,10 +406,10 @@ impl Simulation {
     }
 
     fn advance(&mut self, end: f64) -> Result<(), Stopped> {
-        // Not at the end of the previous step: samples inside it still see the clearance moving.
+        // Done here and not at the end of the previous step, because samples inside that step must still see the clearance move.
         self.finish_ramps();
         let limit = end.min(self.ramp_end());
-        // A fixed step is the user's choice.
+        // Fixed steps ignore this limit: their size is the user's choice.
         let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
         self.attempt.sides.clear();
         self.attempt.edge = false;
@@ -426,7 +427,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether the next step is another one if it must end by `end`.
+    /// Whether `end` would truncate the next step.
     pub fn is_cut_by(&self, end: f64) -> bool {
         let (t, control) = (self.state.now.t, &self.state.control);
         let (t_end, h) = if self.mechanism.is_kinematic() {
@@ -483,7 +484,7 @@ impl Simulation {
         error
     }
 
-    /// Derivative and gaps at the end `t_end` of the step being taken.
+    /// Evaluates derivative and gaps at the end `t_end` of the current step.
     fn evaluate_end(&mut self, t_end: f64) {
         let located = self.locates();
         let Self { mechanism, state, attempt, .. } = self;
@@ -494,7 +495,7 @@ impl Simulation {
         self.finish_gaps(t_end);
     }
 
-    /// What flies, and gaps, at the end `t_end` of the step being taken, after an evaluation there.
+    /// Computes bodies in flight, and gaps, at the end `t_end` of the current step, after an evaluation there.
     fn finish_gaps(&mut self, t_end: f64) {
         let touching = ActiveSet::by(self.locates(), &self.state.now.memory);
         let end = &mut self.attempt.end;
@@ -504,8 +505,8 @@ impl Simulation {
         store_gaps(&self.mechanism, &mut end.gaps);
     }
 
-    /// A step of a kinematic scene: predict, close the loops, compute the reactions. If that fails it retries with shorter
-    /// steps, so that the last good state is close to the failure.
+    /// Takes a step of a kinematic scene: predict, close the loops, compute the reactions. A failed step is retried with shorter
+    /// ones, so that the last good state is close to the failure.
     fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
         let t = self.state.now.t;
         let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
@@ -529,8 +530,8 @@ impl Simulation {
         let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
         let mean_rates = self.stepper.has_mean_rates();
         if mean_rates {
-            // Forces at its end belong to a contact that may be over long before the next step ends: the step's mean tells
-            // more.
+            // Forces at the end of the step belong to a contact that may end long before the next step does: the mean over the
+            // step is more informative.
             let (mechanism, now) = (&mut self.mechanism, &self.state.now);
             let StepEnd { y, k, .. } = &mut self.attempt.end;
             mechanism.measure(t_end, y);
@@ -543,7 +544,7 @@ impl Simulation {
             self.evaluate_end(t_end);
         }
         self.state.record.statistics.count(self.attempt.counts);
-        // Beyond the pose the loops may close again on another branch.
+        // Past a singular pose the loops may close again on another branch.
         let passed = self.mechanism.is_determinant_positive() != self.state.record.determinant_positive
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
         let fault = if passed { Some(StopFault::SingularLoops) } else { self.divergence(open, h) };
@@ -580,8 +581,8 @@ impl Simulation {
         }
         self.record_step(h, switched.contacts || switched.forces);
         self.pass_corner();
-        // The force now depends on the approach speed just found. Where no step needs the derivative at its end, the
-        // reactions of ideal joints still do.
+        // The force now depends on the approach speed just found. Reactions of ideal joints need the derivative at the end even
+        // if the method does not.
         if again {
             let Self { mechanism, state, scratch_k, .. } = self;
             let StepEnd { t, y, k, memory, .. } = &mut state.now;
@@ -604,13 +605,12 @@ impl Simulation {
         Stopped { time: self.state.now.t, fault, advice: if dependent { StopAdvice::Dependent } else { advice } }
     }
 
-    /// Why there is no ideal motion, or no longer one, to compare the probe with: the ideal mechanism does not start, or
-    /// could not continue.
+    /// Why the probe has no ideal motion to be compared with: the ideal mechanism cannot start, or could not continue.
     pub fn probe_fault(&self) -> Option<ProbeFault> {
         self.reference.fault()
     }
 
-    /// Forces at the latest state that the motion does not determine.
+    /// Forces at the latest state that the motion does not determine uniquely.
     pub fn not_unique(&mut self) -> Indeterminate {
         self.sample(self.state.now.t, &mut Frame::default());
         let mechanism = &mut self.mechanism;
@@ -620,7 +620,7 @@ impl Simulation {
         }
     }
 
-    /// Writes the peaks per ball joint since the last call to `out`, in joint order, and clears them here.
+    /// Moves the peaks of each ball joint since the last call into `out`, in joint order.
     pub fn take_peaks(&mut self, out: &mut Vec<Peak>) {
         out.clear();
         let peaks = &mut self.state.record.peaks;

@@ -15,7 +15,7 @@ pub(super) enum AnyStepper {
     DormandPrince(DormandPrince),
     Rosenbrock(Box<Rosenbrock>),
     Radau(Box<Radau>),
-    /// One of them at a time.
+    /// One scheme at a time.
     Automatic {
         explicit: DormandPrince,
         friction: Box<Rosenbrock>,
@@ -24,13 +24,13 @@ pub(super) enum AnyStepper {
     },
 }
 
-/// Which method steps where the choice is automatic.
+/// Active scheme of the automatic method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum ActiveScheme {
     /// Dormand-Prince.
     #[default]
     Explicit,
-    /// ROS34PW2 with friction alone in its Jacobian.
+    /// ROS34PW2 with only friction in its Jacobian.
     Friction,
     /// Radau IIA.
     Implicit,
@@ -54,14 +54,14 @@ impl AnyStepper {
         }
     }
 
-    /// Puts a member of the automatic choice in charge.
+    /// Activates a scheme of the automatic method.
     pub(super) fn choose(&mut self, chosen: ActiveScheme) {
         if let Self::Automatic { member, .. } = self {
             *member = chosen;
         }
     }
 
-    /// Discards what was computed at a state that is no longer current.
+    /// Discards data computed at a state that is no longer current.
     pub(super) fn invalidate(&mut self) {
         match self {
             Self::Rosenbrock(stiff) => stiff.invalidate(),
@@ -82,14 +82,14 @@ impl AnyStepper {
         }
     }
 
-    /// Restores it.
+    /// Restores the implicit method's polynomial.
     pub(super) fn set_polynomial(&mut self, polynomial: &Polynomial) {
         if let Self::Radau(stiff) | Self::Automatic { stiff, .. } = self {
             stiff.set_polynomial(polynomial);
         }
     }
 
-    /// Largest factor for the step after the latest attempt, besides what its error allows.
+    /// Upper bound on the step-size factor after the latest attempt, in addition to the limit set by its error.
     pub(super) fn growth(&self) -> f64 {
         match self {
             Self::Radau(s) | Self::Automatic { stiff: s, member: ActiveScheme::Implicit, .. } => s.growth(),
@@ -97,7 +97,7 @@ impl AnyStepper {
         }
     }
 
-    /// How often the latest attempt factored the matrices of all coordinates, if it did so to step with the automatic choice.
+    /// Factorisations of the full matrices in the latest attempt by the automatic method's implicit scheme; otherwise 0.
     pub(super) fn factorisations(&self) -> u32 {
         match self {
             Self::Automatic { stiff, member: ActiveScheme::Implicit, .. } => stiff.factorisations(),
@@ -150,7 +150,7 @@ impl AnyStepper {
         }
     }
 
-    /// Those nodes with the ends used with them, in units of the step.
+    /// Those nodes and the ends used with them, in units of the step.
     pub(super) fn quadrature(&self) -> &'static [f64] {
         const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
         match self {
@@ -185,7 +185,7 @@ impl AnyStepper {
         matches!(self, Self::ImexEuler(_))
     }
 
-    /// State at fraction `theta` of the latest attempt: the components `part` of it, into those of `out`.
+    /// Interpolates the components `part` of the state at fraction `theta` of the latest attempt into those of `out`.
     pub(super) fn interpolate(
         &self,
         part: Range<usize>,

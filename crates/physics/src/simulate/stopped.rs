@@ -16,7 +16,7 @@ pub struct Stopped {
     pub advice: StopAdvice,
 }
 
-/// What no accepted step may show.
+/// Faults that stop a simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum StopFault {
     /// An ideal motion at a pose beyond which its loops could close on another branch.
@@ -28,7 +28,7 @@ pub enum StopFault {
         /// m.
         open: f64,
     },
-    /// Stabilised constraints that no longer hold anything together.
+    /// Stabilised constraints that have drifted too far to hold the mechanism together.
     #[error("the constraints of the lagrange form are off by {drift:.1e} m")]
     Drift {
         /// m, or rad.
@@ -47,7 +47,7 @@ pub enum StopFault {
         /// m.
         penetration: f64,
     },
-    /// A fixed step that stored more energy in a contact than can have arrived there.
+    /// A fixed step that stored more energy in a contact than the ball can have brought.
     #[error(
         "ball joint {joint}: one step put the ball {penetration:.3e} m inside its socket wall, with {times:.1} times the energy \
          that it can have arrived with"
@@ -76,12 +76,12 @@ pub enum StopFault {
     /// A step size as small as rounding.
     #[error("the step size that the tolerance asks for fell below {shortest:.0e} s")]
     ShortStep {
-        /// The shortest that is tried at this time, s.
+        /// Shortest step tried at this time, s.
         shortest: f64,
     },
 }
 
-/// What to try where a simulation stopped.
+/// What to try after a simulation has stopped.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum StopAdvice {
     /// Closed loops cannot stay closed here.
@@ -90,19 +90,19 @@ pub enum StopAdvice {
     /// Adaptive steps are already as short as needed: the motion itself is beyond the model.
     #[error("try slower drives, a stiffer contact, or a tighter solver.tolerance (now {tolerance:e})")]
     GentlerMotion {
-        /// In force.
+        /// Current value.
         tolerance: f64,
     },
     /// The fixed step is too long.
     #[error("try a smaller solver.step (now {step:e} s) or solver.method = automatic, or else a stiffer contact")]
     ShorterStep {
-        /// In force, s.
+        /// Current value, s.
         step: f64,
     },
     /// A tolerance that cannot be met in this scene.
     #[error("try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene")]
     LooserTolerance {
-        /// In force.
+        /// Current value.
         tolerance: f64,
     },
 }

@@ -36,7 +36,7 @@ impl Grid {
         Self::new(CELLS)
     }
 
-    /// With `cells` cells, at least two.
+    /// Divides the sphere into `cells` cells, at least two.
     fn new(cells: usize) -> Self {
         let n = cells as f64;
         // Polar angle that encloses a given share of the sphere.
@@ -102,7 +102,7 @@ impl Grid {
     }
 }
 
-/// What happened to a cell of a socket's inner face.
+/// Accumulated loads on a cell of a socket's inner face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Contacts that began there.
@@ -127,7 +127,7 @@ struct Socket {
     grid_from_body: Mat3,
     /// Radius r + c of the inner face, m.
     radius: f64,
-    /// Empty for an ideal joint. Copies of the map share what has not changed since.
+    /// Empty for an ideal joint. Copies of the map share cells that have not changed since.
     #[serde(with = "shared")]
     cells: Arc<[Cell]>,
 }
@@ -145,15 +145,15 @@ struct Press {
     friction_power: f64,
 }
 
-/// What the contacts of a run did to the inner faces of its sockets, in cells of equal area.
+/// Wear map of a run: contact loads on the inner faces of its sockets, in cells of equal area.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wear {
     #[serde(skip, default = "grid_of_sockets")]
     grid: Arc<Grid>,
     sockets: Vec<Socket>,
-    /// Of the step being booked; afterwards those at its end, which may begin the next.
+    /// Contacts at the nodes of the step being recorded; afterwards those at its end, reusable for the next step.
     presses: Vec<Press>,
-    /// What the latest step did, by joint and cell: not yet added to the cells.
+    /// Contributions of the latest step, by joint and cell, not yet added to the cells.
     latest: Vec<(usize, usize, Cell)>,
 }
 
@@ -161,7 +161,7 @@ fn grid_of_sockets() -> Arc<Grid> {
     Arc::new(Grid::of_sockets())
 }
 
-/// Cells in files: without the sharing.
+/// Serialises cells without their sharing.
 mod shared {
     use std::sync::Arc;
 
@@ -178,7 +178,7 @@ mod shared {
     }
 }
 
-/// Most entries of a joint in one step: its nodes, and a contact that begins.
+/// Largest number of entries per joint in one step: its nodes and one contact start.
 const MOST_ENTRIES: usize = 4;
 
 impl Wear {
@@ -188,7 +188,7 @@ impl Wear {
         cells * size_of::<Cell>() + size_of_val(self.presses.as_slice())
     }
 
-    /// An empty one.
+    /// An empty map.
     pub(super) fn new(machine: &Machine) -> Self {
         let grid = grid_of_sockets();
         let socket = |joint: &BallJoint| {
@@ -206,7 +206,7 @@ impl Wear {
         Self { presses: Vec::with_capacity(most), latest: Vec::with_capacity(most), sockets, grid }
     }
 
-    /// Whether it is one of `scene`: nothing in it points elsewhere.
+    /// Whether it fits `machine`: all its indices are valid.
     pub(super) fn fits(&self, machine: &Machine) -> bool {
         let own = Self::new(machine);
         let cells = |wear: &Self| wear.sockets.iter().map(|s| s.cells.len()).collect::<Vec<_>>();
@@ -224,8 +224,8 @@ impl Wear {
         &self.grid
     }
 
-    /// What happened to the cells of ball joint `joint`, without the latest step until
-    /// [`Simulation::commit_wear`](super::Simulation::commit_wear); empty for an ideal joint.
+    /// Cells of ball joint `joint`, without the latest step until [`Simulation::commit_wear`](super::Simulation::commit_wear);
+    /// empty for an ideal joint.
     pub fn cells(&self, joint: usize) -> &[Cell] {
         &self.sockets[joint].cells
     }
@@ -242,7 +242,7 @@ impl Wear {
         &self.sockets[joint].grid_from_body
     }
 
-    /// Adds what the latest step did to the cells.
+    /// Adds the contributions of the latest step to the cells.
     pub(super) fn pass(&mut self) {
         for (joint, cell, share) in self.latest.drain(..) {
             let cells = Arc::make_mut(&mut self.sockets[joint].cells);
@@ -250,8 +250,7 @@ impl Wear {
         }
     }
 
-    /// Before booking a step; if its forces continue those at the end of the previous one, these are reused for its first
-    /// node.
+    /// Prepares to record a step. If `goes_on`, the forces at the end of the previous step are reused for its first node.
     pub(super) fn begin_step(&mut self, goes_on: bool) {
         self.pass();
         if !goes_on {
@@ -259,7 +258,7 @@ impl Wear {
         }
     }
 
-    /// Takes the forces of the latest evaluation of `mechanism` as those at node `instant` of the step.
+    /// Records the forces of the latest evaluation of `mechanism` at node `instant` of the step.
     pub(super) fn read(&mut self, instant: usize, mechanism: &Mechanism) {
         for joint in 0..self.sockets.len() {
             if let Some(touch) = mechanism.touch(joint) {
@@ -275,13 +274,13 @@ impl Wear {
         }
     }
 
-    /// A contact of `joint` begins in direction `direction`, in the axes of the socket's body.
+    /// Records that a contact of `joint` begins in `direction`, in the axes of the socket's body.
     pub(super) fn begin_contact(&mut self, joint: usize, direction: &Vec3) {
         let share = Cell { contacts: 1, ..Cell::default() };
         self.latest.push((joint, self.cell(joint, direction), share));
     }
 
-    /// Books a step of size `h` with the quadrature weights `weights`.
+    /// Integrates the recorded forces over a step of size `h` with the quadrature weights `weights`.
     pub(super) fn book(&mut self, h: f64, weights: &[f64]) {
         for press in &self.presses {
             let weight = h * weights[press.instant];
@@ -332,7 +331,7 @@ mod tests {
                 let area = (azimuth[1] - azimuth[0]) * (libm::cos(polar[0]) - libm::cos(polar[1]));
                 assert!((area * n as f64 / (4.0 * PI) - 1.0).abs() < 1e-11, "{n}: {cell}");
                 whole += area;
-                // Its middle is in it, and in no other.
+                // The centre of a cell maps back to that cell.
                 let middle = |[a, b]: [f64; 2]| 0.5 * (a + b);
                 let centre = towards(middle(polar), middle(azimuth));
                 assert_eq!(grid.cell(&centre), cell, "{n}");

@@ -1,28 +1,28 @@
-//! Meshes in the making: triangles with common corners.
+//! Mesh builder: triangles with shared vertices.
 
 use std::collections::BTreeMap;
 
 use super::{Mesh, MeshFault};
 
-/// Most triangles of a file.
+/// Maximum number of triangles in a file.
 pub const MOST_TRIANGLES: usize = 200_000;
-/// Most corners that a file lists.
+/// Maximum number of vertices in a file.
 const MOST_CORNERS: usize = 1_000_000;
-/// Largest coordinate, in the unit of the file.
+/// Largest absolute coordinate, in file units.
 const LARGEST: f64 = 1e9;
 
-/// A mesh in the making.
+/// Collects vertices and triangles, and merges vertices at the same position.
 #[derive(Default)]
 pub(super) struct Builder {
     places: BTreeMap<[u32; 3], u32>,
     vertices: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
-    /// Corners and triangles that were asked for: those that are left out take their time, too.
+    /// Numbers of vertices and triangles submitted: merged and degenerate ones also cost time.
     asked: [usize; 2],
 }
 
 impl Builder {
-    /// Index of the corner at a place.
+    /// Index of the vertex at `place`, which is added if new.
     pub fn vertex(&mut self, place: [f64; 3]) -> Result<u32, MeshFault> {
         self.asked[0] += 1;
         if self.asked[0] > MOST_CORNERS {
@@ -32,7 +32,7 @@ impl Builder {
         if !place.iter().all(|x| x.abs() <= LARGEST) {
             return Err(MeshFault::OutOfRange { most: LARGEST });
         }
-        // 0 and -0 are one place.
+        // Adding 0 turns -0 into 0, so that both share a vertex.
         let place = place.map(|x| x as f32 + 0.0);
         let next = self.vertices.len() as u32;
         let index = *self.places.entry(place.map(f32::to_bits)).or_insert(next);
@@ -42,7 +42,7 @@ impl Builder {
         Ok(index)
     }
 
-    /// Adds a triangle, unless two of its corners are one.
+    /// Adds a triangle; one with a repeated vertex is dropped.
     pub fn triangle(&mut self, [a, b, c]: [u32; 3]) -> Result<(), MeshFault> {
         self.asked[1] += 1;
         if self.asked[1] > MOST_TRIANGLES {
@@ -55,7 +55,7 @@ impl Builder {
         Ok(())
     }
 
-    /// The mesh, its outside outside.
+    /// The finished mesh, oriented outwards.
     pub fn finish(self) -> Result<Mesh, MeshFault> {
         if self.triangles.is_empty() {
             return Err(MeshFault::NoTriangles);

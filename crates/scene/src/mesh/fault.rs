@@ -1,16 +1,16 @@
-//! What can be wrong with a file, in numbers; the wording is formed on display.
+//! Mesh file errors as data; `Display` forms the text.
 
 use std::error::Error;
 
-/// Why another file that a file names cannot be had, from whoever looks for it.
+/// Error from the caller's lookup of a referenced file.
 pub(super) type NoFile = Box<dyn Error + Send + Sync>;
 
-/// What is wrong with a file.
+/// An error in a mesh file.
 #[derive(Debug)]
 pub struct Fault {
-    /// Offset in the file, bytes, where it is known.
+    /// Byte offset in the file, if known.
     pub at: Option<usize>,
-    /// What is wrong there.
+    /// Cause.
     pub why: MeshFault,
 }
 
@@ -25,98 +25,98 @@ impl Fault {
     }
 }
 
-/// Why a file gives no mesh.
+/// Why a mesh file is rejected.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshFault {
-    /// The file ends early.
+    /// Unexpected end of file.
     #[error("the file ends within {0}")]
     EndsWithin(&'static str),
-    /// Something else than the format has in this place.
+    /// Unexpected content.
     #[error("expected {0}")]
     Expected(&'static str),
-    /// Not text.
+    /// Invalid UTF-8.
     #[error("this byte is no text in UTF-8")]
     NotText,
-    /// A word that should be a coordinate.
+    /// A coordinate that is not a number.
     #[error("is not a number")]
     NotNumber,
-    /// A vertex with fewer or more.
+    /// A vertex without exactly three coordinates.
     #[error("needs three coordinates")]
     Coordinates,
-    /// No triangle at all.
+    /// No triangles.
     #[error("holds no triangles")]
     NoTriangles,
-    /// More than this program reads.
+    /// More items than this program reads.
     #[error("has too many {what}; allowed at most {most}")]
     TooMany {
-        /// Of what.
+        /// Kind of item.
         what: &'static str,
-        /// Largest number.
+        /// Maximum number.
         most: usize,
     },
-    /// A vertex that is too far off, or nowhere.
+    /// A coordinate out of range or NaN.
     #[error("a coordinate is out of range; allowed -{most:e} to {most:e} in the unit of the file")]
     OutOfRange {
-        /// Largest coordinate, in the unit of the file.
+        /// Largest absolute coordinate, in file units.
         most: f64,
     },
-    /// OBJ: a face that names a vertex which is not there.
+    /// OBJ: a face with an invalid vertex index.
     #[error(
         "is none of the {known} vertices before this line; allowed 1 to {known}, or -{known} to -1 counted from the latest"
     )]
     NoVertex {
-        /// Number of vertices.
+        /// Number of vertices so far.
         known: usize,
     },
-    /// OBJ: a face with two vertices or less.
+    /// OBJ: a face with fewer than three vertices.
     #[error("a face needs at least 3 vertices")]
     Face,
-    /// STL: a loop that is no triangle.
+    /// STL: a loop without exactly three vertices.
     #[error("a loop needs three vertices")]
     Loop,
-    /// STL: no bytes.
+    /// STL: an empty file.
     #[error("the file is empty")]
     Empty,
-    /// STL: of neither kind.
+    /// STL: neither binary nor text.
     #[error("neither a binary STL file nor one in text, which begins with `solid`")]
     NotStl,
-    /// STL: a length that does not fit the number of triangles.
+    /// STL: a file size that contradicts the triangle count.
     #[error("a binary STL file with {triangles} triangles, as it says here, has {wanted} bytes, this file has {bytes}")]
     Length {
-        /// As the file says.
+        /// Triangle count in the file.
         triangles: usize,
-        /// Length with so many of them, bytes.
+        /// File size for this count, bytes.
         wanted: usize,
-        /// Length of the file, bytes.
+        /// Actual file size, bytes.
         bytes: usize,
     },
-    /// glTF: not JSON.
+    /// glTF: invalid JSON.
     #[error("no glTF file: {0}")]
     NotJson(serde_json::Error),
-    /// glTF: another version of the binary container.
+    /// glTF: an unsupported version of the binary container.
     #[error("version {0} of glTF; allowed 2")]
     Container(usize),
-    /// glTF: a chunk longer than what is left of the file.
+    /// glTF: a chunk that ends beyond the file.
     #[error("{0} ends beyond the file")]
     LongChunk(&'static str),
-    /// glTF: another version.
+    /// glTF: an unsupported version.
     #[error("asset.version is `{0}`; allowed 2.0 and above")]
     Version(String),
-    /// glTF: cannot be read without this extension, as JSON.
+    /// glTF: an unsupported required extension, as JSON.
     #[error("extensionsRequired: this program does not know {0}; export the mesh without it")]
     Extension(String),
-    /// glTF: this buffer lies nowhere.
+    /// glTF: this buffer has no data.
     #[error("buffers[{0}].uri: missing")]
     NoUri(usize),
-    /// glTF: this buffer lies within the file, in another way than as base64.
+    /// glTF: this buffer has a data URI that is not base64.
     #[error("buffers[{0}].uri: holds no base64 data")]
     NotBase64(usize),
-    /// glTF: a buffer lies in another file.
+    /// glTF: an external buffer that cannot be read.
     #[error("buffers[{buffer}].uri: {why}")]
     Other {
-        /// Its index.
+        /// Index of the buffer.
         buffer: usize,
-        /// Why the other file cannot be had.
+        /// Error from the lookup of the other file.
         why: Box<dyn Error + Send + Sync>,
     },
     /// glTF: an index beyond the end of a list.
@@ -127,73 +127,73 @@ pub enum MeshFault {
         /// The index.
         at: usize,
     },
-    /// glTF: an index that is none.
+    /// glTF: an index that is not a whole number.
     #[error("{key} is {json}, must be a whole number")]
     NotIndex {
-        /// What should be an index.
+        /// Key of the index.
         key: &'static str,
-        /// What is there.
+        /// Its value, as JSON.
         json: String,
     },
-    /// glTF: a number of bytes or elements that is none.
+    /// glTF: a byte or element count that is not a whole number.
     #[error("{list}[{at}] {key} is {json}, must be a whole number")]
     NotSize {
         /// Name of the list.
         list: &'static str,
-        /// Index in it.
+        /// Index in the list.
         at: usize,
-        /// What should be such a number.
+        /// Key of the count.
         key: &'static str,
-        /// What is there.
+        /// Its value, as JSON.
         json: String,
     },
-    /// glTF: does not fit in what it is a part of.
+    /// glTF: an item that ends beyond its container.
     #[error("{list}[{at}] ends beyond its {whole}")]
     Beyond {
         /// Name of the list.
         list: &'static str,
-        /// Index in it.
+        /// Index in the list.
         at: usize,
-        /// What it is a part of.
+        /// The container.
         whole: &'static str,
     },
-    /// glTF: this node hangs on two others, or on itself.
+    /// glTF: this node has two parents or is its own ancestor.
     #[error("nodes[{0}] is there twice in the scene")]
     Twice(usize),
-    /// glTF: a node is not placed by as many numbers as it takes.
+    /// glTF: a node transform with the wrong number of values.
     #[error("nodes[{node}].{key} must be {count} numbers")]
     NotNumbers {
-        /// Its index.
+        /// Index of the node.
         node: usize,
-        /// What places it.
+        /// Key of the transform.
         key: &'static str,
-        /// How many numbers.
+        /// Required number of values.
         count: usize,
     },
-    /// glTF: this mesh has triangles with common sides.
+    /// glTF: this mesh has triangle strips or fans.
     #[error("meshes[{0}]: strips and fans of triangles are not read; export single triangles")]
     Strips(usize),
-    /// glTF: a triangle with a corner that is not there.
+    /// glTF: a triangle with an invalid vertex index.
     #[error("meshes[{mesh}]: vertex {vertex} is none of its {known}")]
     NoCorner {
         /// Index of the mesh.
         mesh: usize,
-        /// Index of the corner.
+        /// Index of the vertex.
         vertex: usize,
-        /// Number of corners.
+        /// Number of vertices.
         known: usize,
     },
-    /// glTF: this accessor lists changes to other numbers.
+    /// glTF: this accessor is sparse.
     #[error("accessors[{0}] is sparse, which this program does not read")]
     Sparse(usize),
-    /// glTF: other elements than are needed for this.
+    /// glTF: an accessor with the wrong element or component type.
     #[error("accessors[{accessor}] is not of type {kind} with a component type of {components:?}")]
     Elements {
-        /// Its index.
+        /// Index of the accessor.
         accessor: usize,
-        /// Wanted type.
+        /// Required element type.
         kind: &'static str,
-        /// Allowed types of components, as glTF numbers them.
+        /// Allowed component types, as glTF codes.
         components: &'static [u64],
     },
 }

@@ -1,4 +1,4 @@
-//! glTF 2.0: the triangles of the default scene, placed by its nodes; materials, skins and animations are left aside.
+//! glTF 2.0 reader: triangles of the default scene, transformed by its nodes; materials, skins and animations are ignored.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -40,7 +40,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), Fault> {
     };
     let text = chunk(12, b"JSON", "the chunk JSON")?;
     let next = 20 + text.len();
-    // There need not be one.
+    // The binary chunk is optional.
     let binary = if next < bytes.len() { chunk(next, b"BIN\0", "the chunk BIN")? } else { &[] };
     Ok((text, binary))
 }
@@ -50,7 +50,7 @@ struct File<'f> {
     buffers: Vec<Vec<u8>>,
 }
 
-/// Numbers that lie in a buffer.
+/// Elements in a buffer.
 struct Accessor<'f> {
     bytes: &'f [u8],
     stride: usize,
@@ -111,11 +111,11 @@ impl<'f> File<'f> {
 
     /// Adds the triangles of a mesh.
     fn mesh(&self, at: usize, placed: &Matrix4<f64>, out: &mut Builder) -> Result<(), MeshFault> {
-        /// Kinds of primitives: up to this one, points and lines.
+        /// Primitive modes up to this one are points and lines.
         const LINES: u64 = 3;
         const TRIANGLES: u64 = 4;
         let mesh = self.item("meshes", at)?;
-        // Mirrored triangles are seen from inside.
+        // A mirroring transform reverses the winding.
         let mirrored = placed.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
         for part in mesh["primitives"].as_array().into_iter().flatten() {
             match part.get("mode").map_or(Some(TRIANGLES), Json::as_u64) {
@@ -192,7 +192,7 @@ impl<'f> File<'f> {
         };
         let offset = size_of(json, "accessors", at, "byteOffset")?;
         let bytes = bytes.get(offset..).unwrap_or_default();
-        // The last one need not be followed by a whole stride.
+        // The last element need not fill a whole stride.
         let last = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
         if last.is_none_or(|last| last > bytes.len()) {
             return Err(MeshFault::Beyond { list: "accessors", at, whole: "buffer view" });
@@ -202,14 +202,14 @@ impl<'f> File<'f> {
 }
 
 impl Accessor<'_> {
-    /// Component `k` of element `i` of 32-bit floating-point numbers.
+    /// Component `k` of element `i`, stored as `f32`.
     fn number(&self, i: usize, k: usize) -> f64 {
         let bytes = self.bytes.get(i * self.stride + 4 * k..);
         let bytes = bytes.and_then(|bytes| bytes.first_chunk());
         f64::from(bytes.map_or(f32::NAN, |bytes| f32::from_le_bytes(*bytes)))
     }
 
-    /// Element `i` of whole numbers.
+    /// Element `i`, stored as an unsigned integer.
     fn whole(&self, i: usize) -> usize {
         let bytes = self.bytes.get(i * self.stride..).unwrap_or_default();
         let width = match self.component {
@@ -231,7 +231,7 @@ fn index(json: &Json, key: &'static str) -> Result<usize, MeshFault> {
     whole(json).ok_or_else(|| MeshFault::NotIndex { key, json: json.to_string() })
 }
 
-/// A number of bytes or elements in item `at` of a list, 0 if it is not given.
+/// A byte or element count in item `at` of `list`; 0 if absent.
 fn size_of(item: &Json, list: &'static str, at: usize, key: &'static str) -> Result<usize, MeshFault> {
     let Some(json) = item.get(key) else {
         return Ok(0);
@@ -239,7 +239,7 @@ fn size_of(item: &Json, list: &'static str, at: usize, key: &'static str) -> Res
     whole(json).ok_or_else(|| MeshFault::NotSize { list, at, key, json: json.to_string() })
 }
 
-/// N numbers of node `at`, if they are given.
+/// N numbers under `key` of node `at`, if present.
 fn numbers<const N: usize>(node: &Json, at: usize, key: &'static str) -> Result<Option<[f64; N]>, MeshFault> {
     let Some(list) = node.get(key) else {
         return Ok(None);
@@ -249,7 +249,7 @@ fn numbers<const N: usize>(node: &Json, at: usize, key: &'static str) -> Result<
     list.map(Some).ok_or(MeshFault::NotNumbers { node: at, key, count: N })
 }
 
-/// How node `at` places what hangs on it.
+/// Local transform of node `at`.
 fn matrix(node: &Json, at: usize) -> Result<Matrix4<f64>, MeshFault> {
     if let Some(columns) = numbers::<16>(node, at, "matrix")? {
         return Ok(Matrix4::from_column_slice(&columns));

@@ -1,7 +1,7 @@
-//! Triangle meshes and the files that hold them: STL, OBJ, glTF. What is wrong with a file is said with the byte at which it is.
+//! Readers of triangle meshes: STL, OBJ, glTF. Errors give the byte offset in the file.
 //!
-//! Own readers of a few dozen lines each: those of `stl_io` and `tobj` name no line, `gltf` panics on accessors that lie, and
-//! what they can do beyond triangles would weigh on the page.
+//! The readers are our own, a few dozen lines each: `stl_io` and `tobj` name no line in errors, `gltf` panics on inconsistent
+//! accessors, and their features beyond triangles would bloat the web page.
 
 mod builder;
 mod fault;
@@ -17,25 +17,25 @@ use fault::NoFile;
 pub use fault::{Fault, MeshFault};
 pub use jointplay_physics::machine::Mesh;
 
-/// Gives what another file holds.
+/// Reads a referenced file.
 type Other<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, NoFile>;
 
-/// Kinds of files.
+/// Mesh file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Text or binary.
+    /// STL, text or binary.
     Stl,
-    /// Its faces alone.
+    /// OBJ, faces only.
     Obj,
-    /// `.gltf` or `.glb`.
+    /// glTF, `.gltf` or `.glb`.
     Gltf,
 }
 
 impl Format {
-    /// Endings of file names that are read.
+    /// Supported file name extensions.
     pub const ENDINGS: &'static str = ".stl, .obj, .gltf, .glb";
 
-    /// The format of a file, by the ending of its name.
+    /// The format of a file, by its extension.
     pub fn of(name: &str) -> Option<Self> {
         let ending = Path::new(name).extension()?.to_str()?;
         Some(match ending.to_ascii_lowercase().as_str() {
@@ -46,15 +46,15 @@ impl Format {
         })
     }
 
-    /// Length of its unit, m, where the format says it.
+    /// Length unit, m, if the format defines one.
     pub fn unit(self) -> Option<f64> {
         (self == Self::Gltf).then_some(1.0)
     }
 
-    /// Reads the file that holds `bytes`; `other` gives what another file holds that it names.
+    /// Parses the content of a mesh file; `other` reads the files it references.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// An invalid or unsupported file.
     pub fn read(self, bytes: &[u8], other: Other<'_>) -> Result<Mesh, Fault> {
         let mesh = match self {
             Self::Stl => stl::read(bytes)?,
@@ -70,13 +70,13 @@ fn text(bytes: &[u8]) -> Result<&str, Fault> {
     std::str::from_utf8(bytes).map_err(|fault| Fault::at(fault.valid_up_to(), MeshFault::NotText))
 }
 
-/// A coordinate written as a number.
+/// Parses a coordinate.
 fn coordinate(text: &str, word: &str) -> Result<f64, Fault> {
     let number = word.parse::<f64>().ok();
     number.ok_or_else(|| Fault::at(offset(text, word), MeshFault::NotNumber))
 }
 
-/// Where `word`, a part of `text`, begins, bytes.
+/// Byte offset of `word`, a slice of `text`.
 fn offset(text: &str, word: &str) -> usize {
     word.as_ptr() as usize - text.as_ptr() as usize
 }
@@ -95,7 +95,7 @@ mod tests {
         format.read(bytes, &alone)
     }
 
-    /// Corners of a box of 1 x 2 x 3 about (10, 0, 0), and its triangles seen from outside.
+    /// Vertices and outward triangles of a box of 1 x 2 x 3 centred at (10, 0, 0).
     fn box_of_triangles() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         let side = |i: u32, bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
         let corner = |i| [10.0 + side(i, 0), 2.0 * side(i, 1), 3.0 * side(i, 2)];
@@ -138,7 +138,7 @@ mod tests {
         for [x, y, z] in corners {
             writeln!(out, "v {x} {y} {z}").unwrap();
         }
-        // Whole faces, counted from the end.
+        // Quadrilateral faces with relative vertex indices.
         for pair in triangles.chunks(2) {
             let [a, b, c, d] = [pair[0][0], pair[0][1], pair[0][2], pair[1][2]];
             let [a, b, c, d] = [a, b, c, d].map(|i| i as i32 - 8);
@@ -147,7 +147,7 @@ mod tests {
         out
     }
 
-    /// The box as glTF: turned, scaled and shifted back by its nodes.
+    /// The box as glTF: its nodes rotate, scale and translate the mesh back into place.
     fn gltf_parts() -> (serde_json::Value, Vec<u8>) {
         let (corners, triangles) = box_of_triangles();
         let mut bytes = Vec::new();

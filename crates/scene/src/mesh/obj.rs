@@ -1,4 +1,4 @@
-//! OBJ: vertices and faces; everything else is left aside.
+//! OBJ reader: vertices and faces; all other statements are ignored.
 
 use super::{Builder, Fault, MeshFault, coordinate, offset, text};
 
@@ -43,7 +43,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
     Ok(out)
 }
 
-/// Which of `known` vertices the corner `word`, such as `3/1/2`, of a face is.
+/// Zero-based vertex index of a face corner such as `3/1/2`; `None` if it is not one of the `known` vertices.
 fn index(word: &str, known: usize) -> Option<usize> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let from = if number < 0 { known as i64 } else { -1 };

@@ -1,8 +1,8 @@
-//! STL, text and binary.
+//! STL reader, text and binary.
 
 use super::{Builder, Fault, MeshFault, coordinate, offset, text};
 
-/// Bytes before the triangles of a binary file, and bytes of a triangle.
+/// Sizes of the binary header with the triangle count, and of a triangle record, bytes.
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 
@@ -46,7 +46,7 @@ fn binary(bytes: &[u8]) -> Result<Builder, Fault> {
 
 fn in_words(text: &str) -> Result<Builder, Fault> {
     let mut out = Builder::default();
-    // Corners of the loop that is open.
+    // Vertices of the open loop.
     let mut corners: Option<Vec<u32>> = None;
     let mut ended = false;
     for line in text.lines() {

@@ -1,5 +1,5 @@
-//! Motions that begin and end: a ramp from one position to another, and a pulse that returns. Rate and acceleration are 0 at
-//! both ends. A ramp of constant rate, or a pulse that is half a sine, would ask for an infinite force at its corners.
+//! Motions of finite duration: a ramp from one position to another, and a pulse that returns to its base. Rate and acceleration
+//! are 0 at both ends, because a ramp of constant rate or a half-sine pulse would require an infinite force at its corners.
 
 use std::f64::consts::PI;
 

@@ -4,9 +4,9 @@ use super::Law;
 use crate::jet::Jet;
 use crate::machine::Harmonic;
 
-/// Frequencies whose ratio misses one of whole numbers by more than this have no common period.
+/// Relative deviation from a ratio of integers beyond which two frequencies have no common period.
 const IN_STEP: f64 = 1e-6;
-/// The largest such number.
+/// Largest integer in such a ratio.
 const MOST_SWINGS: f64 = 1000.0;
 
 /// A harmonic at `t`.
@@ -18,7 +18,7 @@ fn at(term: &Harmonic, t: f64) -> Jet {
 #[derive(Debug)]
 pub(super) struct Harmonics {
     mean: f64,
-    /// Those with an amplitude.
+    /// Terms with nonzero amplitude.
     terms: Vec<Harmonic>,
 }
 
@@ -48,13 +48,13 @@ impl Law for Harmonics {
     }
 }
 
-/// The largest frequency of which both are multiples, up to rounding: by Euclid's algorithm. 0 if there is none.
+/// Greatest common divisor of two frequencies up to rounding, by Euclid's algorithm; 0 if there is none.
 fn common(a: f64, b: f64) -> f64 {
     let (mut high, mut low) = (a.max(b), a.min(b));
     let least = IN_STEP * low;
     while low > least {
         let rest = high % low;
-        // A rest just below a whole multiple is rounding, too.
+        // A remainder just below the divisor is rounding, too.
         let rest = rest.min(low - rest);
         (high, low) = (low, rest);
     }

@@ -15,7 +15,7 @@ impl Law for Line {
         Jet::new(self.position + self.velocity * t, self.velocity, 0.0)
     }
 
-    /// Of a hinge: a turn.
+    /// For a hinge: one full turn.
     fn period(&self) -> f64 {
         if self.turns { std::f64::consts::TAU / self.velocity.abs() } else { f64::INFINITY }
     }

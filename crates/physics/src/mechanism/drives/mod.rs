@@ -1,5 +1,5 @@
-//! Motions that drives prescribe: each law a function of time with exact first and second derivatives. One file per family;
-//! what they read from a scene is in `scene/drives.rs`.
+//! Laws of motion for drives: functions of time with exact first and second derivatives, one file per family. `scene/drives.rs`
+//! reads their parameters from a scene.
 
 mod bump;
 mod formula;
@@ -21,21 +21,20 @@ use crate::machine::{Drive, ElementKind, Joint, Machine};
 
 /// A coordinate, m or rad, as a function of time, s. Allocates nothing.
 pub trait Law: Debug + Send + Sync {
-    /// Coordinate, rate and acceleration at `t`. The rate has no jump anywhere.
+    /// Coordinate, rate and acceleration at `t`. The rate is continuous.
     fn at(&self, t: f64) -> Jet;
 
-    /// Time after which the motion repeats, s; infinite where it does not, or where nothing moves.
+    /// Period of the motion, s; infinite if it does not repeat or nothing moves.
     fn period(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Shortest time in which the motion swings there and back, s: a mechanism that follows it exactly steps by a fiftieth of
-    /// that.
+    /// Shortest period of oscillation in the motion, s. A mechanism that follows it exactly uses steps of a fiftieth of this.
     fn swing(&self) -> f64 {
         self.period()
     }
 
-    /// Latest end of a step that starts at `t`, s: no adaptive step passes over what only begins within it.
+    /// Latest end of a step that starts at `t`, s, to resolve features of the law.
     fn step_end(&self, _t: f64) -> f64 {
         f64::INFINITY
     }
@@ -46,7 +45,7 @@ pub trait Law: Debug + Send + Sync {
     }
 }
 
-/// What a driven coordinate follows.
+/// Source of a driven coordinate's motion.
 #[derive(Clone, Debug)]
 pub enum Trajectory {
     /// This coordinate of the scene's closed form.
@@ -55,13 +54,12 @@ pub enum Trajectory {
     Own(Arc<dyn Law>),
 }
 
-/// Shortest time to the end of a step that [`Law::step_end`] asks for, s: at an instant that is reached only up to rounding,
-/// no step of that length follows.
+/// Shortest step that [`Law::step_end`] may impose, s. It prevents steps of rounding length.
 const NEAR: f64 = 1e-9;
-/// Parts into which a single ramp or pulse is stepped, at least.
+/// Minimum number of steps over a single ramp or pulse.
 const PARTS: f64 = 50.0;
 
-/// What a coordinate with this `drive` follows, an angle if it `turns`.
+/// Trajectory of a coordinate with this `drive`; an angle if it `turns`.
 pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
     Trajectory::Own(match drive {
         Drive::ClosedForm(coordinate) => return Trajectory::ClosedForm(*coordinate),
@@ -80,8 +78,8 @@ pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
     })
 }
 
-/// Periods of the motions that drives of joints prescribe, of what force elements follow and of loads, s; infinite where one does
-/// not repeat or nothing moves.
+/// Periods of joint drives, of the drive laws of force elements and of loads, s; infinite if one does not repeat or nothing
+/// moves.
 pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
     let drives = machine.joints.iter().flat_map(Joint::drives);
     let of_drives = drives.map(|(freedom, drive)| {
@@ -113,12 +111,12 @@ impl Trajectory {
     }
 }
 
-/// Period of the closed form of `scene`, s.
+/// Period of the closed form of `machine`, s.
 fn closed_period(machine: &Machine) -> f64 {
     machine.spcmm.map_or(f64::INFINITY, |spcmm| period_if(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency))
 }
 
-/// Period of a swing with these amplitudes, s.
+/// Period of an oscillation with these amplitudes, s; infinite if all are 0.
 fn period_if(amplitudes: &[f64], frequency: f64) -> f64 {
     if amplitudes.iter().any(|amplitude| *amplitude != 0.0) { 1.0 / frequency } else { f64::INFINITY }
 }

@@ -1,24 +1,24 @@
-//! A cubic spline through points. Its second derivative has no jump between the first point and the last; where the points
-//! repeat, nowhere. Otherwise the end values hold outside, and the rate is 0 at both ends.
+//! Cubic spline through points. The second derivative is continuous between the first and last point, and everywhere for a
+//! periodic table. Outside a table that does not repeat, the end values hold, and the rate is 0 at both ends.
 
 use super::{Law, NEAR};
 use crate::jet::Jet;
 use crate::mechanism::spline::{Ends, Spline};
 
-/// Parts into which an interval is stepped, at least, as long as they are not shorter than `FINE`, s.
+/// Minimum number of steps per interval, unless they would be shorter than `FINE`, s.
 const PARTS: f64 = 8.0;
 const FINE: f64 = 1e-3;
 
 #[derive(Debug)]
 pub(super) struct Table {
-    /// Over the instants of the points, s.
+    /// Value against time, s.
     spline: Spline,
     end: f64,
     repeats: bool,
 }
 
 impl Table {
-    /// Through `points`, which are a period if it `repeats`.
+    /// Spline through `points`, which span one period if it `repeats`.
     pub fn new(points: &[[f64; 2]], repeats: bool) -> Self {
         let ends = match repeats {
             true => Ends::Joined,
@@ -27,7 +27,7 @@ impl Table {
         Self { spline: Spline::new(points, ends), end: points[points.len() - 1][1], repeats }
     }
 
-    /// `t`, moved by whole periods to within the points where they repeat.
+    /// `t` shifted by whole periods into the range of the points if they repeat.
     fn within(&self, t: f64) -> f64 {
         let [first, last] = self.spline.ends();
         if !self.repeats || (first..last).contains(&t) {
@@ -35,7 +35,7 @@ impl Table {
         }
         let period = last - first;
         let moved = t - period * ((t - first) / period).floor();
-        // Rounding may miss the period by a hair.
+        // Rounding may overshoot the period slightly.
         moved.clamp(first, last)
     }
 }
@@ -63,7 +63,7 @@ impl Law for Table {
         if self.repeats && moves { last - first } else { f64::INFINITY }
     }
 
-    /// At the next point, where the third derivative jumps, and at some instants on the way there.
+    /// The next point, where the third derivative jumps, or an intermediate instant before it.
     fn step_end(&self, t: f64) -> f64 {
         let (now, times) = (self.within(t), &self.spline.knots);
         let next = match self.spline.next(now + NEAR) {

@@ -31,7 +31,7 @@ fn points(values: &[(f64, f64)]) -> String {
     values.iter().map(point).collect::<Vec<_>>().join(", ")
 }
 
-/// Every law, with these numbers: a length, m, a time, s, and a number from 0 to 1.
+/// Every law for a length (m), a time (s) and a number from 0 to 1.
 fn every_law(a: f64, d: f64, s: f64) -> Vec<String> {
     let steps = [0.0, 0.3 * d, d, (1.2 + s) * d, 3.0 * d];
     let table = [(steps[0], a), (steps[1], 0.0), (steps[2], -a), (steps[3], s * a), (steps[4], a)];
@@ -73,10 +73,10 @@ proptest! {
             let (left, now, right) = (law.at(t - h), law.at(t), law.at(t + h));
             let rate = (right.value - left.value) / (2.0 * h);
             let acceleration = (right.rate - left.rate) / (2.0 * h);
-            // Sizes of the fourth and lower derivatives in one swing.
+            // Size of the fourth and lower derivatives over one oscillation.
             let size = 100.0 * (1.0 + a) * (TAU / d).powi(3) * 1e-3;
             prop_assert!((rate - now.rate).abs() < 1e-2 * h * size, "{text} at {t}: {rate} {now:?}");
-            // Where the rate has a corner, as at the ends of a table, the difference is half the jump.
+            // Where the rate has a corner, as at the ends of a table, the error is half the jump.
             let jump = (right.acceleration - left.acceleration).abs();
             let off = (acceleration - now.acceleration).abs();
             prop_assert!(off < 100.0 * h * size + jump, "{text} at {t}: {acceleration} {now:?}");
@@ -94,7 +94,7 @@ proptest! {
             let held = text.contains("table") && !text.contains("repeat");
             let mut t = -1.0;
             while t < 4.0 {
-                // Either an instant at which the law begins something new, or any.
+                // Either an instant at which the law changes, or any other.
                 let next = law.step_end(t).min(t + 0.1);
                 let eps = 1e-9;
                 let (left, right) = (law.at(next - eps), law.at(next + eps));
@@ -120,7 +120,7 @@ fn ramp_and_pulse_are_where_they_should_be() {
     for t in [1.0, 3.0] {
         assert_eq!((ramp.at(t).rate, ramp.at(t).acceleration), (0.0, 0.0));
     }
-    // 30/16 of the mean rate, half way.
+    // 30/16 of the mean rate at half time.
     assert!((ramp.at(2.0).rate - 1.875).abs() < 1e-15);
     let pulse = law("law = \"pulse\", base = \"1 m\", height = \"4 mm\", start = \"1 s\", duration = \"10 ms\"");
     assert!((pulse.at(1.005).value - 1.004).abs() < 1e-15);
@@ -213,7 +213,7 @@ fn a_spline_reproduces_a_cubic_and_converges_with_the_fourth_order() {
             off.fold(0.0, f64::max)
         };
         let (coarse, fine) = (error(20), error(40));
-        // A sixteenth for half the spacing.
+        // Fourth order in the spacing.
         let ratio = coarse / fine;
         assert!((14.0..18.0).contains(&ratio), "{repeats} {phase}: {ratio} {fine}");
     }

@@ -1,9 +1,9 @@
-//! Bushing between two bodies: three springs along and three about axes fixed in the first, each with a damper.
+//! Bushing between two bodies: three linear and three torsional spring-dampers on axes fixed in the first.
 //!
-//! With x the second point from the first in those axes and theta the rotation vector of the second body from its rest
-//! orientation in the first, the energy stored is (x' K x + theta' L theta) / 2. Force and torque follow from it exactly, for
-//! rotations up to half a turn: both forces act at the second point, and the torque is -J^-T L theta, J the matrix that makes
-//! the relative angular velocity of the rate of theta. About one axis that is -L theta.
+//! Let x be the second point relative to the first in those axes, and theta the rotation vector of the second body from its rest
+//! orientation in the first. The stored energy is (x' K x + theta' L theta) / 2, from which force and torque follow exactly for
+//! rotations up to half a turn. Both forces act at the second point, and the torque is -J^-T L theta, where J maps the rate of
+//! theta to the relative angular velocity. About one axis that is -L theta.
 
 use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, Turning, push};
 use crate::machine::{self, Mat3, Quat, Vec3};
@@ -14,22 +14,22 @@ use crate::mechanism::model::Anchor;
 struct Bushing {
     from: Anchor,
     to: Anchor,
-    /// Its axes as columns, and the rest orientation of the second body, both in the axes of the first.
+    /// Bushing axes as columns, and rest orientation of the second body, both in the axes of the first.
     axes: Mat3,
     rest: Mat3,
-    /// Diagonals of K, its damping, L and its damping.
+    /// Diagonals of K and its damping, of L and its damping.
     stiffness: Vec3,
     damping: Vec3,
     turning_stiffness: Vec3,
     turning_damping: Vec3,
 }
 
-/// State at one instant, along its axes where nothing else is said.
+/// State at one instant, along the bushing axes unless stated otherwise.
 struct State {
-    /// World.
+    /// In world axes.
     axes: Mat3,
     points: [Vec3; 2],
-    /// The second point from both centroids, world.
+    /// Second point from both centroids, world axes.
     arms: [Vec3; 2],
     /// x, m, and its rate.
     offset: Vec3,
@@ -62,10 +62,10 @@ fn rotation_vector(rotation: &Mat3) -> Vec3 {
     vector * (sign * factor)
 }
 
-/// J^-T: makes the torque of the derivatives of an energy by the components of the rotation vector `turn`.
+/// J^-T: maps the derivatives of an energy with respect to the components of the rotation vector `turn` to the torque.
 fn torque_matrix(turn: &Vec3) -> Mat3 {
     let square = turn.norm_squared();
-    // (1 - h cot h) / 4 h^2, h half the angle.
+    // (1 - h cot h) / 4 h^2, where h is half the angle.
     let factor = if square < 1e-3 {
         1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1_209_600.0))
     } else {
@@ -96,7 +96,7 @@ impl Bushing {
         }
     }
 
-    /// Force on the second point and torque on its body, world.
+    /// Force on the second point and torque on its body, world axes.
     fn loads(&self, s: &State) -> [Vec3; 2] {
         let force = self.stiffness.component_mul(&s.offset) + self.damping.component_mul(&s.rate);
         let torque = torque_matrix(&s.turn) * self.turning_stiffness.component_mul(&s.turn)

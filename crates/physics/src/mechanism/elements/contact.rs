@@ -15,8 +15,8 @@ pub struct Gap {
     pub eccentricity: Vec3,
     /// de/dt, m/s.
     pub eccentricity_rate: Vec3,
-    /// Where the ball is in its socket: of a ball beyond the wall from every evaluation, of others once `finish`
-    /// has completed it. An ideal joint has no penetration.
+    /// Position of the ball in its socket. Every evaluation sets it for a ball beyond the wall, and `finish` completes it for the
+    /// others. An ideal joint has no penetration.
     pub separation: Separation,
     /// F_N, N (19).
     pub normal_force: f64,
@@ -28,12 +28,12 @@ pub struct Gap {
 
 /// A ball joint; a force element if it has clearance.
 pub struct Contact {
-    /// Its index among the ball joints, and so that of its memory.
+    /// Index among the ball joints, also that of its contact state.
     index: usize,
     pub joint: BallJoint,
     pub law: Coefficients,
     pub gap: Gap,
-    /// In one of the latest evaluations its sliding speed or penetration rate was beyond the piece of its law held in the memory.
+    /// In one of the latest evaluations, the sliding speed or penetration rate left the frozen branch of the law.
     pub left_piece: bool,
 }
 
@@ -66,7 +66,7 @@ impl Contact {
         -gap.friction.dot(&surfaces)
     }
 
-    /// Contact of the ball with its socket wall at the latest evaluation; `None` if it does not press on it.
+    /// Contact between the ball and its socket wall at the latest evaluation; `None` without contact force.
     pub fn touch(&self, motion: &[Kinematics]) -> Option<Touch> {
         if !self.is_loose() || self.gap.normal_force <= 0.0 {
             return None;
@@ -78,14 +78,14 @@ impl Contact {
         })
     }
 
-    /// Unit vector from the socket centre to the ball centre, which must differ from it, at the latest evaluation, in the axes
-    /// of the socket's body: towards the point of the wall nearest to the ball.
+    /// Unit vector from the socket centre to the ball centre at the latest evaluation, in the axes of the socket's body. It
+    /// points to the point of the wall nearest to the ball; the two centres must differ.
     pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
         let socket = &motion[self.joint.socket.body];
         socket.rotation.tr_mul(&self.direction())
     }
 
-    /// e / |e| of a ball off centre, whether or not its gap has been finished.
+    /// e / |e| of a ball off centre, whether or not `finish` has been called.
     pub fn direction(&self) -> Vec3 {
         self.gap.eccentricity.normalize()
     }
@@ -103,7 +103,7 @@ impl Contact {
         self.law.slip_velocity(n, &self.gap.eccentricity_rate, ball, socket)
     }
 
-    /// Measures eccentricity and its rate; forces stay.
+    /// Measures the eccentricity and its rate; forces are left unchanged.
     pub fn measure(&mut self, motion: &[Kinematics]) {
         let joint = &self.joint;
         let (e, rate) = joint.opening(motion, &joint.arms(motion));

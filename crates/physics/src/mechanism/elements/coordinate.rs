@@ -1,6 +1,6 @@
-//! A coordinate of a joint from the motion of the two bodies that it connects, and a force along it. The same in every
-//! formulation: a force on the child and the opposite one on the parent at the same point, or a pair of torques. Both axes of a
-//! universal joint are perpendicular, so that torques about one do no work on the other.
+//! Coordinate of a joint, from the motion of the two bodies it connects, and a force along it, in every formulation: a force on
+//! the child and its opposite on the parent at the same point, or a pair of torques. The axes of a universal joint are
+//! perpendicular, so that a torque about one does no work on the other.
 
 use std::f64::consts::TAU;
 
@@ -15,11 +15,11 @@ pub(super) struct Coordinate {
     parent: Anchor,
     child: Anchor,
     turns: bool,
-    /// Axis, in the parent's axes, or in the child's.
+    /// Axis, in the axes of the parent or, if `in_child`, of the child.
     axis: Vec3,
     in_child: bool,
-    /// Of an angle: a direction across the axis, in the parent's axes; and in the child's, the one that coincides with it at
-    /// coordinate 0.
+    /// For an angle: a direction perpendicular to the axis, in the parent's axes, and the direction in the child's axes that
+    /// coincides with it at coordinate 0.
     across: Vec3,
     seen: Vec3,
 }
@@ -27,18 +27,18 @@ pub(super) struct Coordinate {
 /// A coordinate at one instant.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
-    /// From the position asked about, m or rad; an angle within half a turn.
+    /// Coordinate relative to the given position, m or rad; angles within half a turn.
     pub off: f64,
-    /// m/s or rad/s.
+    /// Rate, m/s or rad/s.
     pub rate: f64,
-    /// The axis, world.
+    /// Axis, world.
     along: Vec3,
-    /// The child's joint point, m, and its arms from the centroids of parent and child.
+    /// Joint point of the child, world, m, and its arms from the centroids of parent and child.
     point: Vec3,
     arms: [Vec3; 2],
 }
 
-/// Derivatives of a force along a coordinate: by the coordinate, by its rate, by time.
+/// Derivatives of a force along a coordinate with respect to the coordinate, its rate and time.
 pub(super) struct Slopes {
     pub by_position: f64,
     pub by_rate: f64,
@@ -46,7 +46,7 @@ pub(super) struct Slopes {
 }
 
 impl Coordinate {
-    /// The coordinate `on` of `machine`; `ends` are the points that its joint connects.
+    /// Coordinate `on` of `machine`; `ends` are the points connected by its joint.
     pub fn of(machine: &Machine, on: JointCoordinate, ends: &[Anchor]) -> Self {
         let freedom = on.freedom;
         let joint = machine.kinematic_joints().nth(on.joint).expect("an element acts on a joint of its machine");
@@ -72,7 +72,7 @@ impl Coordinate {
         }
     }
 
-    /// The coordinate from `position`, and its rate.
+    /// The coordinate relative to `position`, and its rate.
     pub fn place(&self, position: f64, motion: &[Kinematics]) -> Place {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let of_axis = if self.in_child { child } else { parent };
@@ -107,7 +107,7 @@ impl Coordinate {
         }
     }
 
-    /// The child's joint point as one of the parent, and as one of the child: what separates them is the joint's motion.
+    /// The child's joint point as a point of the parent and as a point of the child: their relative motion is the joint's.
     pub fn ends(&self, motion: &[Kinematics]) -> [Anchor; 2] {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
         let point = child.position + child.rotation * self.child.offset;

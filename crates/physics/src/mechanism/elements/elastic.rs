@@ -1,16 +1,16 @@
-//! What a spring exerts without its damper: preload + stiffness s at a change of length (or of a joint's coordinate) s, or a
-//! curve through points, straight beyond them. Of one that acts one way only, what is left of it.
+//! Elastic force of a spring, without its damper: preload + stiffness s, where s is the change of length or of a joint's
+//! coordinate, or a curve through points, straight beyond them. A one-sided spring exerts only the part of one sign.
 
 use crate::jet::Jet;
 use crate::machine::{self, SpringSide};
 use crate::mechanism::spline::{Ends, Spline};
 
-/// Beyond any stretch, m or rad.
+/// Larger than any stretch, m or rad.
 const FARTHEST: f64 = 1e7;
 
 pub(super) enum Elastic {
     Line {
-        /// At 0, N or N m.
+        /// Tension at zero stretch, N or N m.
         preload: f64,
         /// N/m or N m/rad.
         stiffness: f64,
@@ -20,7 +20,7 @@ pub(super) enum Elastic {
 }
 
 impl Elastic {
-    /// That of a spring which acts on `side`.
+    /// Elastic law of a spring that acts on `side`.
     pub fn new(elastic: &machine::Elastic, side: SpringSide) -> Self {
         match elastic {
             machine::Elastic::Curve(points) => Self::Curve(Curve::new(points, side)),
@@ -30,7 +30,7 @@ impl Elastic {
         }
     }
 
-    /// Tension at `stretch`, N or N m, as if it acted both ways.
+    /// Tension at `stretch`, N or N m, ignoring one-sidedness.
     pub fn tension(&self, stretch: f64) -> f64 {
         match self {
             Self::Line { preload, stiffness, .. } => preload + stiffness * stretch,
@@ -38,7 +38,7 @@ impl Elastic {
         }
     }
 
-    /// Its derivative there, N/m or N m/rad.
+    /// Derivative of the tension, N/m or N m/rad.
     pub fn stiffness(&self, stretch: f64) -> f64 {
         match self {
             Self::Line { stiffness, .. } => *stiffness,
@@ -46,12 +46,12 @@ impl Elastic {
         }
     }
 
-    /// Energy stored, J: what it took to get there from a stretch of 0.
+    /// Stored energy, J: the work done from zero stretch.
     pub fn stored(&self, stretch: f64) -> f64 {
         match self {
             Self::Line { preload, stiffness, side } => {
                 let elastic = preload + stiffness * stretch;
-                // Beyond the length at which it is slack it keeps what it has there.
+                // Once slack, the spring stores what it stored where it went slack.
                 let stretch = match side.of(elastic) == elastic || *stiffness == 0.0 {
                     true => stretch,
                     false => -preload / stiffness,
@@ -63,13 +63,13 @@ impl Elastic {
     }
 }
 
-/// A tension that depends on the stretch along a curve.
+/// Tension given as a curve over the stretch.
 pub(super) struct Curve {
     spline: Spline,
-    /// Stretches at which the cubic of the tension changes, or what is left of it begins or ends, in order, and the energy
-    /// stored there, J.
+    /// Stretches at which the cubic changes or a one-sided spring starts or ceases to act, in ascending order, each with the
+    /// energy stored there, J.
     marks: Vec<[f64; 2]>,
-    /// Whether it acts before the first mark, between two, after the last.
+    /// Whether it acts before the first mark, between marks, after the last.
     acts: Vec<bool>,
 }
 
@@ -102,7 +102,7 @@ impl Curve {
         curve
     }
 
-    /// Tension and its derivatives by the stretch.
+    /// Tension and its derivatives with respect to the stretch.
     fn at(&self, stretch: f64) -> Jet {
         let [first, last] = self.spline.ends();
         let within = stretch.clamp(first, last);
@@ -122,21 +122,21 @@ impl Curve {
         }
     }
 
-    /// Work of stretching it from `a` to `b` without passing a mark, J: Simpson's rule is exact for a cubic.
+    /// Work of stretching from `a` to `b` without crossing a mark, J: Simpson's rule is exact for a cubic.
     fn work(&self, a: f64, b: f64) -> f64 {
         let [at_a, middle, at_b] = [a, 0.5 * (a + b), b].map(|stretch| self.at(stretch).value);
         (b - a) * (at_a + 4.0 * middle + at_b) / 6.0
     }
 
-    /// Stretches at which the tension passes zero.
+    /// Stretches at which the tension changes sign.
     fn roots(&self) -> Vec<f64> {
         let knots = &self.spline.knots;
         let mut roots = Vec::new();
-        // Between these it rises or falls all the way.
+        // The tension is monotonic between these.
         let mut ends = Vec::new();
         for (i, [_, b, c, d]) in self.spline.cubics.iter().enumerate() {
             ends.push(knots[i]);
-            // Where b + 2 c s + 3 d s^2 is zero, in the form that does not cancel.
+            // Roots of b + 2 c s + 3 d s^2, in the form without cancellation.
             let half = -(c + c.signum() * (c * c - 3.0 * b * d).max(0.0).sqrt());
             let mut turns = [half / (3.0 * d), b / half].map(|s| knots[i] + s);
             turns.sort_by(f64::total_cmp);
@@ -148,21 +148,21 @@ impl Curve {
         for pair in ends.windows(2) {
             roots.extend(self.root(pair[0], pair[1]));
         }
-        // The straight ends.
+        // The straight extensions.
         let crossing = |knot: f64| knot - self.at(knot).value / self.at(knot).rate;
         roots.extend(Some(crossing(first)).filter(|at| (-FARTHEST..first).contains(at)));
         roots.extend(Some(crossing(last)).filter(|at| last < *at && *at < FARTHEST));
         roots
     }
 
-    /// Where between `a` and `b` the tension, which rises or falls all the way, is zero.
+    /// Zero of the tension between `a` and `b`, where it is monotonic.
     fn root(&self, mut a: f64, mut b: f64) -> Option<f64> {
         let above = |stretch: f64| self.at(stretch).value > 0.0;
         let at_a = above(a);
         if at_a == above(b) {
             return None;
         }
-        // Until the two are neighbours among the numbers that there are.
+        // Bisects until the two are adjacent floating-point numbers.
         loop {
             let middle = 0.5 * (a + b);
             if middle <= a || middle >= b {
@@ -213,12 +213,12 @@ mod tests {
         let curve = Curve::new(&POINTS, SpringSide::Push);
         let mut roots = curve.roots();
         roots.sort_by(f64::total_cmp);
-        // It passes zero between the first two, the second two, the third two: once each.
+        // One zero in each of the first three intervals.
         assert_eq!(roots.len(), 3, "{roots:?}");
         for root in roots {
             assert!(curve.at(root).value.abs() < 1e-9, "{root}");
         }
-        // Beyond its points only.
+        // A zero beyond the points.
         let line = Curve::new(&[[0.0, 1.0], [1.0, 3.0]], SpringSide::Push);
         assert_eq!(line.roots(), [-0.5]);
         assert_eq!(line.acts, [true, false, false, false]);

@@ -1,5 +1,5 @@
-//! Spring with a damper on a slide or a hinge: force or torque -(preload + stiffness s + damping ds/dt) on the child, s the
-//! joint's coordinate from `position`, or a curve over s in place of the first two.
+//! Spring and damper on a slide or hinge. The force or torque on the child is -(preload + stiffness s + damping ds/dt), where s
+//! is the joint's coordinate measured from `position`; a curve over s may replace the first two terms.
 
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::elastic::Elastic;
@@ -26,7 +26,7 @@ pub(super) fn make(spring: &machine::JointSpring, site: &Mount<'_>) -> Box<dyn S
 }
 
 impl JointSpring {
-    /// The coordinate, and the force or torque on the child.
+    /// The coordinate, and the force or torque on the child, N or N m.
     fn at(&self, motion: &[Kinematics]) -> (Place, f64) {
         let place = self.on.place(self.position, motion);
         let back = self.elastic.tension(place.off) + self.damping * place.rate;

@@ -11,7 +11,7 @@ struct Load {
     force: Vec3,
     torque: Vec3,
     turns: bool,
-    /// rad/s; 0 if constant.
+    /// Angular frequency, rad/s; 0 for a constant load.
     omega: f64,
     phase: f64,
 }

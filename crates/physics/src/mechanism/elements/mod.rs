@@ -1,5 +1,5 @@
-//! Force elements: whatever loads bodies without a constraint. One file per kind. Ball joints with clearance are among them;
-//! the others come from the scene's own list, each kind with an entry below.
+//! Force elements: everything that loads bodies without a constraint, one file per kind. Ball joints with clearance are among
+//! them; the others come from the scene's list, each kind with an entry below.
 
 mod bushing;
 mod contact;
@@ -28,24 +28,24 @@ use crate::machine::{Attachment, Drive, Element, ElementKind, Machine, Mat3, Vec
 use coordinate::Coordinate;
 pub use pull::Pull;
 
-/// What decides which contacts carry a force.
+/// Determines which contacts carry a force.
 #[derive(Clone, Copy, Debug)]
 pub enum ActiveSet<'a> {
-    /// The contact memory: the stepper locates the events at which it changes.
+    /// By the contact state: the stepper locates the events that change it.
     Located(&'a [Memory]),
-    /// Penetration, at every evaluation: for steppers without event location.
+    /// By penetration at every evaluation: for steppers without event location.
     Immediate(&'a [Memory]),
     /// No contact carries a force.
     Nothing,
 }
 
 impl<'a> ActiveSet<'a> {
-    /// By the memory if events are `located`, else by penetration.
+    /// By the contact state if events are `located`, otherwise by penetration.
     pub fn by(located: bool, memory: &'a [Memory]) -> Self {
         if located { Self::Located(memory) } else { Self::Immediate(memory) }
     }
 
-    /// Memory of joint `j` if it may carry a force.
+    /// Contact state of joint `j` if it may carry a force.
     #[inline]
     pub(in crate::mechanism) fn memory(self, j: usize) -> Option<&'a Memory> {
         match self {
@@ -59,11 +59,11 @@ impl<'a> ActiveSet<'a> {
 /// Evaluation counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Of the equations of motion.
+    /// Evaluations of the equations of motion.
     pub equations: u64,
-    /// Of all contacts at an instant: a scene without clearance makes none.
+    /// Evaluations of all contacts at an instant; 0 in a scene without clearance.
     pub contacts: u64,
-    /// Of the friction of one contact: a scene without friction makes none.
+    /// Evaluations of one contact's friction; 0 in a scene without friction.
     pub friction: u64,
 }
 
@@ -75,7 +75,7 @@ impl std::ops::AddAssign for Counts {
     }
 }
 
-/// Motion of the bodies at `t`, s, and what decides which contacts carry a force.
+/// Motion of the bodies at `t`, s, and the active contacts.
 #[derive(Clone, Copy)]
 pub(super) struct At<'a> {
     pub t: f64,
@@ -83,43 +83,43 @@ pub(super) struct At<'a> {
     pub touching: ActiveSet<'a>,
 }
 
-/// What elements add to in an evaluation.
+/// Accumulators of an evaluation.
 pub(super) struct Loads<'a> {
-    /// On the bodies, about their centroids; the last is the world's.
+    /// Loads on the bodies about their centroids; the last is the world's.
     pub wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
 }
 
-/// How the force between two points depends on their relative motion.
+/// Linearisation of the force between two points with respect to their relative motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coupling {
-    /// The points, first the one `force` acts on, each with the distance along `normal` from it to where the force acts, m.
+    /// The points, first the one `force` acts on, each with the distance from it to the point of application along `normal`, m.
     pub sides: [(Anchor, f64); 2],
     /// Zero if the force acts at the points themselves.
     pub normal: Vec3,
-    /// Force on the first, N, if it acts along a normal that turns with the points; otherwise zero.
+    /// Force on the first, N, if it acts along a normal that rotates with the points; otherwise zero.
     pub force: Vec3,
     /// Derivatives of the force.
     pub stiffness: Stiffness,
-    /// Whether its slip-dependent part follows the surfaces rather than the points.
+    /// Whether the slip-dependent part follows the surfaces rather than the points.
     pub uses_surface_velocity: bool,
-    /// Of an element between points of two bodies that coincide, in axes that follow the bodies: how its torque depends on
-    /// their relative rotation. What moves both bodies as one then leaves force and torque as they are.
+    /// For an element between coincident points of two bodies, in axes fixed to the bodies: the dependence of its torque on their
+    /// relative rotation. A common rotation of both bodies leaves force and torque unchanged.
     pub turning: Option<Turning>,
 }
 
-/// How the torque on the first of two bodies, and its opposite on the second, depend on their relative motion.
+/// Linearisation of the torque on the first of two bodies (and its opposite on the second) with respect to their relative motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Turning {
-    /// Derivatives by relative rotation, N m/rad, and by relative angular velocity, N m s/rad.
+    /// Derivatives with respect to relative rotation, N m/rad, and to relative angular velocity, N m s/rad.
     pub by_turn: Mat3,
     pub by_spin: Mat3,
-    /// At fixed motion, N m/s.
+    /// Time derivative at fixed motion, N m/s.
     pub by_time: Vec3,
 }
 
 impl Coupling {
-    /// For a force on the second of two points that acts there: derivatives by their distance, N/m, and by its rate, N s/m.
+    /// For a force acting at the second of two points: derivatives with respect to their displacement, N/m, and its rate, N s/m.
     fn between_points([from, to]: [Anchor; 2], by_displacement: Mat3, by_rate: Mat3) -> Self {
         Self {
             sides: [(to, 0.0), (from, 0.0)],
@@ -131,7 +131,7 @@ impl Coupling {
         }
     }
 
-    /// For a force on the second of two points that coincide, N/m, N s/m and N/s, and a torque on its body.
+    /// For a force at the second of two coincident points, N/m, N s/m and N/s, and a torque on its body.
     fn at_one_point(
         [from, to]: [Anchor; 2],
         [by_displacement, by_rate]: [Mat3; 2],
@@ -140,7 +140,7 @@ impl Coupling {
     ) -> Self {
         let mut coupling = Self::between_points([from, to], by_displacement, by_rate);
         coupling.stiffness.by_clearance = by_time;
-        // With these lengths what a coordinate turns is the relative angular velocity itself.
+        // With these distances, `Column::turn` is the relative angular velocity itself.
         coupling.sides = [(to, 1.0), (from, 1.0)];
         coupling.turning = Some(turning);
         coupling
@@ -150,20 +150,20 @@ impl Coupling {
 /// Report of an element at one instant. SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ElementReport {
-    /// Where it acts: both points of an element between two, otherwise the same point twice, m.
+    /// Points of application, m: both points of an element between two, otherwise the same point twice.
     pub points: [Vec3; 2],
-    /// Force on the second, N.
+    /// Force on the second point, N.
     pub force: Vec3,
-    /// Torque on the body, N m, if it has one; of an element on a hinge, on the child.
+    /// Torque on the body, N m, if any; for an element on a hinge, on the child.
     pub torque: Option<Vec3>,
-    /// Whether it is a pair of torques, without any force.
+    /// Whether the load is a pure torque pair.
     pub only_turns: bool,
-    /// Of a stop that is touched: how deep, and the depth at which it exerts the force that its scene gives, m or rad.
+    /// For a stop in contact: its depth, and the depth at which it exerts the force given in the scene, m or rad.
     pub depth: Option<[f64; 2]>,
 }
 
 impl ElementReport {
-    /// [`Self::force`], unless it is a pair of torques.
+    /// [`Self::force`], unless the load is a pure torque pair.
     pub fn own_force(&self) -> Option<Vec3> {
         (!self.only_turns).then_some(self.force)
     }
@@ -209,23 +209,23 @@ impl Powers {
     }
 }
 
-/// Something that loads bodies depending on their motion and on time. Allocates nothing.
+/// A load on bodies that depends on their motion and on time. Allocates nothing.
 pub(super) trait ForceElement: Send {
     /// Adds its loads.
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
 
-    /// The two points on whose relative motion, and on that of whose bodies, it depends in `motion`; `None` if nothing about it
-    /// is stiff.
+    /// The two points in `motion` on whose relative motion, and that of their bodies, the force depends; `None` if it is not
+    /// stiff.
     fn ends(&self, _motion: &[Kinematics]) -> Option<[Anchor; 2]> {
         None
     }
 
-    /// Its linearisation there, after an evaluation; `None` if it has none.
+    /// Linearisation after an evaluation; `None` if there is none.
     fn coupling(&self, _at: &At<'_>) -> Option<Coupling> {
         None
     }
 
-    /// Energy stored at `t`, J; for a contact, at the gap last measured.
+    /// Stored energy at `t`, J; for a contact, at the gap last measured.
     fn stored(&self, _t: f64, _motion: &[Kinematics]) -> f64 {
         0.0
     }
@@ -234,51 +234,52 @@ pub(super) trait ForceElement: Send {
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers);
 }
 
-/// An element of the scene's own list. Ball joints, with clearance or without, are reported as joints.
+/// An element of the scene's own list. Ball joints are reported as joints instead, with or without clearance.
 pub(super) trait SceneElement: ForceElement {
     /// Period of its explicit time dependence, s; infinite if it has none.
     fn period(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// Latest end of an adaptive step that starts at `t`, s: none passes over what its law only begins within it.
+    /// Latest end of an adaptive step that starts at `t`, s, to resolve features of its time law.
     fn step_end(&self, _t: f64) -> f64 {
         f64::INFINITY
     }
 
-    /// How deep it is pressed in, and that or, where it has let go though it is still pressed in, not above 0; in any unit. Explicit
-    /// steps end where a sign changes. `None` if it exerts a force wherever it is.
+    /// Depth of contact, and the smaller of that and an indicator that falls to 0 when contact is lost while still compressed; in
+    /// any unit. Explicit steps end where a sign changes. `None` if the element always exerts a force.
     fn pressed(&self, _t: f64, _motion: &[Kinematics]) -> Option<[f64; 2]> {
         None
     }
 
-    /// Whether the slope of its force has a vertical tangent where it begins.
+    /// Whether the slope of the force has a vertical tangent at first contact.
     fn begins_vertically(&self) -> bool {
         false
     }
 
-    /// Follows from here on its law as if it pressed, or as if it did not, wherever it is; `None`: as the motion has it.
+    /// Freezes the contact state: the element follows its law as if it pressed, or as if it did not, regardless of the motion.
+    /// `None` unfreezes it.
     fn hold(&mut self, _presses: Option<bool>) {}
 
     /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }
 
-/// Where an element of the scene acts.
+/// Mounting of an element of the scene.
 struct Mount<'a> {
-    /// Its points.
+    /// Points of attachment.
     anchors: &'a [Anchor],
     coordinate: Option<Coordinate>,
 }
 
 impl Mount<'_> {
-    /// That of the joint it acts on: only for kinds that do.
+    /// Joint coordinate; only for kinds that act on a joint.
     fn coordinate(&self) -> Coordinate {
         self.coordinate.expect("a kind that acts on a joint")
     }
 }
 
-/// The force elements of `scene`, in its order.
+/// The force elements of `machine`, in the order of the scene.
 pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn SceneElement>> {
     let make = |element: &Element| {
         let anchors: Vec<Anchor> = element.points.iter().map(|point| model.anchor(machine, point)).collect();
@@ -304,7 +305,7 @@ pub(super) fn hand(machine: &Machine, model: &Model, pull: Pull) -> Box<dyn Scen
     Box::new(pull::Hand { on, pull })
 }
 
-/// The law of time that an element follows, of an angle if it `turns`.
+/// Time law that an element follows; an angle if it `turns`.
 fn law_of(drive: Option<&Drive>, turns: bool) -> Option<Arc<dyn Law>> {
     trajectory_of(drive?, turns).law().cloned()
 }

@@ -1,5 +1,5 @@
-//! Motor on a slide or a hinge: force or torque clamped to a limit of F + k (target - q) + d (target' - q'), q the joint's
-//! coordinate. Its work is a drive's.
+//! Motor on a slide or hinge. Its force or torque is F + k (target - q) + d (target' - q'), clamped to a limit, where q is the
+//! joint's coordinate. Its work counts as drive work.
 
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, law_of};
@@ -32,13 +32,13 @@ pub(super) fn make(motor: &machine::Motor, site: &Mount<'_>) -> Box<dyn SceneEle
 }
 
 impl Motor {
-    /// The motion that it is to follow.
+    /// Reference motion at `t`.
     fn target(&self, t: f64) -> Jet {
         let value = |law: &Arc<dyn Law>| law.at(t);
         self.target.as_ref().map_or_else(Jet::default, value)
     }
 
-    /// The coordinate from the target, and the force or torque on the child without the limit.
+    /// The coordinate relative to the target, and the unclamped force or torque on the child.
     fn at(&self, t: f64, motion: &[Kinematics]) -> (Place, f64) {
         let target = self.target(t);
         let place = self.on.place(target.value, motion);
@@ -46,7 +46,7 @@ impl Motor {
         (place, self.force - ahead)
     }
 
-    /// The same with the limit.
+    /// The same with the force or torque clamped.
     fn limited(&self, t: f64, motion: &[Kinematics]) -> (Place, f64) {
         let (place, force) = self.at(t, motion);
         (place, force.clamp(-self.limit, self.limit))

@@ -1,5 +1,5 @@
-//! A hand that pulls on a body: a spring and a damper between a point of the body and the hand. It is external to the
-//! scene, so all its work is external.
+//! Pulling hand: a spring and damper between a point of a body and the hand. The hand is outside the scene, so all its work is
+//! external.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,24 +8,24 @@ use crate::machine::{Machine, Vec3};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
-/// Natural frequency of all moving bodies together on the spring, Hz: soft enough for every method, and a few times the
-/// weight over the length of a hand movement.
+/// Natural frequency of the total moving mass on the spring, Hz: soft enough for every method, yet a hand movement yields a few
+/// times the weight.
 const FREQUENCY: f64 = 3.0;
 /// Damping ratio of that oscillation.
 const DAMPING: f64 = 0.3;
 
-/// Where the hand pulls, and how.
+/// A pull of the hand on a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pull {
     /// Body, by its index in the scene.
     pub body: usize,
-    /// Point of it, in its scene frame, m.
+    /// Point on the body, in its scene frame, m.
     pub point: Vec3,
-    /// Where the hand is, world axes, m.
+    /// Position of the hand, world axes, m.
     pub hand: Vec3,
-    /// N/m.
+    /// Spring stiffness, N/m.
     pub stiffness: f64,
-    /// Against the point's velocity, N s/m.
+    /// Damping of the point's absolute velocity, N s/m.
     pub damping: f64,
 }
 
@@ -35,14 +35,15 @@ pub(super) struct Hand {
 }
 
 impl Pull {
-    /// On `point` (m, scene frame) of body `body` of `scene`, as softly as suits the scene's masses; the hand is at `hand`, m.
+    /// A pull on `point` (m, scene frame) of body `body` by the hand at `hand` (m, world), with stiffness and damping from the
+    /// total mass.
     pub fn softly(machine: &Machine, body: usize, point: Vec3, hand: Vec3) -> Self {
         let mass: f64 = machine.bodies.iter().map(|body| body.mass).sum();
         let rate = std::f64::consts::TAU * FREQUENCY;
         Self { body, point, hand, stiffness: mass * rate * rate, damping: 2.0 * DAMPING * mass * rate }
     }
 
-    /// Its report for a given position, m, and velocity, m/s, of the point: from the hand to the point.
+    /// Report for a given position (m) and velocity (m/s) of the point, drawn from the hand to the point.
     pub fn report(&self, point: Vec3, velocity: Vec3) -> ElementReport {
         ElementReport {
             points: [self.hand, point],
@@ -53,14 +54,14 @@ impl Pull {
 }
 
 impl Hand {
-    /// Its report, the velocity of the point and its arm from the centroid.
+    /// Report, velocity of the point, and its arm from the centroid.
     fn at(&self, motion: &[Kinematics]) -> (ElementReport, Vec3, Vec3) {
         let (point, velocity, arm) = point_of(&self.on, motion);
         (self.pull.report(point, velocity), velocity, arm)
     }
 }
 
-// Soft by design: nothing that an implicit method has to linearise.
+// Soft by design: there is nothing for an implicit method to linearise.
 impl ForceElement for Hand {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let (report, _, arm) = self.at(at.motion);

@@ -1,5 +1,5 @@
-//! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt, or
-//! a curve over l - length in place of the first two, or what is left of it where it only pushes or only pulls.
+//! Spring and damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt. A curve
+//! over l - length may replace the first two terms, and the spring may act only in compression or only in tension.
 
 use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, point_of, push};
@@ -15,7 +15,7 @@ struct Spring {
     elastic: Elastic,
     damping: f64,
     side: SpringSide,
-    /// Over a step, of one that only pushes or only pulls: whether it does, whatever its length.
+    /// State of a one-sided spring frozen over a step, if any.
     held: Option<bool>,
 }
 
@@ -25,15 +25,15 @@ struct State {
     points: [Vec3; 2],
     /// Velocity of `to` relative to `from`, m/s.
     velocity: Vec3,
-    /// Distance of the points, m, and unit vector from `from` to `to`; zero where they coincide.
+    /// Distance between the points, m, and unit vector from `from` to `to`; zero if they coincide.
     length: f64,
     along: Vec3,
     rate: f64,
-    /// N, without the damper, as if it acted both ways.
+    /// Elastic tension, N, ignoring one-sidedness.
     elastic: f64,
-    /// N.
+    /// Total tension, N.
     tension: f64,
-    /// Whether it would act the other way, and does not.
+    /// Whether a one-sided spring is slack.
     slack: bool,
 }
 
@@ -62,7 +62,7 @@ impl Spring {
         let both = elastic + self.damping * rate;
         let tension = match self.held {
             Some(true) => both,
-            // Where the spring has let go, its damper has, too.
+            // When the spring is slack, its damper is, too.
             None if self.side.of(elastic) == elastic => self.side.of(both),
             _ => 0.0,
         };
@@ -99,7 +99,7 @@ impl ForceElement for Spring {
         }
         let stiffness = self.elastic.stiffness(s.length - self.length);
         if s.length == 0.0 {
-            // A bushing resists separation in any direction; otherwise the direction, and with it the force, jumps here.
+            // A bushing resists separation in any direction; otherwise the direction, and hence the force, is discontinuous here.
             let bush = self.length == 0.0 && s.elastic == 0.0;
             let by_displacement = Mat3::identity() * -stiffness;
             return bush.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));
@@ -127,7 +127,7 @@ impl ForceElement for Spring {
 }
 
 impl SceneElement for Spring {
-    /// Of one that only pushes or only pulls: its elastic force, and that with the damper's.
+    /// For a one-sided spring: its elastic force, and the smaller of that and the total force with the damper.
     fn pressed(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let sign = match self.side {
             SpringSide::Both => return None,

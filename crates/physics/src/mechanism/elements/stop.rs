@@ -1,8 +1,8 @@
 //! Stops of a slide or a hinge: F = K d^1.5 (1 + a dd/dt), never below 0, d the depth of the coordinate beyond a limit.
 //!
-//! This is the contact law of a joint with one difference: the damping term there divides the rate by that at which the contact
-//! began, which takes a memory; here by a given speed, a = chi / speed. An undisturbed impact at that speed rebounds with the
-//! requested restitution, whatever moves; a slower one with more.
+//! This is the contact law of a joint with one difference. There the damping term divides the rate by the approach speed, which
+//! needs a contact state; here it divides by a given speed, a = chi / speed. An undisturbed impact at that speed rebounds with
+//! the requested restitution, whatever the masses; a slower one rebounds with more.
 
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement};
@@ -14,26 +14,26 @@ use crate::mechanism::model::Anchor;
 
 struct Stop {
     on: Coordinate,
-    /// Between the limits, or the only one: a hinge is taken within half a turn of it.
+    /// Midpoint of the limits, or the only limit. The angle of a hinge is taken within half a turn of it.
     middle: f64,
-    /// From there, m or rad; infinite where there is none.
+    /// Limits relative to `middle`, m or rad; infinite if absent.
     lower: f64,
     upper: f64,
-    /// At which it exerts the force given, m or rad.
+    /// Depth at which the stop exerts the given force, m or rad.
     depth: f64,
     /// K, N/m^1.5 or N m/rad^1.5.
     stiffness: f64,
     /// a, s/m or s/rad.
     damping: f64,
-    /// Over a step: whether it presses, wherever the coordinate is.
+    /// Contact state frozen over a step, if any.
     held: Option<bool>,
 }
 
-/// A stop that is touched.
+/// A stop in contact.
 struct Press {
     /// 1 at the upper limit, -1 at the lower.
     side: f64,
-    /// d and its rate.
+    /// d, m or rad, and its rate.
     depth: f64,
     rate: f64,
     /// K d^1.5 and F, N or N m.
@@ -62,7 +62,7 @@ pub(super) fn make(stop: &machine::Stop, site: &Mount<'_>) -> Box<dyn SceneEleme
 }
 
 impl Stop {
-    /// The coordinate, and the stop that it touches.
+    /// The coordinate, and the stop in contact, if any.
     fn at(&self, motion: &[Kinematics]) -> (Place, Option<Press>) {
         let place = self.on.place(self.middle, motion);
         let press = self.nearest(&place);
@@ -70,14 +70,14 @@ impl Stop {
         (place, touches.then_some(press))
     }
 
-    /// The nearer stop as if it were touched.
+    /// The nearer stop as if in contact.
     fn nearest(&self, place: &Place) -> Press {
         let [above, below] = [place.off - self.upper, self.lower - place.off];
         let (side, depth) = if above > below { (1.0, above) } else { (-1.0, below) };
         let rate = side * place.rate;
         let elastic = self.stiffness * depth * depth.abs().sqrt();
         let force = elastic * (1.0 + self.damping * rate);
-        // Held, it follows its law smoothly beyond the edge at which the step then ends.
+        // A frozen stop follows its law smoothly beyond the edge, where the step then ends.
         let force = if self.held.is_some() { force } else { force.max(0.0) };
         Press { side, depth, rate, elastic, force }
     }
@@ -114,7 +114,7 @@ impl ForceElement for Stop {
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let (place, press) = self.at(motion);
         let nearest = self.nearest(&place);
-        // Where it has let go, what it still stores is lost as it comes out.
+        // Energy stored when contact is lost is dissipated as the stop recovers.
         let let_go = nearest.depth > 0.0 && 1.0 + self.damping * nearest.rate <= 0.0;
         let elastic = if let_go || press.is_some() { nearest.elastic } else { 0.0 };
         powers.damping += (press.map_or(0.0, |press| press.force) - elastic) * nearest.rate;
@@ -122,7 +122,7 @@ impl ForceElement for Stop {
 }
 
 impl SceneElement for Stop {
-    /// Where it is left faster than it can follow it lets go: d (1 + a dd/dt).
+    /// Contact is lost where d (1 + a dd/dt) falls to 0.
     fn pressed(&self, _: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let Press { depth, rate, .. } = self.nearest(&self.on.place(self.middle, motion));
         Some([depth, depth.min(depth * (1.0 + self.damping * rate))])

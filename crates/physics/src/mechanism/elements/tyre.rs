@@ -1,6 +1,5 @@
-//! Tyre of a wheel on a ground that moves up and down: F = k d + c dd/dt along `up` at the wheel's centre while it is
-//! pressed in by d = height of the ground + radius - height of the centre, never below 0. The work of the moving ground is a
-//! drive's.
+//! Tyre on a ground that moves up and down. The force at the wheel centre is F = k d + c dd/dt along `up`, never below 0, while
+//! the deflection d = ground height + radius - centre height is positive. The work of the moving ground counts as drive work.
 
 use std::sync::Arc;
 
@@ -13,14 +12,14 @@ use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
 struct Tyre {
-    /// The wheel's centre.
+    /// Wheel centre.
     on: Anchor,
     up: Vec3,
     radius: f64,
     stiffness: f64,
     damping: f64,
     ground: Option<Arc<dyn Law>>,
-    /// Over a step: whether it presses, wherever the wheel is.
+    /// Contact state frozen over a step, if any.
     held: Option<bool>,
 }
 
@@ -28,12 +27,12 @@ struct Tyre {
 struct State {
     centre: Vec3,
     arm: Vec3,
-    /// Height of the ground along `up`, m.
+    /// Ground height along `up`, m.
     ground: Jet,
-    /// d, below 0 above the ground, m, and its rate.
+    /// Deflection d, m, negative above the ground, and its rate, m/s.
     depth: f64,
     rate: f64,
-    /// N; not above 0 where it has let go.
+    /// Force, N; zero or negative once contact is lost.
     force: f64,
 }
 
@@ -56,7 +55,7 @@ impl Tyre {
         let ground = self.ground.as_ref().map_or_else(Jet::default, height);
         let depth = ground.value + self.radius - self.up.dot(&centre);
         let rate = ground.rate - self.up.dot(&velocity);
-        // Where the spring has let go, its damper has, too.
+        // Once the spring has lost contact, the damper has, too.
         let force = self.stiffness * depth + self.damping * rate;
         let force = match self.held {
             Some(true) => force,
@@ -75,7 +74,7 @@ impl ForceElement for Tyre {
     }
 
     fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
-        // What it presses on is where the centre is, but stays with the world, the last of the bodies.
+        // The reaction acts at the wheel centre's current position, but on the world, which is the last body.
         let world = Anchor { body: motion.len() - 1, offset: point_of(&self.on, motion).0 };
         Some([world, self.on])
     }
@@ -117,7 +116,7 @@ impl SceneElement for Tyre {
         self.ground.as_ref().map_or(f64::INFINITY, end)
     }
 
-    /// It lets go where k d + c dd/dt falls to 0.
+    /// Contact is lost where k d + c dd/dt falls to 0.
     fn pressed(&self, t: f64, motion: &[Kinematics]) -> Option<[f64; 2]> {
         let s = self.at(t, motion);
         Some([s.depth, s.depth.min(self.stiffness * s.depth + self.damping * s.rate)])
@@ -127,7 +126,7 @@ impl SceneElement for Tyre {
         self.held = presses;
     }
 
-    /// From the ground below the centre to that.
+    /// From the ground below the wheel centre to the centre.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.at(t, motion);
         let above = self.up.dot(&s.centre) - s.ground.value;

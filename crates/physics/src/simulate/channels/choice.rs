@@ -1,4 +1,4 @@
-//! Choosing what is recorded, by name.
+//! Selection of channels by name.
 
 use std::collections::BTreeSet;
 
@@ -8,10 +8,10 @@ use crate::machine::Machine;
 use crate::simulate::Frame;
 use crate::suggest::nearest;
 
-/// Place of the signals that `run` writes only if asked for: behind all others.
+/// Place of the signals that `run` writes only on request: after all others.
 const ASKED: u8 = u8::MAX;
 
-/// A channel that rows of a scene can have.
+/// A channel available in the rows of a scene.
 #[derive(Clone, Debug)]
 pub struct Listed {
     /// Its name: parts separated by dots, such as `S1.force.x`.
@@ -20,15 +20,15 @@ pub struct Listed {
     pub column: String,
     /// SI unit; empty for a code.
     pub unit: &'static str,
-    /// What it is.
+    /// Description.
     pub help: &'static str,
-    /// Whether `run` writes it unasked.
+    /// Whether `run` writes it by default.
     pub unasked: bool,
     pub(super) reading: Reading,
 }
 
 impl Listed {
-    /// Its name without its component along an axis.
+    /// Its name without the component.
     pub fn group(&self) -> &str {
         match self.name.rsplit_once('.') {
             Some((group, "x" | "y" | "z" | "alpha" | "beta" | "gamma")) => group,
@@ -36,12 +36,12 @@ impl Listed {
         }
     }
 
-    /// Whether `pattern` matches its name, the beginning of that up to a dot, or its column.
+    /// Whether `pattern` matches its name, a prefix of the name that ends before a dot, or its column.
     pub fn is_chosen_by(&self, pattern: &str) -> bool {
         self.names().any(|name| matches(pattern, name)) || matches(pattern, &self.column)
     }
 
-    /// Its name, then without its last part, and so on.
+    /// Its name, then the name without its last part, and so on.
     fn names(&self) -> impl Iterator<Item = &str> {
         let cuts = self.name.rmatch_indices('.').map(|(dot, _)| dot);
         [self.name.len()].into_iter().chain(cuts).map(|end| &self.name[..end])
@@ -58,7 +58,7 @@ pub struct NoChannel {
     near: String,
 }
 
-/// Every channel of `scene` in order: the columns that `run` writes unasked, then the others. `first` as in
+/// Every channel of `machine` in order: the columns that `run` writes by default, then the others. `first` as in
 /// [`run_columns`](super::run_columns).
 pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<Listed> {
     let (mut list, mut names, mut columns) = (Vec::new(), BTreeSet::new(), BTreeSet::new());
@@ -67,10 +67,10 @@ pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<Listed> {
         known.then(|| signal.run.unwrap_or(ASKED))
     };
     lay_out(machine, Some(first), usize::MAX, place, |found| {
-        // A term that plots always show and rows only of some scenes has two signals.
+        // A term shown in every plot but only in the rows of some scenes has two signals.
         if names.insert(found.name.clone()) {
             let mut column = found.column;
-            // A part may have a name that makes of its column one of the output body's, such as a joint `alpha`.
+            // A part's name may make its column clash with one of the output body, as with a joint `alpha`.
             while !columns.insert(column.clone()) {
                 column.insert_str(0, "part_");
             }
@@ -87,8 +87,8 @@ pub fn channels_of(machine: &Machine, first: &Frame) -> Vec<Listed> {
     list
 }
 
-/// Columns of the rows of `run` with the time and the channels that match one of `patterns`, in the order of
-/// [`channels_of`], each with its name and where it is read. In patterns `*` stands for any characters, `?` for one.
+/// Names and readings of the time and of the channels that match one of `patterns`, in the order of [`channels_of`]. In patterns,
+/// `*` matches any characters and `?` exactly one.
 ///
 /// # Errors
 /// A pattern without a match.
@@ -110,7 +110,7 @@ pub fn chosen_columns(
     Ok(list.iter().filter(chosen).map(|channel| (channel.column.clone(), channel.reading)).unzip())
 }
 
-/// Units by the ends of column names, the longer first.
+/// Units by column-name suffix, longer suffixes first.
 const UNITS: [(&str, &str); 10] = [
     ("_rad_s2", "rad/s2"),
     ("_rad_s", "rad/s"),
@@ -134,7 +134,7 @@ fn unit_of(column: &str) -> &'static str {
 fn matches(pattern: &str, name: &str) -> bool {
     let (pattern, name) = (pattern.as_bytes(), name.as_bytes());
     let (mut p, mut n) = (0, 0);
-    // Behind the latest `*`: where the pattern goes on, and the end of what the `*` stands for.
+    // After the latest `*`: the next pattern position, and the end of the text that the `*` matches.
     let mut star = None;
     while n < name.len() {
         match pattern.get(p) {

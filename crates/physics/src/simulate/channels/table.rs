@@ -1,5 +1,5 @@
-//! The single table of what is read from a frame: names in plots and in files, and how each value is read. Plots, their
-//! tooltips, saved records and the rows of `run` are all derived from it.
+//! The single table of frame quantities: their names in plots and files, and how each is read. Plots, their tooltips, saved
+//! records and the rows of `run` are all derived from it.
 
 use Quantity as Q;
 use Take::{
@@ -44,20 +44,20 @@ struct Plot {
     help: &'static str,
 }
 
-/// What a plot shows of its channels.
+/// How a plot shows its channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlotKind {
-    /// A curve of each, over whatever range they have.
+    /// One curve per channel, over their range.
     Curves,
-    /// The same over a range that begins at zero: none is ever negative.
+    /// Curves over a range that begins at zero: no value is ever negative.
     FromZero,
-    /// The same with the clearances of the joints.
+    /// As `FromZero`, with the clearances of the joints.
     FromZeroWithClearances,
     /// Bands stacked on both sides of zero.
     Bands,
 }
 
-/// Words for the plots of a window, in the order in which it lists them.
+/// Words for the plots in scene files and links, in list order.
 pub const PLOT_WORDS: [&str; 16] = [
     "normal-force",
     "friction-force",
@@ -228,7 +228,7 @@ impl Quantity {
         self.plot().unit
     }
 
-    /// What its plot shows of its channels.
+    /// How its plot shows the channels.
     pub fn kind(self) -> PlotKind {
         self.plot().kind
     }
@@ -238,68 +238,67 @@ impl Quantity {
         self.plot().help
     }
 
-    /// Whether this member of [`Self::EnergyBalance`] takes or stores energy; the others supply it. All of them sum to
-    /// zero.
+    /// Whether this member of [`Self::EnergyBalance`] takes or stores energy; the others supply it. All members sum to zero.
     pub fn takes(member: &str) -> bool {
         TABLE.iter().any(|signal| matches!(signal.take, Taken(own, _) if own == member))
     }
 }
 
-/// How a signal is read from a frame (SI units, world axes), and what it is repeated for.
+/// How a signal is read from a frame (SI units, world axes), and for which parts it is repeated.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Take {
-    /// A single value; with its member name in the plot.
+    /// A single value, with its member name in the plot.
     Whole(&'static str, fn(&Frame) -> f64),
-    /// Of the output body, along x, y, z.
+    /// Vector of the output body: x, y, z.
     Axes(fn(&Pose) -> Vec3),
-    /// Of the output body, by alpha, beta, gamma.
+    /// Angles of the output body: alpha, beta, gamma.
     Angles(fn(&Pose) -> Vec3),
-    /// Of each body, along x, y, z.
+    /// Vector of each body: x, y, z.
     BodyAxes(fn(&BodyMotion) -> Vec3),
-    /// The same of each but the output body.
+    /// Vector of each body except the output body: x, y, z.
     OtherAxes(fn(&BodyMotion) -> Vec3),
-    /// Of each body but the output body, by alpha, beta, gamma.
+    /// Angles of each body except the output body: alpha, beta, gamma.
     OtherAngles(fn(&Pose) -> Vec3),
-    /// Of each sliding joint: its coordinate, or the rate of that.
+    /// Coordinate (0) or rate (1) of each sliding joint.
     SlideCoordinate(usize),
-    /// The same of each turning joint, and of the angle of a joint that slides, too.
+    /// Angle (0) or rate (1) of each turning joint; the angle also of a joint that both slides and turns.
     HingeCoordinate(usize),
-    /// The rate of that angle.
+    /// Angular rate of a joint that both slides and turns.
     TurnRate,
-    /// The same of a universal joint about its axis in the parent, and about that in the child.
+    /// Angle (0) or rate (1) of a universal joint: about its axis in the parent, then about the one in the child.
     FirstTurn(usize),
     SecondTurn(usize),
-    /// Of each joint that holds its child: the force on that, or the torque, along x, y, z.
+    /// Force (0) or torque (1) of each fixed, sliding or turning joint on its child: x, y, z.
     Reaction(usize),
-    /// Of each joint that closes a loop, from force and torque on its child, along x, y, z.
+    /// Vector of each loop-closing joint, from force and torque on its child: x, y, z.
     Closing(fn(&[Vec3; 2]) -> Vec3),
-    /// Of each ball joint.
+    /// Value of each ball joint.
     Joint(fn(&JointReport) -> f64),
-    /// Of each ball joint, along x, y, z.
+    /// Vector of each ball joint: x, y, z.
     JointAxes(fn(&JointReport) -> Vec3),
-    /// Actuator of each driven slide.
+    /// Actuator force of each driven slide.
     Slide,
-    /// Actuator of each driven hinge.
+    /// Actuator torque of each driven hinge.
     Hinge,
-    /// Actuator of each other driven angle: about the axis in the parent, and about that in the child.
+    /// Actuator torque of each other driven angle: about the axis in the parent, then about the one in the child.
     Turn,
     ChildTurn,
     /// A term of the energy balance that supplies energy, with its member name.
     Given(&'static str, fn(&Ledger) -> f64),
     /// A term that takes or stores energy.
     Taken(&'static str, fn(&Ledger) -> f64),
-    /// Along x, y, z.
+    /// Error of the probe tip: x, y, z.
     ProbeError,
-    /// Of each force element that reports it, along x, y, z.
+    /// Vector of each force element that reports it: x, y, z.
     Element(fn(&ElementReport) -> Option<Vec3>),
-    /// Of each force element between two points.
+    /// Value of each force element between two points.
     ElementValue(fn(&ElementReport) -> f64),
 }
 
-/// What a signal is repeated for.
+/// Parts for which a signal is repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Each {
-    /// Nothing: there is one.
+    /// Not repeated.
     Once,
     /// The output body alone.
     Output,
@@ -307,7 +306,7 @@ pub(super) enum Each {
     Body,
     /// Coordinates of joints that slide or turn.
     Coordinate,
-    /// These and fixed ones.
+    /// Sliding, turning and fixed joints.
     Holding,
     /// Joints that close loops.
     Closing,
@@ -319,7 +318,7 @@ pub(super) enum Each {
     Element,
 }
 
-/// Names of a signal's components: in plots, and in columns.
+/// Names of a signal's components, in plots and in columns.
 pub(super) type Components = &'static [(&'static str, &'static str)];
 
 impl Take {
@@ -393,13 +392,13 @@ pub(super) struct Signal {
     pub name: &'static str,
     /// Column name in files, with the SI unit, by the same rule.
     pub column: &'static str,
-    /// What it is.
+    /// Description.
     pub help: &'static str,
     /// Plot that shows it.
     pub plot: Option<Quantity>,
-    /// Place in the rows of `run`, lowest first; without one it is written only if asked for. Signals of the same place
-    /// keep the order of the table, part by part where they are repeated. Readers also rely on column positions: append new
-    /// columns at the end.
+    /// Place in the rows of `run`, lowest first; a signal without one is written only on request. Signals with the same place are
+    /// in table order, part by part where they are repeated. Readers also rely on column positions: append new columns at the
+    /// end.
     pub run: Option<u8>,
     /// How it is read.
     pub take: Take,
@@ -407,17 +406,17 @@ pub(super) struct Signal {
     pub of_elements: bool,
 }
 
-/// A signal in neither plots nor the rows that `run` writes unasked.
+/// A signal in no plot, written by `run` only on request.
 const fn asked(name: &'static str, column: &'static str, take: Take, help: &'static str) -> Signal {
     Signal { name, column, help, plot: None, run: None, take, of_elements: false }
 }
 
-/// The same shown in a plot.
+/// The same signal, shown in a plot.
 const fn plotted(plot: Quantity, signal: Signal) -> Signal {
     Signal { plot: Some(plot), ..signal }
 }
 
-/// The same among the columns of `run`.
+/// The same signal, among the default columns of `run`.
 const fn listed(place: u8, signal: Signal) -> Signal {
     Signal { run: Some(place), ..signal }
 }
@@ -474,7 +473,7 @@ pub(super) const TABLE: &[Signal] = &[
     plotted(Q::EnergyBalance, asked("energy.elastic_change", "elastic_change_J", Taken("elastic", |ledger| ledger.elastic_change), "change of the elastic energy since the start")),
     both(Q::EnergyBalance, 11, asked("energy.residual", "energy_residual_J", Given("residual", Ledger::residual), "error of the integration: energy that came from nowhere since the start")),
 
-    // Supplied by whoever computes the ideal motion alongside the run.
+    // Supplied by the code that computes the ideal motion alongside the run.
     plotted(Q::TipError, asked("", "tip_error_m", Whole("distance", |_| f64::NAN), "")),
     both(Q::ProbeError, 9, asked("probe_error.#", "probe_error_#_m", ProbeError, "probe tip from where the ideal mechanism has it")),
 
@@ -512,7 +511,7 @@ pub(super) const TABLE: &[Signal] = &[
     asked("@.length", "@_length_m", ElementValue(|element| (element.points[1] - element.points[0]).norm()), "distance of the element's points"),
 ];
 
-/// Name of the time, which every row begins with.
+/// Channel name of the time, the first column of every row.
 pub(super) const TIME: &str = "time";
 
 /// Code of a contact state in files.

@@ -1,4 +1,4 @@
-//! Steps whose size follows the error estimate, cut at the first contact start or end inside them.
+//! Steps whose size follows the error estimate, truncated at the first contact start or end inside them.
 
 use super::automatic::STABILITY_LIMIT;
 use super::corners::LawBranch;
@@ -11,27 +11,27 @@ use crate::simulate::{StopAdvice, StopFault, Stopped};
 
 /// Shortest first step after a contact begins, s.
 const SHORTEST_FIRST: f64 = 1e-9;
-/// From this tolerance on a step that is cut at an event ends on the interpolant, whose error is about the estimate; with
-/// tighter ones it is repeated, which costs little beside their many steps.
+/// At this tolerance or a looser one, a step truncated at an event ends on the interpolant, whose error is about the estimate. At
+/// tighter ones it is repeated, which adds little to their many steps.
 const END_ON_INTERPOLANT: f64 = 1e-5;
-/// What the explicit member of the automatic choice may err by where the tolerance is looser: it takes the steps through impacts,
-/// which decide all that follows and are few beside those in lasting contact.
+/// Loosest tolerance of the automatic method's explicit scheme. It takes the steps through impacts, which determine all later
+/// motion and are few compared with those in lasting contact.
 const OF_IMPACTS: f64 = 1e-5;
-/// The same over an explicit step in which a stop presses, as a fraction: its force grows with d^1.5, whose slope begins with a
-/// vertical tangent. How the motion after an impact depends on that before it, which exponents go by, errs by much more than the
-/// motion itself.
+/// Factor on the allowed error of an explicit step in which a stop presses: its force grows with d^1.5, whose slope begins with a
+/// vertical tangent. The sensitivity of the motion after an impact to the motion before it, which determines exponents, has a
+/// much larger error than the motion itself.
 const WHILE_PRESSED: f64 = 0.001;
-/// Least and largest factor for the next try after one whose iteration failed.
+/// Smallest and largest step-size factor after an attempt whose iteration failed.
 const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
-/// An error so many times the allowed one is no matter of accuracy: the step was unstable.
+/// Ratio of error to allowed error beyond which the step was unstable, not merely inaccurate.
 const BLOWN_UP: f64 = 100.0;
 
-/// The step that one was before an event cut it.
+/// A step as it was before an event truncated it.
 #[derive(Clone, Copy)]
 pub(super) struct Whole {
     /// s.
     size: f64,
-    /// It was repeated to its end; otherwise it ended on its interpolant.
+    /// Whether it was repeated to end at the event; otherwise it ended on its interpolant.
     repeated: bool,
 }
 
@@ -47,7 +47,7 @@ struct SignedGap {
 }
 
 impl Simulation {
-    /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
+    /// Takes a step whose size follows the error estimate, truncated at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
         self.choose_flights(limit);
         self.stepper.choose(self.state.control.member);
@@ -84,7 +84,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Scaled error that a step may have.
+    /// Largest scaled error of an acceptable step.
     fn allowed_error(&self) -> f64 {
         let solver = &self.machine.solver;
         let allowed = match (solver.method, self.state.control.member) {
@@ -95,7 +95,8 @@ impl Simulation {
         if presses { WHILE_PRESSED * allowed } else { allowed }
     }
 
-    /// One attempt at a step with its event; `None` if it must be repeated with the smaller `h_next` it has set.
+    /// Attempts a step and locates its first event. Returns its end and size, s, or `None` if it must be repeated with the new
+    /// `h_next`.
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.now.t;
         let tolerance = self.machine.solver.tolerance;
@@ -137,7 +138,7 @@ impl Simulation {
         self.finish_gaps(t_end);
         let event = self.first_event(h);
         let corner = self.first_corner(h);
-        // Beside another run it ends where that did, as that, but for an event of its own before.
+        // A step that follows another run ends where and how that run's step did, unless an event of its own comes first.
         let last = beside.map(|whole| ((limit - t) / h, whole.repeated));
         let before_last = |theta: f64| last.is_none_or(|(last, _)| theta < last);
         let event = event.filter(|theta| before_last(*theta));
@@ -148,7 +149,7 @@ impl Simulation {
             && corner.is_at_start()
             && !self.attempt.turned
         {
-            // Retry once on the other piece; if that leads back here, this piece is as good.
+            // Retry once on the other branch; if that leads back here, either branch will do.
             self.attempt.turned = true;
             corner.next.put(&mut self.state.now.memory[corner.joint]);
             self.stepper.invalidate();
@@ -159,7 +160,7 @@ impl Simulation {
         let corner = corner.filter(|corner| !corner.is_at_start());
         let edge = self.first_edge(h);
         if edge.is_some_and(|theta| theta < edges::AT_START) {
-            // It was passed at the start: the step is repeated on the other side.
+            // The edge was passed at the start: repeat the step on the other side.
             self.state.control.h_next = asked;
             self.state.control.contact_began = contact_began;
             return None;
@@ -174,7 +175,7 @@ impl Simulation {
             self.attempt.whole = Some(Whole { size: h, repeated: false });
             h *= theta;
         } else if let Some(corner) = corner {
-            // The whole step worked; a rate that stops rising soon after the contact began is no evidence against it.
+            // The full step worked; a rate that stops rising soon after contact onset is no evidence against its size.
             if contact_began && matches!(corner.next, LawBranch::Approach(_)) {
                 self.state.control.h_contact = next.max(SHORTEST_FIRST);
             }
@@ -200,7 +201,7 @@ impl Simulation {
                 self.attempt.whole = Some(Whole { size: h, repeated: false });
                 return Some((t_end, h * theta));
             }
-            // Repeated, shortened, so that its end carries the method's error and not the interpolant's.
+            // Repeat the step, shortened, so that its end has the error of the method and not that of the interpolant.
             self.attempt.whole = Some(Whole { size: h, repeated: true });
             if event.is_some() {
                 h *= theta;
@@ -239,7 +240,7 @@ impl Simulation {
         first
     }
 
-    /// Where joint `j` leaves the contact state in its memory, as a fraction of the step just attempted.
+    /// Fraction of the step just attempted at which joint `j` leaves its recorded contact state.
     fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         // Positive where the gap contradicts the recorded contact state.
@@ -264,11 +265,11 @@ impl Simulation {
             }
             left = right;
         }
-        // In the wrong state throughout: it switches at the end of the step.
+        // The state is wrong throughout: it switches at the end of the step.
         None
     }
 
-    /// Two points within an interval of the step that bracket the signed gap turning positive.
+    /// Two points within an interval of the step between which the signed gap turns positive.
     fn crossing_within(
         &mut self,
         j: usize,
@@ -277,7 +278,7 @@ impl Simulation {
         left: SignedGap,
         right: SignedGap,
     ) -> Option<(SignedGap, SignedGap)> {
-        // At 0 a piece may end, and the next one begins: the gap opens or closes in the latter.
+        // A gap of exactly 0 may end one interval and begin the next; the crossing belongs to the latter.
         if left.gap <= 0.0 && right.gap > 0.0 {
             return Some((left, right));
         }

@@ -1,4 +1,4 @@
-//! Which member of the automatic choice steps: the explicit one through impacts, the implicit one once contacts have settled.
+//! Choice of scheme in the automatic method: explicit through impacts, implicit once contacts have settled.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,35 +9,36 @@ use crate::simulate::stepper::ActiveScheme;
 
 /// h |lambda| beyond which an explicit step is limited by stability.
 pub(super) const STABILITY_LIMIT: f64 = 3.0;
-/// Steps that must be limited by stability, or taken since the latest contact began, before the implicit method is tried.
+/// Stability-limited steps before the implicit scheme is tried.
 const LIMITED_STEPS: u32 = 8;
-/// Steps that must be limited by stability before friction is tried as the cause.
+/// Stability-limited steps before friction is tried as the cause.
 const LIMITED_BEFORE_FRICTION: u32 = 2;
+/// Steps since the latest contact began before the implicit scheme is tried.
 const SETTLED_STEPS: u32 = 60;
-/// Over a trial of a member its progress per cost must be this many times that of the steps before it; otherwise it has to wait
-/// for explicit steps that cost this many times as much as the trial, twice as many after each consecutive failed trial, at most
-/// so many times.
+/// A scheme passes its trial if its progress per cost is at least `WORTH_IT` times that of the steps before. Otherwise it waits
+/// for explicit steps that cost `EXPLICIT_TURN` times as much as the trial; each consecutive failure doubles the wait, up to
+/// `MOST_DOUBLINGS` times.
 const WORTH_IT: f64 = 0.7;
 const EXPLICIT_TURN: f64 = 2.5;
 const MOST_DOUBLINGS: u32 = 3;
-/// A trial of the implicit member lasts so many steps, or until something strikes.
+/// Steps in a trial of the implicit scheme, unless an impact ends it.
 const TRIAL_STEPS: u32 = 24;
-/// The first of them, in which the step still grows, do not count once there are as many.
+/// Initial trial steps that do not count once they are complete, because the step size is still growing.
 const GROWING_STEPS: u32 = 4;
-/// One of friction's lasts so many, or until friction limits no more.
+/// Steps in a trial of the friction scheme, unless friction stops limiting the step size before.
 const FRICTION_STEPS: u32 = 8;
-/// It is on trial at tolerances below this: its order is lower than the explicit one's, and its steps may be shorter there.
+/// Tolerance below which the friction scheme is on trial: its lower order may make its steps shorter than explicit ones.
 const TRIED_BELOW: f64 = 2e-6;
-/// Longest of its steps, times the angular frequency at which a ball rings on its wall: that is explicit, and at loose tolerances
-/// longer steps keep it up.
+/// Longest step of the friction scheme times the angular frequency at which a ball rings on its wall: the normal force is
+/// explicit, and at loose tolerances longer steps sustain the ringing.
 const RINGING: f64 = 1.5;
-/// How much of the progress and cost of the explicit methods counts a step later.
+/// Decay per step of the recorded progress and cost of the explicit schemes.
 const KEPT: f64 = 0.95;
-/// Cost of a step beside evaluations and algebra (events, peaks, energies), and of an explicit step in all, in evaluations.
+/// Cost of a step besides evaluations and algebra (events, peaks, energies), and total cost of an explicit step, in evaluations.
 const STEP_COST: f64 = 6.0;
 const EXPLICIT_COST: f64 = STEP_COST + 6.0;
 
-/// A member's steps on trial, and what became of earlier trials.
+/// Steps of a scheme on trial, and the outcome of earlier trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Trial {
     /// Time, s, cost, in evaluations, and number of its steps.
@@ -46,7 +47,7 @@ struct Trial {
     steps: u32,
     /// Consecutive failed trials.
     failures: u32,
-    /// Explicit steps before the next one.
+    /// Explicit steps before the next trial.
     wait: u32,
 }
 
@@ -57,7 +58,7 @@ impl Trial {
         self.steps += 1;
     }
 
-    /// Ends it; whether it failed, beside steps with this progress per cost.
+    /// Ends the trial; returns whether it failed against earlier steps with the progress per cost `before`.
     fn conclude_trial(&mut self, before: f64) -> bool {
         let fails = self.progress < WORTH_IT * before * self.cost;
         if fails {
@@ -87,7 +88,7 @@ pub(super) struct SchemeSelector {
     /// Time, s, and cost, in evaluations, of the latest steps other than implicit ones.
     explicit_progress: f64,
     explicit_cost: f64,
-    /// Of friction's member, and of the implicit one.
+    /// Trials of the friction scheme and of the implicit one.
     friction: Trial,
     implicit: Trial,
 }
@@ -100,8 +101,8 @@ impl SchemeSelector {
 }
 
 impl Simulation {
-    /// Lets the implicit member take the first steps where balls touch from the start, without a law that damps them: explicit
-    /// steps hold their ringing at a multiple of the tolerance, from which the implicit ones would have to follow it.
+    /// Starts with the implicit scheme if balls touch from the start and their laws have no damping: explicit steps would sustain
+    /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
     pub(super) fn choose_first_member(&mut self) {
         let Self { mechanism, machine, state, .. } = self;
         let touching = || state.now.memory.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
@@ -117,7 +118,7 @@ impl Simulation {
         }
     }
 
-    /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
+    /// Chooses the scheme of the next step, after one of size `h` that took `evaluations` evaluations.
     pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
         let before = self.state.control.member;
         if before == ActiveScheme::Friction {
@@ -134,12 +135,13 @@ impl Simulation {
     fn put_member(&mut self, member: ActiveScheme) {
         self.state.control.member = member;
         self.state.control.controller = controller_of(Method::Automatic, member);
-        // Corners are located by those that have an interpolant of their own.
+        // Only schemes with their own interpolant locate corners.
         self.freeze_branches(false);
         self.stepper.invalidate();
     }
 
-    /// After an explicit step that blew up: whether friction on its ramp may be the cause, and now steps implicitly.
+    /// After an unstable explicit step: switches to the friction scheme if friction on its ramp may be the cause; returns whether
+    /// it did so.
     pub(super) fn try_friction_scheme(&mut self) -> bool {
         let touches = self.state.now.memory.iter().any(|m| m.active);
         let turns = self.machine.solver.method == Method::Automatic
@@ -192,7 +194,7 @@ impl Simulation {
                 (trial.progress, trial.cost) = (0.0, 0.0);
             }
             if trial.steps >= TRIAL_STEPS && trial.conclude_trial(before) {
-                // That step may have been cut at an event to next to nothing.
+                // An event may have truncated that step to almost nothing.
                 state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
                 return ActiveScheme::Explicit;
             }
@@ -204,7 +206,7 @@ impl Simulation {
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
         if member == ActiveScheme::Friction {
-            // It costs more than an explicit step, which must be as much shorter.
+            // A friction step costs more than an explicit one, so it must be longer in proportion.
             let dearer = 1.0 + algebra / EXPLICIT_COST;
             let over = self.mechanism.friction_rate() * h < STABILITY_LIMIT * dearer;
             let ends = over || choice.friction.steps >= FRICTION_STEPS;
@@ -254,7 +256,7 @@ pub(super) fn controller_of(method: Method, member: ActiveScheme) -> Controller 
     })
 }
 
-/// Allocates what an implicit method needs.
+/// Allocates the workspace of an implicit method.
 pub(super) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
     let velocities = mechanism.dimension() - mechanism.positions();
     if mechanism.is_kinematic() {
@@ -271,7 +273,7 @@ pub(super) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Res
         mechanism.prepare_linearisation();
     }
     if method == Method::Automatic {
-        // Where they couple too widely, without it.
+        // If contacts couple too widely, the method does without the friction scheme.
         let _ = mechanism.prepare_friction();
     }
     Ok(())

@@ -6,13 +6,13 @@ use crate::contact::{Coefficients, Memory, Separation};
 use crate::machine::least_impact_steps;
 use crate::simulate::peaks::PenetrationCubic;
 
-/// Deepest penetration, as a fraction of the clearance, of a ball that is at its wall but for rounding.
+/// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
 const AT_WALL: f64 = 1e-9;
 
-/// What pushes a ball whose motion before its contact is not known, m/s^2.
+/// Push on a ball whose motion before the contact is unknown, m/s^2.
 const UNKNOWN: f64 = f64::MAX;
 
-/// What the end of a step changed in the contact memory.
+/// Changes in the contact memory at the end of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Switched {
     /// A contact began or ended.
@@ -22,8 +22,8 @@ pub(super) struct Switched {
 }
 
 impl State {
-    /// Records that contact `j` begins at `time` with the penetration rate `rate` (m/s), which changed at `push` (m/s^2)
-    /// before, and the restitution `asked`; returns its memory.
+    /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2), and
+    /// restitution setting `asked`; returns its memory.
     fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, asked: f64, coefficients: &Coefficients) -> Memory {
         let among_others = self.now.memory.iter().any(|m| m.active);
         self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others);
@@ -57,8 +57,8 @@ impl State {
 }
 
 impl Simulation {
-    /// Contacts that exist at the start take the floor as their approach speed: how they began is unknown. One whose ball is
-    /// at its wall within rounding begins there, at the rate it has.
+    /// Initialises the contacts that exist at the start. Their onset is unknown, so the floor serves as approach speed; a ball at
+    /// its wall to within rounding begins its contact there, at its current rate.
     pub(super) fn begin_contacts_at_start(&mut self) {
         let Self { mechanism, machine, state, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
@@ -80,8 +80,8 @@ impl Simulation {
         }
     }
 
-    /// Begins the contacts of balls that are exactly at their walls and move into them: over the next step no sign changes. The
-    /// force is still 0.
+    /// Begins the contacts of balls that are exactly at their walls and move into them: the next step would show no sign change.
+    /// The force is still 0.
     pub(super) fn begin_contacts_at_walls(&mut self) {
         let Self { mechanism, machine, state, .. } = self;
         let mut begins = false;
@@ -118,8 +118,8 @@ impl Simulation {
                 let memory = state.now.memory[j].unsplit();
                 state.follow(j, &course, coefficients, strongest[j].0, &memory, 0.0);
             }
-            // A located switch ends within rounding of the wall, on either side; but the repeated step may show that a ball
-            // about to separate turned around before.
+            // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
+            // about to separate has turned back.
             let turned = state.now.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
             let touching = match located {
                 Some(located) if located == j => !state.now.memory[j].active || turned,
@@ -217,7 +217,7 @@ impl Simulation {
                 peak.normal = force;
                 peak.time = time;
                 peak.normal_force = gap.separation.normal * -force;
-                // Friction follows the normal force within a step: the ratio at the step's end is used for the peak.
+                // Friction is taken as proportional to the normal force within a step, with the ratio at the step's end.
                 peak.friction_force =
                     if gap.normal_force > 0.0 { gap.friction * (force / gap.normal_force) } else { gap.friction };
             }

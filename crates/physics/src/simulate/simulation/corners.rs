@@ -1,5 +1,5 @@
-//! Corners of the contact laws as events: over a whole step each touching joint stays on one piece of the friction law and
-//! one piece of the approach-speed rule, and the step ends where its sliding speed or penetration rate leaves that piece.
+//! Corners of the contact laws as events. During a step each touching joint stays on one piece of the friction law and one of the
+//! approach-speed rule; the step ends where its sliding speed or penetration rate leaves that piece.
 
 use super::{Simulation, State};
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
@@ -10,7 +10,7 @@ use crate::simulate::stepper::ActiveScheme;
 const PARTS: u32 = 4;
 /// A corner earlier than this fraction of the step was passed at its start: the step is repeated on the next piece.
 const AT_START: f64 = 1e-9;
-/// The same where a rate stops rising: it is stationary there, and the force agrees to second order on both pieces.
+/// The same limit where a rate stops rising: it is stationary there, and the forces of both pieces agree to second order.
 const LEVEL_AT_START: f64 = 1e-3;
 /// A rate that falls over this last fraction of a step has passed its maximum inside the last part.
 const LAST: f64 = 1e-4;
@@ -31,17 +31,17 @@ pub(super) struct Corner {
     pub next: LawBranch,
 }
 
-/// Piece beyond a corner.
+/// Piece of a law beyond a corner.
 #[derive(Clone, Copy)]
 pub(super) enum LawBranch {
-    /// Of the friction law.
+    /// Piece of the friction law.
     Friction(FrictionPiece),
-    /// Of the approach-speed rule.
+    /// Piece of the approach-speed rule.
     Approach(ApproachPiece),
 }
 
 impl LawBranch {
-    /// Puts a contact on it.
+    /// Switches a contact to this piece.
     pub(super) fn put(self, memory: &mut Memory) {
         match self {
             Self::Friction(piece) => memory.friction_piece = piece,
@@ -51,23 +51,23 @@ impl LawBranch {
 }
 
 impl Corner {
-    /// Whether it lies so early that its joint is better put on the next piece before the step.
+    /// Whether it lies so early that its joint should switch to the next piece before the step.
     pub(super) fn is_at_start(&self) -> bool {
         self.theta <= AT_START
     }
 }
 
 impl Simulation {
-    /// Whether the method locates corners. It needs its own interpolant: over a step longer than the contact's oscillation
-    /// a cubic through both ends overshoots, and a step that ends on it gains energy.
+    /// Whether the method locates corners. This takes the method's own interpolant: over a step longer than the contact's
+    /// oscillation, a cubic through both ends overshoots, and a step that ends on it gains energy.
     fn locates_corners(&self) -> bool {
         let method = self.machine.solver.method;
         let whole = self.state.control.member == ActiveScheme::Friction;
         method.is_adaptive() && method != Method::Rosenbrock && !whole
     }
 
-    /// Puts every touching joint on its current pieces of the laws; those that already hold some keep them unless `anew`.
-    /// Where corners are not located, all follow the whole laws.
+    /// Assigns every touching joint its current pieces of the laws; joints that already have pieces retain them unless `anew`. If
+    /// corners are not located, all joints use the full laws.
     pub(super) fn freeze_branches(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.control.chatters;
         let Self { mechanism, state, .. } = self;
@@ -80,7 +80,7 @@ impl Simulation {
         if !holds {
             return;
         }
-        // Anew the gaps may be those of another state until they are measured.
+        // With `anew`, the gaps may belong to another state until they are measured.
         if !anew {
             for (j, memory) in now.memory.iter_mut().enumerate() {
                 memory.hold_approach(mechanism.contacts.coefficients(j), now.gaps[j].rate);
@@ -128,7 +128,7 @@ impl Simulation {
         first
     }
 
-    /// Where the penetration rate of joint `j` exceeds the largest so far.
+    /// Step fraction at which the penetration rate of joint `j` exceeds its largest value so far, and the next piece.
     fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         let most = self.state.now.memory[j].approach_speed * (1.0 + NO_FASTER);
         let mut left = (0.0, self.state.now.gaps[j].rate - most);
@@ -150,14 +150,14 @@ impl Simulation {
         None
     }
 
-    /// Where the penetration rate of joint `j`, the largest so far, stops rising.
+    /// Step fraction at which the penetration rate of joint `j`, now at its largest, stops rising, and the next piece.
     fn level(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let mut before = self.state.now.gaps[j].rate;
         for n in 1..=PARTS {
             let end = f64::from(n) / f64::from(PARTS);
             let rate = self.rate_at(j, end, h);
-            // The next step would take a maximum that this one has left behind for the rate at its start.
+            // Otherwise the next step would mistake the rate at its start for a maximum that this step has passed.
             let passed = n == PARTS && self.rate_at(j, end - LAST, h) > rate;
             if rate >= before && !passed {
                 before = rate;
@@ -208,8 +208,7 @@ impl Simulation {
         mechanism.measure_one(j, time, scratch_y);
     }
 
-    /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which
-    /// piece.
+    /// Step fraction at which the sliding speed of joint `j` leaves its piece, and the next piece.
     fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         let mut left = (0.0, self.beyond(j, 0.0, h).0);
         for n in 1..=PARTS {
@@ -238,7 +237,7 @@ impl Simulation {
         None
     }
 
-    /// Ends the step just attempted at a corner. Unlike at the start of a contact the step is not repeated: its end would
+    /// Ends the step just attempted at a corner. Unlike at the start of a contact, the step is not repeated: the new end would
     /// miss the corner by the tolerance, which is not small compared with the ramp, and slide back at once.
     pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
         let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
@@ -254,7 +253,7 @@ impl Simulation {
         self.evaluate_end(t_end);
     }
 
-    /// How far joint `j` slides beyond its piece on the interpolant of the attempted step, and its sliding speed, m/s.
+    /// Excess of joint `j`'s sliding speed over its piece, and that speed, m/s, on the interpolant of the attempted step.
     fn beyond(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
         self.measure_at(j, theta, h);
         let speed = self.mechanism.slip_speed(j);
@@ -263,8 +262,8 @@ impl Simulation {
         (c.beyond(slip, speed), speed)
     }
 
-    /// After an accepted step: moves to the piece beyond the corner at its end, and stops locating for a while if corners
-    /// follow one another almost step by step.
+    /// After an accepted step: switches to the piece beyond the corner at its end. Stops locating corners for a while if almost
+    /// every step ends at one.
     pub(super) fn pass_corner(&mut self) {
         let state = &mut self.state;
         if let Some((j, next)) = self.attempt.corner.take() {

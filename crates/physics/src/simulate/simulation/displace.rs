@@ -1,13 +1,13 @@
-//! Perturbing the state: for a twin run and its renormalisation.
+//! Perturbations of the state, for a twin run and its renormalisation.
 
 use super::Simulation;
 use crate::contact::Memory;
 use crate::simulate::Stopped;
 
 impl Simulation {
-    /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there: quaternions
-    /// are renormalised, ideal joints closed again. A joint whose ball the offset puts into its wall is now in contact, one
-    /// whose ball it lifts is not; every other contact keeps its memory. Counters are unchanged; a wear map is dropped.
+    /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there. Quaternions are
+    /// renormalised, ideal joints closed again. A ball moved into its wall is now in contact, a ball lifted off is not; every
+    /// other contact retains its memory. Counters are unchanged; a wear map is dropped.
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
     pub fn displace(&mut self, offset: &[f64]) {
@@ -24,7 +24,7 @@ impl Simulation {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            // The offset may lie beyond a corner of the laws.
+            // The offset may cross a corner of the laws.
             state.now.memory[j] = state.now.memory[j].unsplit();
             let gap = *mechanism.contacts.gap(j);
             let touching = gap.separation.penetration > 0.0;
@@ -44,16 +44,16 @@ impl Simulation {
         self.record_change();
     }
 
-    /// Takes the approach speeds that its contacts remember towards those of `other`, a run in the same state but for a little, by
-    /// the fraction `part` of their difference.
+    /// Moves the stored approach speeds of the contacts towards those of `other`, a run in nearly the same state, by the fraction
+    /// `part` of their difference.
     pub fn remember_like(&mut self, other: &Self, part: f64) {
         for (own, other) in self.state.now.memory.iter_mut().zip(&other.state.now.memory) {
             own.approach_speed += part * (other.approach_speed - own.approach_speed);
         }
     }
 
-    /// Steps to where `other`, a run in the same state but for a little, is after its latest step: by the same step, which ends as
-    /// that did. One that is cut there errs otherwise, by about the tolerance.
+    /// Steps to the time of `other`, a run in nearly the same state, by reproducing its latest step and the way it ended. A step
+    /// merely truncated there would have a different error, by about the tolerance.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -67,8 +67,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Steps from here on as `other` is about to, in the same state but for a little: with its step size and its member of the
-    /// automatic choice. Two runs that choose their own err differently, and seem to part.
+    /// Adopts the step control of `other`, a run in nearly the same state: its step size and its scheme of the automatic method.
+    /// Two runs that choose their own have different errors and seem to diverge.
     pub fn step_like(&mut self, other: &Self) {
         let turns = self.state.control.member != other.state.control.member;
         self.state.control.clone_from(&other.state.control);
@@ -111,7 +111,8 @@ mod tests {
             }
             follower.step_like(&run);
         }
-        // Rounding cuts some of its steps in two; one that chooses its own is cut at nearly every end of the run's.
+        // Rounding splits some of the follower's steps in two; a twin that chooses its own is truncated at nearly every one of
+        // the run's.
         let steps = |of: &Simulation| of.statistics().steps - before;
         assert!(steps(&follower) < 600, "{}", steps(&follower));
         assert!(steps(&alone) > 800, "{}", steps(&alone));

@@ -1,4 +1,4 @@
-//! Reasons to doubt a result: from the scene's settings, and from what happened in the run.
+//! Reasons to doubt a result, from the scene's settings and from the course of the run.
 
 use super::Simulation;
 use crate::contact::{FrictionVelocity, settled_penetration};
@@ -12,26 +12,25 @@ const MOST_FLOORED: f64 = 0.5;
 const LARGEST_PATCH: f64 = 1.0 / 3.0;
 /// Constraint violations above this fraction of the smallest clearance blur the effect of the clearance.
 const DRIFT_OF_CLEARANCE: f64 = 0.1;
-/// The same where every ball joint is ideal, m.
+/// Limit on constraint violations if every ball joint is ideal, m.
 const DRIFT: f64 = 1e-4;
-/// Damping over elastic force, less that of an undisturbed impact, beyond which a force is an artefact of the law.
+/// Excess of damping over elastic force, compared with an undisturbed impact, beyond which a force is an artefact of the law.
 const MOST_DAMPING: f64 = 1.0;
-/// By how much the restitution of an undisturbed impact may exceed that of its law.
+/// Allowed excess of an undisturbed impact's restitution over its law's prediction.
 const MOST_ASTRAY: f64 = 0.1;
-/// Fraction of the energy by which a residual is judged that may be unaccounted for.
+/// Allowed residual as a fraction of the ledger's energy scale.
 const RESIDUAL: f64 = 5e-3;
-/// Fraction of each work that may be unaccounted for, and the smallest residual, as a fraction of the energy by which it is judged,
-/// for which this is checked: a restitution loss may be tiny compared with everything else, and correct although the residual is
-/// as large.
+/// Allowed residual as a fraction of each work, and the smallest residual, as a fraction of the energy scale, for which this is
+/// checked: a restitution loss may be tiny compared with everything else, and correct although the residual is as large.
 const RESIDUAL_OF_WORK: f64 = 0.1;
 const NOTEWORTHY: f64 = 1e-3;
 /// Fraction of the energies present below which a residual is rounding.
 const ROUNDING: f64 = 1e-9;
-/// A mechanism at rest has almost no energy: energies smaller than with all bodies at the speed that crosses the smallest
-/// clearance in this time, s, do not count.
+/// Time to cross the smallest clearance at a negligible speed, s. A mechanism at rest has almost no energy: energies below those
+/// of all bodies at this speed do not count.
 const CREEP: f64 = 0.1;
-/// Fraction of the time in which stability may limit an explicit method's steps, and the loosest tolerance at which such
-/// steps still conserve energy.
+/// Allowed fraction of time in which stability limits an explicit method's steps, and the loosest tolerance at which such steps
+/// still conserve energy.
 const MOST_HELD: f64 = 0.1;
 const LOOSEST_HELD: f64 = 3e-5;
 
@@ -90,7 +89,7 @@ impl Simulation {
         doubts
     }
 
-    /// Unaccounted energy, compared with what the machine held and lost, or with each work; and losses that are gains.
+    /// Doubts about unaccounted energy, compared with the energy held and lost or with each work, and about negative losses.
     fn energy_doubt(&self, ledger: &Ledger) -> Option<Doubt> {
         let residual = ledger.residual();
         let clearances = self.machine.ball_joints.iter().map(|j| j.contact.clearance);

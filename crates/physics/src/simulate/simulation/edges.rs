@@ -1,18 +1,18 @@
-//! Edges of force elements as events: over a whole step a stop or a tyre presses, or does not, and the step ends where it begins or
-//! ceases to. Its force has a kink or a jump there, and a step across it errs in a way that its estimate does not see.
+//! Edges of force elements as events. During a step a stop or a tyre either presses or does not, and the step ends where that
+//! changes. The force has a kink or a jump there, and a step across it has an error that its estimate does not see.
 
 use super::Simulation;
 use super::flights::put_flights;
 use crate::integrate::find_root;
 
-/// Parts of a step at whose ends elements are looked at.
+/// Parts of a step at whose ends elements are checked.
 const PARTS: u32 = 4;
 /// An edge earlier than this fraction of the step was passed at its start.
 pub(super) const AT_START: f64 = 1e-9;
 
 impl Simulation {
-    /// Lets the elements that have edges stay on their side over the step about to be taken, if the method ends steps there: it
-    /// needs an interpolant as accurate as its steps.
+    /// Fixes the side of each element that has edges for the next step, if the method ends steps there, which takes an
+    /// interpolant as accurate as its steps.
     pub(super) fn hold_sides(&mut self) {
         if self.stepper.ends_on_interpolant() && self.mechanism.has_edges() {
             let Self { mechanism, state, attempt, .. } = self;
@@ -22,7 +22,7 @@ impl Simulation {
     }
 
     /// Fraction of the step just attempted at which the first element begins or ceases to press, if any does; 0 if one did so at
-    /// the start and has been put on the other side.
+    /// the start and has been switched to the other side.
     pub(super) fn first_edge(&mut self, h: f64) -> Option<f64> {
         if self.attempt.sides.is_empty() {
             return None;
@@ -31,7 +31,7 @@ impl Simulation {
         let mut from = AT_START;
         self.look_at_elements(from, h, &mut left);
         let turns = self.attempt.sides.iter().zip(&left).any(|(side, now)| (*side > 0.0) != (*now > 0.0));
-        // Once: if that leads back here, either side is as good.
+        // Only once: if that leads back here, either side will do.
         if turns && !self.attempt.turned {
             self.attempt.turned = true;
             self.attempt.sides.copy_from_slice(&left);
@@ -45,7 +45,7 @@ impl Simulation {
             for (number, (&left, &right)) in left.iter().zip(&right).enumerate() {
                 if (left > 0.0) != (right > 0.0) {
                     let width = (1e-15 / h).max(1e-12);
-                    // It returns an instant beyond the edge: before it the next step would start with the wrong force.
+                    // The root returned is just past the edge: before it the next step would start with the wrong force.
                     let at = find_root(from, left, to, right, width, 0.0, |theta| self.pressed_at(number, theta, h));
                     first = Some(first.map_or(at, |first| first.min(at)));
                 }
@@ -60,14 +60,14 @@ impl Simulation {
         first
     }
 
-    /// How every element that has edges is pressed, on the interpolant of the attempted step.
+    /// Writes the contact indicators of every element that has edges, on the interpolant of the attempted step, to `out`.
     fn look_at_elements(&mut self, theta: f64, h: f64, out: &mut Vec<f64>) {
         let time = self.measure_all_at(theta, h);
         out.clear();
         out.extend(self.mechanism.pressed(time));
     }
 
-    /// One of these numbers.
+    /// One of these indicators.
     fn pressed_at(&mut self, number: usize, theta: f64, h: f64) -> f64 {
         let time = self.measure_all_at(theta, h);
         self.mechanism.pressed(time).nth(number).unwrap_or_default()

@@ -1,45 +1,45 @@
-//! Keeps the energy ledger: powers at a few instants of each accepted step.
+//! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
 use super::{Record, Simulation, State};
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
 use crate::simulate::ledger::{Account, Energies, weights};
 use crate::simulate::{Frame, Ledger};
 
-/// Ends of past steps from which the works of a kinematic scene are integrated: its powers are smooth, and its steps short
-/// compared with their periods.
+/// Past step ends used to integrate the works of a kinematic scene: its powers are smooth, and its steps short compared with
+/// their periods.
 const PAST_ENDS: usize = 5;
 /// A past step shorter than this fraction of the one being integrated is ignored.
 const SHORTEST_PAST: f64 = 0.1;
-/// Where besides its ends the powers of such a step are evaluated while there are too few past ends.
+/// Interior nodes of such a step while there are too few past ends.
 const MIDDLE: [f64; 1] = [0.5];
 
 impl Simulation {
-    /// Energy moved since the start (the last reset); `None` where `solver.energy_ledger` is off.
+    /// Energy exchanged since the start (the last reset); `None` where `solver.energy_ledger` is off.
     pub fn ledger(&self) -> Option<&Ledger> {
         let account = &self.state.record.account;
         account.on.then(|| account.ledger())
     }
 
-    /// Opens a new account at the current state, just fully evaluated.
+    /// Starts a new ledger at the current state, which has just been fully evaluated.
     pub(super) fn start_ledger(&mut self) {
         let Self { mechanism, state, .. } = self;
         let energies = energies(mechanism, state);
         state.record.account = Account::start(self.machine.solver.energy_ledger, energies);
     }
 
-    /// Books what a live change did to the energies; the state was just fully evaluated.
+    /// Records the effect of a live change on the energies; the state has just been fully evaluated.
     pub(super) fn record_change(&mut self) {
         let Self { mechanism, state, .. } = self;
         if state.record.account.on {
             let energies = energies(mechanism, state);
             state.record.account.record_change(energies);
         }
-        // A wear map keeps them even without a ledger.
+        // Powers are stored for a wear map even without a ledger.
         state.record.account.powers = None;
     }
 
-    /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory is still that of the
-    /// step; `switched` if it has changed at its end.
+    /// Records the step just accepted, of size `h`, in the ledger and the wear map, with the contact memory of the step;
+    /// `switched` if that has changed at its end.
     pub(super) fn record_step(&mut self, h: f64, switched: bool) {
         let Record { account, wear, .. } = &self.state.record;
         let keeps_ledger = account.on;
@@ -53,7 +53,7 @@ impl Simulation {
         }
         let energies = energies(mechanism, state);
         if mechanism.has_powers() {
-            // Powers may jump at an edge at the step's end: those of the step count.
+            // Powers may jump at an edge at the step's end: use those on the step's side.
             if self.attempt.edge {
                 mechanism.hold_elements(&self.attempt.sides);
                 mechanism.forget_evaluation();
@@ -82,8 +82,8 @@ impl Simulation {
         }
     }
 
-    /// Starts booking the step just accepted in the wear map: the contacts that began at its end, and the forces there,
-    /// from the latest evaluation.
+    /// Starts recording the step just accepted in the wear map: the contacts that began at its end, and the forces there, from
+    /// the latest evaluation.
     fn begin_wear_of_step(&mut self) {
         let State { before, now, record, .. } = &mut self.state;
         let Some(wear) = &mut record.wear else {
@@ -103,7 +103,7 @@ impl Simulation {
     fn lay_out_course(&mut self, h: f64, end: Powers) {
         let (from, to) = (self.state.before.t, self.state.now.t);
         let kinematic = self.mechanism.is_kinematic();
-        // Over a jump of a derivative past ends tell nothing.
+        // Past ends are of no use across a jump of a derivative.
         if kinematic && !self.mechanism.has_broken_drives() {
             let past = &mut self.state.record.account.past;
             past.push_apart(to, end, SHORTEST_PAST * h);
@@ -129,7 +129,7 @@ impl Simulation {
 
     /// Powers at fraction `theta` of the step just accepted.
     fn powers_within(&mut self, theta: f64, h: f64) -> Powers {
-        // Nothing acts on the others but gravity.
+        // Bodies in flight are left out: only gravity acts on them.
         self.interpolate_stepped(theta, h);
         let located = self.locates();
         let Self { mechanism, stepper, state, scratch_y, scratch_k, .. } = self;
@@ -162,7 +162,7 @@ impl Simulation {
     }
 }
 
-/// Energies at the latest evaluation, that of the current state.
+/// Energies from the latest evaluation, at the current state.
 fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
     let contacts = &mechanism.contacts;

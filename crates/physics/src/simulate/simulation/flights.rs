@@ -1,16 +1,16 @@
-//! Bodies in free flight: while nothing touches a free body its motion is known in advance, and the steps that impacts
-//! elsewhere need leave it out.
+//! Bodies in free flight: while nothing touches a free body, its motion is known in advance, and the steps that resolve impacts
+//! elsewhere exclude it.
 
 use super::{LONGEST_STEP, Simulation, StepEnd};
 use crate::integrate::{Method, System as _};
 use crate::mechanism::{ActiveSet, Flight, Mechanism};
 
-/// With fewer free bodies than this, leaving some out saves less than it costs.
+/// With fewer free bodies than this, excluding some saves less than it costs.
 const FEWEST_FLYERS: usize = 3;
 
 impl Simulation {
-    /// Decides, before a step that ends by `limit`, which bodies it leaves out: those that touch nothing and whose motion is
-    /// known until then.
+    /// Chooses the bodies to exclude from a step that ends by `limit`: those that touch nothing and whose motion is known until
+    /// then.
     pub(super) fn choose_flights(&mut self, limit: f64) {
         let free_flight_bodies = self.mechanism.free_flight_bodies().len();
         if self.machine.solver.method != Method::Automatic || free_flight_bodies < FEWEST_FLYERS {
@@ -44,7 +44,7 @@ impl Simulation {
         self.leave_out_flights();
         self.stepper.invalidate();
         if some_land {
-            // The derivative of what landed is still that of a flight.
+            // The derivative of a body that landed is still that of its flight.
             let located = self.locates();
             let Self { mechanism, state, .. } = self;
             let StepEnd { t, y, k, memory, .. } = &mut state.now;
@@ -55,13 +55,13 @@ impl Simulation {
         }
     }
 
-    /// Lets evaluations leave out what flies.
+    /// Excludes bodies in flight from evaluations.
     pub(super) fn leave_out_flights(&mut self) {
         let flights = &self.state.flights;
         self.mechanism.suspend(|flyer| flights[flyer].is_some());
     }
 
-    /// Lets evaluations see everything for a while, if anything flies; whether it does.
+    /// Includes all bodies in evaluations until `leave_out_flights`; returns whether any is in flight.
     pub(super) fn look_at_all(&mut self) -> bool {
         let any = self.state.flights.iter().any(Option::is_some);
         if any {
@@ -70,14 +70,15 @@ impl Simulation {
         any
     }
 
-    /// After a step that failed: samples within the step before it would miss the flights that ended with that.
+    /// After a failed step: discards the previous step, because samples within it would miss the flights that ended with the
+    /// failed step.
     pub(super) fn forget_flown(&mut self) {
         if self.state.flights.iter().any(Option::is_some) {
             self.state.discard_previous_step();
         }
     }
 
-    /// Ends all flights: the state is no longer the one that they continue.
+    /// Ends all flights, because the state from which they continue has changed.
     pub(super) fn end_flights(&mut self) {
         self.look_at_all();
         self.state.flights.fill(None);
@@ -95,7 +96,7 @@ pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k
     }
 }
 
-/// Writes the bodies in flight at `t` to the state `y`.
+/// Writes the motion of bodies in flight at `t` to the state `y`.
 pub(super) fn put_flights(mechanism: &Mechanism, flights: &[Option<Flight>], t: f64, y: &mut [f64]) {
     for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(flights) {
         if let Some(flight) = flight {

@@ -1,19 +1,19 @@
-//! The divergence guard: what no accepted step may show.
+//! The divergence guard: checks that every accepted step must pass.
 
 use super::{OPEN_LOOP, Simulation};
 use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
 const ABSURD_SPEED: f64 = 1e6;
-/// With a penetration above this many radii a ball has left its socket, and its contact patch is no longer small.
+/// Penetration in ball radii beyond which a ball has left its socket and its contact patch is no longer small.
 const LEFT_SOCKET: f64 = 0.1;
-/// Energy stored by an impact's first step, over that of the approach, beyond which the step and not the motion created it.
+/// Energy stored by an impact's first step, over that of the approach, beyond which the step, not the motion, created it.
 const MOST_OVERSHOOT: f64 = 4.0;
-/// Stabilised constraints that are off by more than this no longer hold anything together, m.
+/// Violation beyond which stabilised constraints no longer hold the mechanism together, m.
 const MOST_DRIFT: f64 = 1e-3;
 
 impl Simulation {
-    /// What is wrong with the step of size `h` just attempted, if anything.
+    /// Fault of the step of size `h` just attempted, if any.
     pub(super) fn divergence(&self, open: f64, h: f64) -> Option<StopFault> {
         if !(open <= OPEN_LOOP) {
             return Some(StopFault::OpenLoops { open });
@@ -51,7 +51,7 @@ impl Simulation {
                 return Some(StopFault::AbsurdSpeed { body: body.name.clone(), speed: v, angular_speed: w });
             }
         }
-        // Where the others are is known from the motion.
+        // All other components follow from the motion, checked above.
         let end = &self.attempt.end;
         let moving = self.mechanism.moving().iter();
         let sane = moving.fold(true, |sane, part| {
@@ -61,8 +61,8 @@ impl Simulation {
         (!sane).then_some(StopFault::NotFinite)
     }
 
-    /// If a fixed step carried a free ball so far into the wall that it stores more energy there than any approach could
-    /// bring: the ratio.
+    /// Ratio of stored to approach energy, if a fixed step carried a free ball so far into the wall that it stores more than any
+    /// approach could bring.
     fn energy_of_overshoot(&self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         if start.penetration > 0.0 || end.penetration <= 0.0 {

@@ -1,5 +1,5 @@
-//! The ideal motion that a probe is compared with: where it has no closed form, a simulation of the same scene with every
-//! ball joint ideal, run alongside.
+//! Ideal motion with which a probe is compared. If it has no closed form, the same scene with every ball joint ideal is simulated
+//! alongside.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,13 +12,13 @@ use crate::simulate::{Frame, Snapshot, StartError, Stopped};
 const TOLERANCE: f64 = 1e-10;
 /// First step, s.
 const FIRST_STEP: f64 = 1e-4;
-/// Latest step ends that are kept. Both motions step at most 10 ms, so that samples within a step lie among them.
+/// Number of latest step ends stored. Both motions step at most 10 ms, so that samples within a step lie among them.
 const MARKS: usize = 64;
 
-/// Why there is no ideal motion, or no longer one, to compare a probe with.
+/// Why a probe has no ideal motion to be compared with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeFault {
-    /// The ideal mechanism does not start.
+    /// The ideal mechanism cannot start.
     #[error("cannot start: {0}")]
     NoStart(StartError),
     /// It could not continue.
@@ -26,7 +26,7 @@ pub enum ProbeFault {
     Stopped(Stopped),
 }
 
-/// Source of the ideal tip; in a snapshot, with what it keeps of a second simulation.
+/// Source of the ideal tip. `M` is a second simulation, or its state in a snapshot.
 #[derive(Clone, Debug)]
 pub(in crate::simulate) enum IdealTip<M = IdealMotion> {
     /// There is no probe, or the drives' closed form gives it.
@@ -46,7 +46,7 @@ struct Mark {
     tip: [Vec3; 3],
 }
 
-/// The ideal scene in motion, and past positions of its tip.
+/// Simulation of the ideal scene, and past positions of its tip.
 pub(in crate::simulate) struct IdealMotion {
     pub(super) simulation: Simulation,
     body: usize,
@@ -55,17 +55,17 @@ pub(in crate::simulate) struct IdealMotion {
     pub(super) marks: TipHistory,
 }
 
-/// The latest step ends, and whether more will follow.
+/// Tip at the latest step ends, and why the motion stopped, if it did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct TipHistory {
-    /// As many as are kept.
+    /// Ring buffer.
     ring: Vec<Mark>,
     count: usize,
     /// Why it stopped.
     stopped: Option<Stopped>,
 }
 
-/// The part of it that a snapshot keeps.
+/// State of the ideal motion in a snapshot.
 #[derive(Clone, Debug)]
 pub(in crate::simulate) struct Kept {
     snapshot: Snapshot,
@@ -73,7 +73,7 @@ pub(in crate::simulate) struct Kept {
 }
 
 impl IdealTip {
-    /// For `scene`, whose mechanism may know its ideal motion in closed form.
+    /// Chooses the source for `machine`; `closed_form` if its mechanism knows the ideal motion in closed form.
     pub(super) fn of(machine: &Machine, closed_form: bool) -> Self {
         let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
             return Self::ClosedForm;
@@ -87,7 +87,7 @@ impl IdealTip {
         }
     }
 
-    /// Tip in `frame` minus the ideal tip at its time.
+    /// Tip in `frame` minus the ideal tip at its time, m.
     pub(super) fn error(&mut self, frame: &Frame) -> Option<Vec3> {
         match self {
             Self::ClosedForm | Self::None(_) => None,
@@ -100,7 +100,7 @@ impl IdealTip {
         }
     }
 
-    /// Why there is no ideal motion, or no longer one.
+    /// Why there is no ideal motion, if it failed.
     pub(super) fn fault(&self) -> Option<ProbeFault> {
         match self {
             Self::ClosedForm | Self::SelfReference => None,
@@ -109,7 +109,7 @@ impl IdealTip {
         }
     }
 
-    /// Gravity from `time` on.
+    /// Sets gravity from `time` on, m/s^2.
     pub(super) fn set_gravity(&mut self, time: f64, gravity: Vec3) {
         if let Self::Simulated(motion) = self {
             motion.set_gravity(time, gravity);
@@ -120,7 +120,7 @@ impl IdealTip {
         self.map(|motion| Kept { snapshot: motion.simulation.snapshot(), marks: motion.marks.clone() })
     }
 
-    /// To the state of a reference of the same equations.
+    /// Restores the state of a reference with the same equations.
     pub(super) fn restore(&mut self, kept: &IdealTip<Kept>) {
         if let (Self::Simulated(motion), IdealTip::Simulated(kept)) = (self, kept) {
             motion.simulation.restore(&kept.snapshot);
@@ -130,7 +130,7 @@ impl IdealTip {
 }
 
 impl IdealTip<Kept> {
-    /// What it was kept of, for `scene`.
+    /// Recreates the reference of `machine`.
     pub(super) fn resume(&self, machine: &Machine) -> IdealTip {
         self.map(|kept| IdealMotion {
             simulation: Simulation::of(&kept.snapshot),
@@ -153,8 +153,8 @@ impl<M> IdealTip<M> {
     }
 }
 
-/// `scene` with every ball joint ideal, with the same drives and gravity, solved accurately enough to serve as a reference.
-/// It has no probe of its own.
+/// `machine` with every ball joint ideal, with the same drives and gravity, solved accurately enough to serve as a reference. It
+/// has no probe.
 pub fn closed(machine: &Machine) -> Machine {
     let mut ideal = machine.clone();
     for joint in &mut ideal.ball_joints {
@@ -212,14 +212,14 @@ impl IdealMotion {
         self.tip(time);
         self.simulation.go_back_to(time);
         self.simulation.set_gravity(gravity);
-        // What lay after `time` no longer holds.
+        // Marks after `time` are no longer valid.
         self.marks.forget_after(time);
         self.mark();
     }
 }
 
 impl TipHistory {
-    /// Whether there are as many as are kept.
+    /// Whether the ring buffer has its full length.
     pub(super) fn fits(&self) -> bool {
         self.ring.len() == MARKS
     }
@@ -242,13 +242,13 @@ impl TipHistory {
     }
 }
 
-/// The quintic through positions, velocities and accelerations at both ends.
+/// Quintic interpolation of positions, velocities and accelerations at both ends.
 fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
     let h = b.time - a.time;
     let s = (time - a.time) / h;
     let ([x0, v0, a0], [x1, v1, a1]) = (a.tip, b.tip);
     let (v0, v1, a0, a1) = (v0 * h, v1 * h, a0 * (h * h), a1 * (h * h));
-    // What remains at the end after the parabola from the start.
+    // Remainders at the end after subtracting the parabola from the start.
     let (x, v, c) = (x1 - x0 - v0 - a0 * 0.5, v1 - v0 - a0, a1 - a0);
     let (c3, c4, c5) = (x * 10.0 - v * 4.0 + c * 0.5, x * -15.0 + v * 7.0 - c, x * 6.0 - v * 3.0 + c * 0.5);
     x0 + (v0 + (a0 * 0.5 + (c3 + (c4 + c5 * s) * s) * s) * s) * s
@@ -274,7 +274,7 @@ mod tests {
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
         for k in 0..40 {
-            // Between step ends of either motion, and not always forward.
+            // Times between step ends of either motion, not always increasing.
             let time = 0.0137 * f64::from(k) - 0.001 * f64::from(k % 3);
             simulation.advance_to(time).expect("runs");
             simulation.sample(time, &mut frame);

@@ -36,11 +36,11 @@ pub enum ChangeError {
 }
 
 impl Simulation {
-    /// Goes on with the gravity, the contacts and the stepper of `next`. [`Effect::AtReset`] if it differs in anything else, or if a
-    /// ball joint becomes ideal or stops being so, which changes the equations; nothing has changed then.
+    /// Adopts the gravity, contacts and stepper of `next`. Returns [`Effect::AtReset`] and changes nothing if `next` differs in
+    /// anything else, or if a ball joint becomes or ceases to be ideal, which changes the equations.
     ///
     /// # Errors
-    /// A method that is too costly for the equations; nothing has changed then.
+    /// If the method is too costly for the equations; nothing has changed then.
     pub fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
         let pairs = self.machine.ball_joints.iter().zip(&next.ball_joints);
         let clearances = pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance));
@@ -91,7 +91,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether such a pull is possible.
+    /// Checks whether a pull is possible.
     ///
     /// # Errors
     /// An unknown body, or a position out of reach.
@@ -108,7 +108,7 @@ impl Simulation {
         }
     }
 
-    /// Force of the hand that pulls, if any, with the bodies as in `frame`.
+    /// Force of the pulling hand, if any, with the bodies as in `frame`.
     pub fn pull_in(&self, frame: &Frame) -> Option<ElementReport> {
         let pull = self.state.pull?;
         let motion = frame.bodies.get(pull.body)?;
@@ -122,14 +122,14 @@ impl Simulation {
         self.state.pull
     }
 
-    /// Sets gravity from now on, m/s^2, of a simulation that is not changed otherwise.
+    /// Sets gravity from now on, m/s^2, and changes nothing else.
     pub fn set_gravity(&mut self, gravity: Vec3) {
         Arc::make_mut(&mut self.machine).gravity = gravity;
         self.sync_parameters();
         self.refresh();
     }
 
-    /// Gives the equations what live changes reach: the machine and the state have it.
+    /// Copies the parameters that live changes affect from machine and state to the mechanism.
     pub(super) fn sync_parameters(&mut self) {
         let Self { mechanism, state, machine, .. } = self;
         mechanism.gravity = machine.gravity;
@@ -145,7 +145,7 @@ impl Simulation {
         }
     }
 
-    /// Back to `time` within the latest step, on its interpolant; only for a simulation without contacts.
+    /// Rewinds to `time` within the latest step, on its interpolant; only for a simulation without contacts.
     pub(in crate::simulate) fn go_back_to(&mut self, time: f64) {
         let h = self.state.now.t - self.state.before.t;
         if !(time < self.state.now.t && time >= self.state.before.t) {
@@ -158,7 +158,7 @@ impl Simulation {
         self.refresh();
     }
 
-    /// New contact parameters from this instant; a clearance that would put the ball inside the wall is ramped.
+    /// Applies new contact parameters from this instant; a clearance that would place the ball inside the wall is ramped.
     fn change_contact(&mut self, j: usize, contact: &crate::contact::Parameters) {
         if contact.clearance == 0.0 {
             return;
@@ -177,14 +177,14 @@ impl Simulation {
             contact.clearance
         };
         state.clearances[j] = clearance;
-        // A ball that the wall has left; one just arriving, or leaving, stays as it is.
+        // The wall has moved away from the ball. The state of a ball just arriving or leaving does not change.
         if clearance > now && state.now.memory[j].active && distance <= clearance {
             state.now.memory[j] = Memory::default();
         }
         state.record.impacts.change(j, state.now.memory[j].active);
     }
 
-    /// When the first clearance ramp under way ends, s.
+    /// End of the active clearance ramp that finishes first, s.
     pub(super) fn ramp_end(&self) -> f64 {
         let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
         self.state.ramps.iter().flatten().map(end).fold(f64::INFINITY, f64::min)

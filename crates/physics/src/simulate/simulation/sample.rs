@@ -1,4 +1,4 @@
-//! Everything at an instant within the latest step.
+//! Sampling of an instant within the latest step.
 
 use super::Simulation;
 use super::flights::put_flights;
@@ -8,21 +8,21 @@ use crate::mechanism::ActiveSet;
 use crate::simulate::{Frame, report};
 
 impl Simulation {
-    /// Largest normal force of ball joint `j` (reaction, if ideal) since the last reset and when, (N, s): that of
-    /// [`Statistics`](crate::simulate::Statistics), found from the ends of steps, or a larger one seen by a sample.
+    /// Largest normal force of ball joint `j` (reaction, if ideal) since the last reset, and its time, (N, s): the value in
+    /// [`Statistics`](crate::simulate::Statistics), found from the ends of steps, or a larger one from a sample.
     pub fn peak(&self, j: usize) -> (f64, f64) {
         let statistics = self.statistics();
         let found = (statistics.peak_normal[j], statistics.peak_time[j]);
         if self.sampled[j].0 > found.0 { self.sampled[j] } else { found }
     }
 
-    /// Everything at the latest state.
+    /// Samples the latest state.
     pub fn sample_now(&mut self, out: &mut Frame) {
         self.sample(self.time(), out);
     }
 
-    /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
-    /// Allocates only while `out` is too small.
+    /// Samples the state at `time`, interpolated within the latest step; forces come from the interpolated state. Allocates only
+    /// while `out` is too small.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
         let time = time.clamp(self.state.before.t, self.state.now.t);
         self.look(time);
@@ -73,15 +73,14 @@ impl Simulation {
         }
     }
 
-    /// State at fraction `theta` of the latest step, of size `h`, by the method's interpolant, written to the scratch
-    /// state.
+    /// Writes the state at fraction `theta` of the latest step, of size `h`, from the method's interpolant to the scratch state.
     pub(super) fn interpolate(&mut self, theta: f64, h: f64) {
         self.interpolate_stepped(theta, h);
         let (state, time) = (&self.state, self.state.before.t + theta * h);
         put_flights(&self.mechanism, &state.flights, time, &mut self.scratch_y);
     }
 
-    /// The same but for the bodies in flight.
+    /// The same without the bodies in flight.
     pub(super) fn interpolate_stepped(&mut self, theta: f64, h: f64) {
         let Self { mechanism, stepper, state, scratch_y, .. } = self;
         let (before, now) = (&state.before, &state.now);
@@ -109,7 +108,7 @@ mod tests {
                 let change = ("formulation".to_owned(), form.to_owned());
                 let scene = Scene::load(name, &[change, method]).expect("loads");
                 let mut simulation = Simulation::new(&scene.machine).expect("starts");
-                // Driven, it turns more than once; otherwise it stays within half a turn.
+                // The driven crank turns more than once; the other stays within half a turn.
                 let time = if name == "slider-crank" { 0.1 } else { 1.3 };
                 simulation.advance_to(time).expect("runs");
                 let mut frame = Frame::default();

@@ -1,4 +1,4 @@
-//! The state of a run for a file: in a later process the run goes on from it with the same bits.
+//! The state of a run for a file: a later process continues from it with the same bits.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,18 +7,17 @@ use super::{Simulation, State, StepEnd};
 use crate::integrate::Polynomial;
 use crate::simulate::{LoadPeaks, Snapshot};
 
-/// Everything of a running simulation that its scene does not determine. It says nothing about the scene: whoever stores it
-/// stores that, too.
+/// The part of a running simulation that its scene does not determine. The scene is not included and must be stored with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SavedState {
     state: State,
     polynomial: Option<Polynomial>,
-    /// Of the ideal motion alongside.
+    /// State of the ideal motion alongside.
     ideal: Option<Box<SavedIdeal>>,
-    /// Largest force seen by a sample, N, and when, s, by joint.
+    /// Largest sampled force, N, and its time, s, by joint.
     sampled: Vec<(f64, f64)>,
-    /// Peaks of loads, if kept.
+    /// Load peaks, if tracked.
     loads: Option<LoadPeaks>,
 }
 
@@ -42,7 +41,7 @@ impl SavedState {
 }
 
 impl State {
-    /// Whether it has the shape of `own`, a state of `simulation`'s scene: nothing in it points elsewhere.
+    /// Whether it has the dimensions of a state of `simulation`, and all its indices are valid.
     fn fits(&self, simulation: &Simulation) -> bool {
         let own = &simulation.state;
         let joints = own.now.gaps.len();
@@ -89,10 +88,10 @@ impl Simulation {
         }
     }
 
-    /// Puts a simulation of the same scene into the state `saved`; going on gives the same bits as where it was saved.
+    /// Restores the state `saved` in a simulation of the same scene; continuing gives the same bits as in the original run.
     ///
     /// # Errors
-    /// A state that cannot be one of this scene; the simulation is then of no use.
+    /// If the state cannot belong to this scene; the simulation is then unusable.
     pub fn resume(&mut self, saved: &SavedState) -> Result<(), StateMismatch> {
         let polynomial = self.stepper.polynomial();
         let fits = saved.state.fits(self)

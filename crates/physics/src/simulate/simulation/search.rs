@@ -1,4 +1,4 @@
-//! Peaks that the ends of a step do not show: its inside is sampled, as an output row would.
+//! Search for peaks inside a step, which is sampled as for an output row.
 
 use super::Simulation;
 use crate::simulate::LoadPeaks;
@@ -6,14 +6,14 @@ use crate::simulate::peaks::PenetrationCubic;
 
 /// A step whose forces stay below this fraction of their peaks so far is not searched.
 pub(super) const NEAR_PEAK: f64 = 0.5;
-/// Loads other than those of contacts are taken this often, s, where steps are shorter and no contact is near its peak.
+/// Interval at which non-contact loads are recorded, s, if steps are shorter and no contact is near its peak.
 const LOADS_EVERY: f64 = 1e-4;
-/// Where a fixed step is sampled.
+/// Fractions at which a fixed step is sampled.
 const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
 impl Simulation {
-    /// Takes the reactions at the end of the step just accepted, just fully evaluated. Without contacts they are smooth and
-    /// peak on the parabola through three step ends.
+    /// Records the reactions at the end of the step just accepted and fully evaluated. Without contacts they are smooth, and
+    /// their peaks lie on the parabola through three step ends.
     pub(super) fn track_reactions(&mut self) {
         let joints = self.state.now.gaps.len();
         let smooth = !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j));
@@ -27,9 +27,9 @@ impl Simulation {
         }
     }
 
-    /// Finds the largest normal force of every joint in contact over the step just accepted, and where, from the cubic
-    /// through the penetration. A peak inside a located step is re-evaluated there: the cubic's rate, which sets the
-    /// damping, is not that of the motion.
+    /// Finds the largest normal force of every joint in contact over the step just accepted, and its step fraction, from the
+    /// penetration cubic. A peak inside a located step is re-evaluated there: the cubic's rate, which sets the damping, differs
+    /// from that of the motion.
     pub(super) fn find_strongest(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
@@ -66,18 +66,18 @@ impl Simulation {
         }
     }
 
-    /// Keeps the peaks of loads from now on. It does not affect the steps.
+    /// Tracks load peaks from now on. This does not affect the steps.
     pub fn keep_load_peaks(&mut self) {
         self.loads = Some(LoadPeaks::new(&self.machine, &self.mechanism));
         self.look_at_loads();
     }
 
-    /// The peaks of loads at the ends of steps and in samples, if kept.
+    /// Load peaks at the ends of steps and in samples, if tracked.
     pub fn load_peaks(&self) -> Option<&LoadPeaks> {
         self.loads.as_ref()
     }
 
-    /// Takes the loads at the latest state.
+    /// Records the loads at the latest state.
     fn look_at_loads(&mut self) {
         let time = self.state.now.t;
         self.look(time);
@@ -86,8 +86,8 @@ impl Simulation {
         }
     }
 
-    /// Where a fixed step is long compared with an impact, an output row inside it sees other rates than the cubic through
-    /// the penetration.
+    /// Samples a fixed step near a contact peak: if the step is long compared with an impact, an output row inside it sees other
+    /// rates than the penetration cubic.
     fn search_contacts(&mut self) {
         let near = std::mem::take(&mut self.attempt.near_peak);
         if !near || self.locates() {

@@ -1,4 +1,4 @@
-//! The whole state: copied, restored, hashed.
+//! Copying, restoring and hashing the whole state.
 
 use super::automatic::prepare_implicit;
 use super::{Simulation, State};
@@ -16,7 +16,7 @@ impl State {
         self.record.statistics.steps
     }
 
-    /// Approximate, rounded up.
+    /// Approximate size in bytes, rounded up.
     pub(in crate::simulate) fn bytes(&self) -> usize {
         // Both ends of the step, the ledger's and the stepper's copies.
         const COPIES: usize = 12;
@@ -30,7 +30,7 @@ impl State {
     }
 }
 
-/// Allocates what `method` needs, which was in use with these equations when the snapshot was taken.
+/// Allocates the workspace of `method`, which these equations already used when the snapshot was taken.
 fn prepare(mechanism: &mut Mechanism, method: Method) {
     prepare_implicit(mechanism, method).expect("it was not too costly then");
 }
@@ -47,8 +47,8 @@ impl Simulation {
         }
     }
 
-    /// A simulation in the state of `snapshot`. Nothing is assembled: a live change may have led to where no start would
-    /// be accepted. Continuing gives the same bits as where the snapshot was taken.
+    /// A simulation in the state of `snapshot`. Nothing is assembled again: after a live change the state may not be acceptable
+    /// as a start. Continuing gives the same bits as in the original run.
     pub fn of(snapshot: &Snapshot) -> Self {
         let machine = &snapshot.machine;
         let mut mechanism = Mechanism::resumed(machine, &snapshot.structure);
@@ -59,8 +59,8 @@ impl Simulation {
         simulation
     }
 
-    /// Restores a state of this simulation, or of any other, with its peaks and counters. If the equations are still those
-    /// of the snapshot they are kept, and this costs about as much as a step; else as [`Self::of`].
+    /// Restores a state of this simulation, or of any other, with its peaks and counters. If the equations are still those of the
+    /// snapshot, they are reused and the cost is about that of a step; otherwise it is that of [`Self::of`].
     pub fn restore(&mut self, snapshot: &Snapshot) {
         if !self.mechanism.has_structure(&snapshot.structure) {
             *self = Self::of(snapshot);
@@ -85,7 +85,7 @@ impl Simulation {
         let Self { mechanism, state, scratch_k, .. } = self;
         // The interpolant of the previous step is not part of the state.
         state.before.copy_from(&state.now);
-        // What is read from the mechanism between steps: motion, reactions, clearance ramps.
+        // Recompute the quantities read from the mechanism between steps: motion, reactions, clearance ramps.
         let now = &state.now;
         let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &now.memory));
         evaluator.derivative(now.t, &now.y, scratch_k);
@@ -94,8 +94,8 @@ impl Simulation {
     }
 
     /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball joint
-    /// whether it is in contact, its approach speed, and its clearance in force. The current piece of the friction law is
-    /// left out: like the step size it belongs to the stepper.
+    /// whether it is in contact, its approach speed, and its current clearance. The current piece of the friction law is
+    /// excluded: like the step size, it belongs to the stepper.
     pub fn state_hash(&self) -> u64 {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut add = |bits: u64| {

@@ -4,8 +4,8 @@ use super::Simulation;
 use crate::simulate::Wear;
 
 impl Simulation {
-    /// Keeps a wear map from now on, empty except for the contacts under way, which count as begun. It belongs to the
-    /// state: a snapshot holds it, and a reset ends it. It does not affect the steps.
+    /// Starts a wear map, empty except for the current contacts, which count as begun. It belongs to the state: a snapshot
+    /// contains it, and a reset ends it. It does not affect the steps.
     pub fn keep_wear(&mut self) {
         let mut wear = Wear::new(&self.machine);
         self.look(self.state.now.t);
@@ -19,12 +19,12 @@ impl Simulation {
         self.state.record.wear = Some(wear);
     }
 
-    /// The wear map, if kept.
+    /// The wear map, if there is one.
     pub fn wear(&self) -> Option<&Wear> {
         self.state.record.wear.as_ref()
     }
 
-    /// Adds what the latest step did to the wear map. The next step would do so, too.
+    /// Adds the contributions of the latest step to the wear map, instead of leaving that to the next step.
     pub fn commit_wear(&mut self) {
         if let Some(wear) = &mut self.state.record.wear {
             wear.pass();
