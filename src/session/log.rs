@@ -55,7 +55,7 @@ impl Event {
     /// here: the caller that steps the run handles them.
     ///
     /// # Errors
-    /// As [`Simulation::set`]; the run is left unchanged.
+    /// As [`LiveScene::set`]; the run is left unchanged.
     pub fn apply(&self, run: &mut LiveScene, original: &Scene) -> Result<Effect, SetError> {
         match self {
             Self::Set { key, value } => {

@@ -648,7 +648,7 @@ impl Player {
     /// Back to t = 0 with every change applied.
     ///
     /// # Errors
-    /// As [`Simulation::reset`]; the run is left unchanged.
+    /// As [`LiveScene::reset`]; the run is left unchanged.
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation.reset()?;
         self.stopped = None;
@@ -675,7 +675,7 @@ impl Player {
     /// Changes a parameter to a value as a user writes it.
     ///
     /// # Errors
-    /// As [`Simulation::set`]; the run is left unchanged.
+    /// As [`LiveScene::set`]; the run is left unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
         let run_before = self.before_change(key);
         if self.has_future() {
@@ -751,7 +751,7 @@ impl Player {
     /// Resets a parameter to its value in the scene file.
     ///
     /// # Errors
-    /// As [`Simulation::set_value`]; the run is left unchanged.
+    /// As [`LiveScene::set_value`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.original.get(key)?;
         let run_before = self.before_change(key);

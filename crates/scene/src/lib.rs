@@ -47,7 +47,6 @@ mod load;
 pub mod mesh;
 mod model;
 mod numbers;
-mod outline;
 mod own;
 mod parameters;
 mod pattern;
@@ -77,7 +76,7 @@ pub use key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, ValueType,
 pub use live::{LiveScene, SceneSnapshot, SetError};
 pub use load::*;
 pub use model::*;
-pub use outline::{OutlineFault, fill};
+
 pub use parameters::*;
 pub use quantity::{DimensionError, Quantity, evaluate};
 pub use table::{find, reference_page, table};

@@ -6,7 +6,7 @@ use super::mesh::{Fault, Format};
 use super::pattern_instance::PatternInstance;
 use super::placement::read_rotation;
 use super::*;
-use jointplay_physics::machine::Solid;
+use jointplay_physics::machine::{Solid, fill};
 use jointplay_physics::units::format_quantity_digits;
 use jointplay_physics::words::words;
 

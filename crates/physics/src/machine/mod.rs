@@ -8,6 +8,7 @@ mod element;
 mod joint;
 mod mesh;
 mod mesh_unit;
+mod outline;
 mod roles;
 mod settings;
 mod solid;
@@ -19,6 +20,7 @@ pub use drive::*;
 pub use element::*;
 pub use joint::*;
 pub use mesh::Mesh;
+pub use outline::{OutlineFault, fill};
 pub use settings::*;
 pub use solid::Solid;
 

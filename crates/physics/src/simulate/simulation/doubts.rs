@@ -36,7 +36,7 @@ const LOOSEST_HELD: f64 = 3e-5;
 
 impl Simulation {
     /// Reasons not to trust the results since the last reset; empty if there are none. Begins with
-    /// [`crate::scene::Scene::doubts`] of the running scene.
+    /// [`crate::machine::Machine::doubts`] of the machine as it is running.
     pub fn doubts(&self) -> Vec<Doubt> {
         let machine = self.machine.doubts().into_iter().map(Doubt::Machine);
         let mut doubts: Vec<Doubt> = machine.collect();
