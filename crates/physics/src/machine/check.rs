@@ -399,9 +399,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 mod tests {
     use super::*;
     use crate::machine::{Attachment, Body, Joint, Mat3, Vec3};
-    use crate::mechanism::MechanismError;
     use crate::scene::{Scene, built_in_text};
-    use crate::simulate::Simulation;
 
     /// Fault of a machine with a bob in a socket after `change`.
     fn fault(change: impl FnOnce(&mut Machine)) -> Option<MachineFault> {
@@ -410,11 +408,7 @@ mod tests {
         let [socket, ball] = [Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros())];
         machine.ball_joints.push(BallJoint::new("S1", socket, ball));
         change(&mut machine);
-        let found = machine.check().err();
-        // Nothing panics, and a simulation reports the same fault.
-        let started = Simulation::new(&machine).err().map(|error| error.0);
-        assert_eq!(started, found.clone().map(MechanismError::Machine));
-        found
+        machine.check().err()
     }
 
     #[test]

@@ -174,3 +174,21 @@ impl Snapshot {
         self.state.bytes()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::{Attachment, BallJoint, MachineFault, Vec3};
+
+    #[test]
+    fn a_machine_whose_parts_do_not_fit_does_not_start() {
+        let fault = |machine: &Machine| Simulation::new(machine).err().map(|error| error.0);
+        assert_eq!(fault(&Machine::default()), Some(MechanismError::Machine(MachineFault::Empty)));
+        let mut machine = crate::scene::Scene::load("pendulum", &[]).expect("built in").machine;
+        assert_eq!(fault(&machine), None);
+        let [socket, ball] = [Attachment::on(0, Vec3::zeros()), Attachment::on(7, Vec3::zeros())];
+        machine.ball_joints.push(BallJoint::new("S2", socket, ball));
+        let beyond = MachineFault::NoBody { what: "S2".to_owned(), body: 7, bodies: 1 };
+        assert_eq!(fault(&machine), Some(MechanismError::Machine(beyond)));
+    }
+}
