@@ -8,7 +8,7 @@ use super::drawn::{BarKind, Pose, Solid};
 use super::solids::push_solid;
 use super::theme::Material;
 use super::{Colour, Layer, Line, to_f32};
-use crate::machine::{self, Attachment, Bushing, Freedom, Joint, JointCoordinate, Motor, Stop};
+use crate::machine::{self, Bushing, Freedom, Joint, JointCoordinate, Motor, Stop};
 use crate::scene::Scene;
 use crate::simulate::{ElementReport, Frame};
 
@@ -54,15 +54,8 @@ fn rotation(quat: &machine::Quat) -> Mat3 {
 }
 
 /// A sleeve at the point of one body and a pin at that of the other, along the bushing axis of lowest rotational stiffness.
-pub(super) fn push_bushing(
-    bushing: &Bushing,
-    from: &Attachment,
-    report: &ElementReport,
-    frame: &Frame,
-    style: &Style,
-    layer: &mut Layer,
-) {
-    let axes = Pose::in_frame(frame, from.body).rotation * rotation(&bushing.axes);
+pub(super) fn push_bushing(bushing: &Bushing, report: &ElementReport, frame: &Frame, style: &Style, layer: &mut Layer) {
+    let axes = Pose::in_frame(frame, bushing.from.body).rotation * rotation(&bushing.axes);
     let turning = &bushing.turning_stiffness;
     // Ties go to the last axis: the axis of a turned part is z.
     let softest = (0..3).rev().min_by(|&a, &b| turning[a].total_cmp(&turning[b])).unwrap_or(2);

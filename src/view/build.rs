@@ -358,7 +358,7 @@ impl SceneView {
                 push_ground(from, up, radius, width, colour, lines);
             }
             ElementKind::Bushing(bushing) => {
-                push_bushing(bushing, &element.points[0], report, frame, &style, solid);
+                push_bushing(bushing, report, frame, &style, solid);
             }
             ElementKind::Stop(stop) => push_stop(stop, report, (scene, frame), &style, solid),
             ElementKind::Motor(motor) => {

@@ -167,7 +167,7 @@ fn unbalanced(scene: &Scene, frame: &Frame) -> Vec<[Vec3; 2]> {
     }
     for (element, report) in scene.machine.elements.iter().zip(&frame.elements) {
         let torque = report.torque.unwrap_or_else(Vec3::zeros);
-        match &element.points[..] {
+        match &element.points(&scene.machine)[..] {
             [only] => push(only.body, report.points[1], report.force, torque),
             [from, to] => {
                 push(to.body, report.points[1], report.force, torque);

@@ -323,6 +323,11 @@ impl Place<'_, '_> {
         self.coordinate.expect("the element's table has a joint")
     }
 
+    /// Points of an element whose table has two.
+    fn two_points(&self) -> [Attachment; 2] {
+        [self.points[0], self.points[1]]
+    }
+
     fn number(&self, name: &str) -> Result<f64, SceneError> {
         self.section.number(name)
     }
@@ -404,7 +409,10 @@ impl Place<'_, '_> {
 }
 
 fn read_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
+    let [from, to] = place.two_points();
     let spring = Spring {
+        from,
+        to,
         length: place.number("length")?,
         damping: place.number("damping")?,
         elastic: place.elastic([("length", D::Length), ("tension", D::Force)])?,
@@ -426,6 +434,7 @@ fn read_load(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         Ok(copy.map_or(vector, |copy| copy.direction(vector)))
     };
     let load = Load {
+        on: place.points[0],
         frequency: place.number("frequency")?,
         phase: place.number("phase")?,
         force: vector("force")?,
@@ -497,7 +506,10 @@ fn read_bushing(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         let rotation = read_rotation(place.section.get(name))?;
         Ok(outside(0).map_or(rotation, |copy| copy.rotation(rotation)))
     };
+    let [from, to] = place.two_points();
     let bushing = Bushing {
+        from,
+        to,
         axes: rotation("axes")?,
         rotation: rotation("rotation")?,
         stiffness,
@@ -543,6 +555,7 @@ fn read_tyre(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
     };
     let own = place.section.get("up").and(place.section.document.copy);
     let tyre = Tyre {
+        on: place.points[0],
         radius: place.number("radius")?,
         stiffness: place.number("stiffness")?,
         damping: place.number("damping")?,
@@ -576,7 +589,7 @@ pub(super) fn read_element<'d>(
     let ends: Vec<&str> =
         keys.filter(|key| key.table().is_some_and(|of| of.name == ATTACHMENT.name)).map(|key| key.name).collect();
     let point = |key: &&str| read_attachment(&section, key, scene, bodies);
-    let mut points = ends.iter().map(point).collect::<Result<Vec<_>, _>>()?;
+    let points = ends.iter().map(point).collect::<Result<Vec<_>, _>>()?;
     match points[..] {
         [first, second] if first.body == second.body => {
             let [from, to] = [ends[0], ends[1]];
@@ -597,11 +610,10 @@ pub(super) fn read_element<'d>(
             let why = format!("this joint has a drive, which leaves a {kind} nothing to move");
             return Err(section.require("joint")?.error(why));
         }
-        points = of.points().to_vec();
         coordinate = Some(JointCoordinate { joint: index, freedom });
         section.document.on_hinge = freedom.turns();
     }
     let place = Place { section: &section, scene, points: &points, coordinate };
     let kind = read_kind(&place)?;
-    Ok((Element { name, kind, points }, section))
+    Ok((Element { name, kind }, section))
 }

@@ -2,7 +2,9 @@
 
 use std::cmp::Ordering;
 
-use super::{BallJoint, Doubt, ElementKind, JointCoordinate, Machine, Warning};
+use super::{
+    BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointSpring, Machine, Spcmm, Spring, Warning,
+};
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use crate::units::{Dimension, format_quantity, unit_names};
@@ -73,6 +75,22 @@ pub enum MachineFault {
         /// Name of the body.
         body: String,
     },
+    /// Points of a curve or of a table of positions that do not rise.
+    #[error("{what}: a curve needs at least two finite points, whose first numbers rise")]
+    Points {
+        /// Name of the joint or element.
+        what: String,
+    },
+    /// A closed form that the machine does not have, or that drives no such coordinate.
+    #[error(
+        "{what} follows coordinate {coordinate} of a closed form (counted from 0), which this machine does not have"
+    )]
+    NoClosedForm {
+        /// Name of the joint or element.
+        what: String,
+        /// Coordinate.
+        coordinate: usize,
+    },
     /// Contact parameters contradict one another.
     #[error("{joint}: {fault}")]
     Contact {
@@ -120,7 +138,6 @@ impl Machine {
             exists(&joint.name, joint.socket.body.max(joint.ball.body))?;
         }
         for element in &self.elements {
-            element.points.iter().try_for_each(|point| exists(&element.name, point.body))?;
             let has = |on: JointCoordinate| {
                 let joint = self.kinematic_joints().nth(on.joint);
                 joint.is_some_and(|joint| joint.kind.freedoms().contains(&on.freedom))
@@ -128,12 +145,44 @@ impl Machine {
             if element.coordinate().is_some_and(|on| !has(on)) {
                 return Err(MachineFault::NoCoordinate { element: element.name.clone() });
             }
+            element.points(self).iter().try_for_each(|point| exists(&element.name, point.body))?;
         }
         exists("output", Some(self.output.body))?;
+        self.check_laws()?;
         self.check_contacts().map_err(|conflict| {
             let joint = conflict.joint.map_or("contact", |joint| &self.ball_joints[joint].name);
             MachineFault::Contact { joint: joint.to_owned(), fault: conflict.fault }
         })
+    }
+
+    /// Checks curves and time laws.
+    fn check_laws(&self) -> Result<(), MachineFault> {
+        let rises = |what: &str, points: &[[f64; 2]]| {
+            let finite = points.iter().flatten().all(|number| number.is_finite());
+            let rising = points.len() >= 2 && points.windows(2).all(|pair| pair[0][0] < pair[1][0]);
+            if finite && rising { Ok(()) } else { Err(MachineFault::Points { what: what.to_owned() }) }
+        };
+        // Elements follow laws of their own.
+        let check = |what: &str, drive: &Drive, forms: usize| match drive {
+            Drive::Table { points, .. } => rises(what, points),
+            Drive::ClosedForm(coordinate) if *coordinate >= forms => {
+                Err(MachineFault::NoClosedForm { what: what.to_owned(), coordinate: *coordinate })
+            }
+            _ => Ok(()),
+        };
+        let forms = if self.spcmm.is_some() { Spcmm::SLIDERS } else { 0 };
+        for joint in &self.joints {
+            joint.drives().try_for_each(|(_, drive)| check(&joint.name, drive, forms))?;
+        }
+        for element in &self.elements {
+            element.law().map_or(Ok(()), |law| check(&element.name, law, 0))?;
+            if let ElementKind::Spring(Spring { elastic: Elastic::Curve(points), .. })
+            | ElementKind::JointSpring(JointSpring { elastic: Elastic::Curve(points), .. }) = &element.kind
+            {
+                rises(&element.name, points)?;
+            }
+        }
+        Ok(())
     }
 
     /// Length scale of relative tolerances, m: the smallest ball radius, or 50 times the smallest depth of a slide's stop, at
@@ -261,7 +310,7 @@ impl Machine {
     fn pushes(&self) -> Vec<f64> {
         let mut pushes = vec![0.0; self.bodies.len()];
         for element in &self.elements {
-            for body in element.points.iter().filter_map(|point| point.body) {
+            for body in element.points(self).iter().filter_map(|point| point.body) {
                 pushes[body] += element.own_force();
             }
         }
@@ -398,7 +447,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, Body, Joint, Mat3, Vec3};
+    use crate::machine::{Attachment, Body, Element, Joint, Mat3, SpringSide, Vec3};
     use crate::scene::{Scene, built_in_text};
 
     /// Fault of a machine with a bob in a socket after `change`.
@@ -426,6 +475,23 @@ mod tests {
         for inertia in [Mat3::zeros(), -Mat3::identity(), Mat3::new(1.0, 0.1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)] {
             assert!(matches!(fault(|machine| machine.bodies[0].inertia = inertia), Some(MachineFault::Inertia { .. })));
         }
+        let drive = |drive: Drive| {
+            move |machine: &mut Machine| machine.joints[0] = Joint::revolute(None, 0, Vec3::z()).with_drive(drive)
+        };
+        let table = |points: &[[f64; 2]]| drive(Drive::Table { points: points.to_vec(), repeats: false });
+        assert_eq!(fault(table(&[[0.0, 1.0], [1.0, 2.0]])), None);
+        for points in [&[][..], &[[0.0, 1.0]], &[[1.0, 1.0], [1.0, 2.0]], &[[0.0, 1.0], [1.0, f64::NAN]]] {
+            assert!(matches!(fault(table(points)), Some(MachineFault::Points { .. })), "{points:?}");
+        }
+        let none = fault(drive(Drive::ClosedForm(2)));
+        assert!(matches!(none, Some(MachineFault::NoClosedForm { coordinate: 2, .. })), "{none:?}");
+        let curve = fault(|machine| {
+            let [from, to] = [Attachment::world(Vec3::zeros()), Attachment::on(0, Vec3::zeros())];
+            let (elastic, side) = (Elastic::Curve(Vec::new()), SpringSide::Both);
+            let spring = Spring { from, to, length: 0.1, elastic, damping: 0.0, side };
+            machine.elements.push(Element { name: "s".to_owned(), kind: ElementKind::Spring(spring) });
+        });
+        assert_eq!(curve, Some(MachineFault::Points { what: "s".to_owned() }));
         let wide = fault(|machine| machine.ball_joints[0].contact.clearance = 1.0);
         assert!(matches!(wide, Some(MachineFault::Contact { joint, .. }) if joint == "S1"));
     }

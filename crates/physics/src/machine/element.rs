@@ -1,7 +1,7 @@
 //! Force elements: springs, loads, stops and others that load bodies without a constraint. Their physics is in
 //! `mechanism/elements`, one file for each kind.
 
-use super::{Attachment, Drive, Freedom, Quat, Vec3};
+use super::{Attachment, Drive, Freedom, Machine, Quat, Vec3};
 use crate::words::words;
 
 /// A force element.
@@ -11,9 +11,6 @@ pub struct Element {
     pub name: String,
     /// Kind, with its parameters.
     pub kind: ElementKind,
-    /// Points of application: one, or two for an element between points. An element on a joint coordinate has the parent and
-    /// child points of that joint.
-    pub points: Vec<Attachment>,
 }
 
 /// Kind of a force element. Adding one takes a variant here, a file in `mechanism/elements`, and its row in the scene format.
@@ -61,6 +58,10 @@ pub enum Elastic {
 /// Tension `elastic` + `damping` dl/dt along the line between two points, restricted to one sign if the spring is one-sided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spring {
+    /// First point of application.
+    pub from: Attachment,
+    /// Second point of application, on another body.
+    pub to: Attachment,
     /// Distance of the points at zero stretch, m.
     pub length: f64,
     /// Tension as a function of the stretch.
@@ -74,6 +75,8 @@ pub struct Spring {
 /// An external load: constant if the frequency is 0, otherwise times sin(2 pi frequency t + phase).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
+    /// Point of application, on a body.
+    pub on: Attachment,
     /// Force at its point, N.
     pub force: Vec3,
     /// Torque, N m.
@@ -121,6 +124,10 @@ pub struct Stop {
 /// Diagonal stiffnesses and dampings along and about axes fixed in the first of two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bushing {
+    /// First point of application.
+    pub from: Attachment,
+    /// Second point of application, on another body.
+    pub to: Attachment,
     /// Its axes in the first body.
     pub axes: Quat,
     /// Orientation of the second body relative to the first at which the torque vanishes.
@@ -155,6 +162,8 @@ pub struct Motor {
 /// Tyre force k d + c dd/dt along `up` at the wheel's centre, never below 0, with the depth d of the wheel in the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tyre {
+    /// Point of application, on a body.
+    pub on: Attachment,
     /// Unit vector, world axes.
     pub up: Vec3,
     /// Height of the centre above ground at first contact, m.
@@ -234,6 +243,28 @@ impl Elastic {
 }
 
 impl Element {
+    /// Points of application in `machine`: one, or two for an element between points; of one on a joint coordinate, the parent and
+    /// child points of that joint.
+    pub fn points(&self, machine: &Machine) -> Vec<Attachment> {
+        match &self.kind {
+            ElementKind::Spring(Spring { from, to, .. }) | ElementKind::Bushing(Bushing { from, to, .. }) => {
+                vec![*from, *to]
+            }
+            ElementKind::Load(Load { on, .. }) | ElementKind::Tyre(Tyre { on, .. }) => vec![*on],
+            ElementKind::JointSpring(JointSpring { on, .. })
+            | ElementKind::Stop(Stop { on, .. })
+            | ElementKind::Motor(Motor { on, .. }) => {
+                let joint = machine.kinematic_joints().nth(on.joint);
+                joint.map_or_else(Vec::new, |joint| joint.points().to_vec())
+            }
+        }
+    }
+
+    /// Whether it acts between two points of its own.
+    pub fn is_between_points(&self) -> bool {
+        matches!(self.kind, ElementKind::Spring(_) | ElementKind::Bushing(_))
+    }
+
     /// The joint coordinate on which it acts, if any.
     pub fn coordinate(&self) -> Option<JointCoordinate> {
         match &self.kind {

@@ -91,7 +91,7 @@ impl Machine {
     fn points(&self) -> impl Iterator<Item = Attachment> {
         let joints = self.joints.iter().chain(&self.closing_joints).flat_map(Joint::points);
         let balls = self.ball_joints.iter().flat_map(|joint| [joint.socket, joint.ball]);
-        let elements = self.elements.iter().flat_map(|element| element.points.iter().copied());
+        let elements = self.elements.iter().flat_map(|element| element.points(self));
         joints.chain(balls).chain(elements)
     }
 }

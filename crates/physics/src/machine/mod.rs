@@ -151,6 +151,11 @@ pub struct Spcmm {
     pub driven_rod: f64,
 }
 
+impl Spcmm {
+    /// Number of sliders, the coordinates that the closed form drives.
+    pub const SLIDERS: usize = 3;
+}
+
 /// Contents of the pose columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {

@@ -37,7 +37,7 @@ impl FreeFlightBody {
             return Vec::new();
         }
         let mut loaded = vec![false; model.bodies.len()];
-        let points = machine.elements.iter().flat_map(|element| &element.points);
+        let points = machine.elements.iter().flat_map(|element| element.points(machine));
         for body in points.filter_map(|point| point.body) {
             loaded[body] = true;
         }

@@ -251,10 +251,7 @@ fn has(machine: &Machine, first: Option<&Frame>, signal: &Signal, part: usize, f
         }
         Take::ProbeError => known(machine.output.probe.is_some()),
         Take::Element(_) => known(true),
-        Take::ElementValue(_) => {
-            let element = &machine.elements[part];
-            element.coordinate().is_none() && element.points.len() == 2
-        }
+        Take::ElementValue(_) => machine.elements[part].is_between_points(),
         _ => true,
     }
 }

@@ -5,7 +5,7 @@
 //! rotations up to half a turn. Both forces act at the second point, and the torque is -J^-T L theta, where J maps the rate of
 //! theta to the relative angular velocity. About one axis that is -L theta.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, Turning, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Turning, push};
 use crate::machine::{self, Mat3, Quat, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::{Kinematics, quaternion_of};
@@ -39,11 +39,11 @@ struct State {
     spin: Vec3,
 }
 
-pub(super) fn make(bushing: &machine::Bushing, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(bushing: &machine::Bushing, [from, to]: [Anchor; 2]) -> Box<dyn SceneElement> {
     let matrix = |rotation: Quat| rotation.to_rotation_matrix().into_inner();
     Box::new(Bushing {
-        from: site.anchors[0],
-        to: site.anchors[1],
+        from,
+        to,
         axes: matrix(bushing.axes),
         rest: matrix(bushing.rotation),
         stiffness: bushing.stiffness,

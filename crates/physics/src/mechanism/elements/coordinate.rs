@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use super::{Coupling, ElementReport, Turning, push};
 use crate::machine::{Freedom, JointCoordinate, Machine, Mat3, Vec3};
 use crate::mechanism::kinematics::{Kinematics, Wrench};
-use crate::mechanism::model::Anchor;
+use crate::mechanism::model::{Anchor, Model};
 
 /// A displacement along an axis or an angle about it.
 #[derive(Clone, Copy)]
@@ -46,10 +46,11 @@ pub(super) struct Slopes {
 }
 
 impl Coordinate {
-    /// Coordinate `on` of `machine`; `ends` are the points connected by its joint.
-    pub fn of(machine: &Machine, on: JointCoordinate, ends: &[Anchor]) -> Self {
+    /// The coordinate `on` of `machine`.
+    pub fn of(machine: &Machine, model: &Model, on: JointCoordinate) -> Self {
         let freedom = on.freedom;
         let joint = machine.kinematic_joints().nth(on.joint).expect("an element acts on a joint of its machine");
+        let [parent, child] = joint.points().map(|point| model.anchor(machine, &point));
         let (axis, second, rest) = (joint.axis, joint.child_axis, joint.rotation);
         let [across, seen] = match freedom {
             Freedom::FirstTurn => [rest * second, second],
@@ -62,8 +63,8 @@ impl Coordinate {
         };
         let in_child = freedom == Freedom::SecondTurn;
         Self {
-            parent: ends[0],
-            child: ends[1],
+            parent,
+            child,
             turns: freedom.turns(),
             axis: if in_child { second } else { axis },
             in_child,

@@ -3,7 +3,7 @@
 
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::elastic::Elastic;
-use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
 use crate::machine::{self, SpringSide};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -16,9 +16,9 @@ struct JointSpring {
     damping: f64,
 }
 
-pub(super) fn make(spring: &machine::JointSpring, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(spring: &machine::JointSpring, on: Coordinate) -> Box<dyn SceneElement> {
     Box::new(JointSpring {
-        on: site.coordinate(),
+        on,
         position: spring.position,
         elastic: Elastic::new(&spring.elastic, SpringSide::Both),
         damping: spring.damping,

@@ -1,6 +1,6 @@
 //! External force and torque on a body, constant or harmonic, in world or body axes.
 
-use super::{At, ElementReport, ForceElement, Loads, Mount, SceneElement, point_of, push};
+use super::{At, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
 use crate::machine::{self, LoadAxes, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -16,9 +16,9 @@ struct Load {
     phase: f64,
 }
 
-pub(super) fn make(load: &machine::Load, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(load: &machine::Load, on: Anchor) -> Box<dyn SceneElement> {
     Box::new(Load {
-        on: site.anchors[0],
+        on,
         force: load.force,
         torque: load.torque,
         turns: load.axes == LoadAxes::Body,

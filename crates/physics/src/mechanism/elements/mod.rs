@@ -24,7 +24,7 @@ use super::drives::{Law, trajectory_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
-use crate::machine::{Attachment, Drive, Element, ElementKind, Machine, Mat3, Vec3};
+use crate::machine::{Attachment, Drive, Element, ElementKind, JointCoordinate, Machine, Mat3, Vec3};
 use coordinate::Coordinate;
 pub use pull::Pull;
 
@@ -265,34 +265,19 @@ pub(super) trait SceneElement: ForceElement {
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }
 
-/// Mounting of an element of the scene.
-struct Mount<'a> {
-    /// Points of attachment.
-    anchors: &'a [Anchor],
-    coordinate: Option<Coordinate>,
-}
-
-impl Mount<'_> {
-    /// Joint coordinate; only for kinds that act on a joint.
-    fn coordinate(&self) -> Coordinate {
-        self.coordinate.expect("a kind that acts on a joint")
-    }
-}
-
 /// The force elements of `machine`, in the order of the scene.
 pub(super) fn elements_of(machine: &Machine, model: &Model) -> Vec<Box<dyn SceneElement>> {
     let make = |element: &Element| {
-        let anchors: Vec<Anchor> = element.points.iter().map(|point| model.anchor(machine, point)).collect();
-        let coordinate = element.coordinate().map(|on| Coordinate::of(machine, on, &anchors));
-        let site = Mount { anchors: &anchors, coordinate };
+        let anchor = |point: &Attachment| model.anchor(machine, point);
+        let coordinate = |on: JointCoordinate| Coordinate::of(machine, model, on);
         match &element.kind {
-            ElementKind::Spring(spring) => spring::make(spring, &site),
-            ElementKind::Load(load) => load::make(load, &site),
-            ElementKind::JointSpring(spring) => joint_spring::make(spring, &site),
-            ElementKind::Stop(stop) => stop::make(stop, &site),
-            ElementKind::Bushing(bushing) => bushing::make(bushing, &site),
-            ElementKind::Motor(motor) => motor::make(motor, &site),
-            ElementKind::Tyre(tyre) => tyre::make(tyre, &site),
+            ElementKind::Spring(spring) => spring::make(spring, [&spring.from, &spring.to].map(anchor)),
+            ElementKind::Load(load) => load::make(load, anchor(&load.on)),
+            ElementKind::JointSpring(spring) => joint_spring::make(spring, coordinate(spring.on)),
+            ElementKind::Stop(stop) => stop::make(stop, coordinate(stop.on)),
+            ElementKind::Bushing(bushing) => bushing::make(bushing, [&bushing.from, &bushing.to].map(anchor)),
+            ElementKind::Motor(motor) => motor::make(motor, coordinate(motor.on)),
+            ElementKind::Tyre(tyre) => tyre::make(tyre, anchor(&tyre.on)),
         }
     };
     machine.elements.iter().map(make).collect()

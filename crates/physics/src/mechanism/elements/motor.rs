@@ -2,7 +2,7 @@
 //! joint's coordinate. Its work counts as drive work.
 
 use super::coordinate::{Coordinate, Place, Slopes};
-use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, law_of};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, law_of};
 use crate::jet::Jet;
 use crate::machine;
 use crate::mechanism::Powers;
@@ -20,9 +20,9 @@ struct Motor {
     target: Option<Arc<dyn Law>>,
 }
 
-pub(super) fn make(motor: &machine::Motor, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(motor: &machine::Motor, on: Coordinate) -> Box<dyn SceneElement> {
     Box::new(Motor {
-        on: site.coordinate(),
+        on,
         force: motor.force,
         stiffness: motor.stiffness,
         damping: motor.damping,

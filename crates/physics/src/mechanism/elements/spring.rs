@@ -2,7 +2,7 @@
 //! over l - length may replace the first two terms, and the spring may act only in compression or only in tension.
 
 use super::elastic::Elastic;
-use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, point_of, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
 use crate::machine::{self, Mat3, SpringSide, Vec3};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -37,10 +37,10 @@ struct State {
     slack: bool,
 }
 
-pub(super) fn make(spring: &machine::Spring, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(spring: &machine::Spring, [from, to]: [Anchor; 2]) -> Box<dyn SceneElement> {
     Box::new(Spring {
-        from: site.anchors[0],
-        to: site.anchors[1],
+        from,
+        to,
         length: spring.length,
         elastic: Elastic::new(&spring.elastic, spring.side),
         damping: spring.damping,

@@ -5,7 +5,7 @@
 //! the requested restitution, whatever the masses; a slower one rebounds with more.
 
 use super::coordinate::{Coordinate, Place, Slopes};
-use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement};
 use crate::contact::{NormalLaw, damping_factor};
 use crate::machine;
 use crate::mechanism::Powers;
@@ -41,7 +41,7 @@ struct Press {
     force: f64,
 }
 
-pub(super) fn make(stop: &machine::Stop, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(stop: &machine::Stop, on: Coordinate) -> Box<dyn SceneElement> {
     let machine::Stop { lower, upper, depth, .. } = *stop;
     let middle = match (lower.is_finite(), upper.is_finite()) {
         (true, true) => 0.5 * (lower + upper),
@@ -50,7 +50,7 @@ pub(super) fn make(stop: &machine::Stop, site: &Mount<'_>) -> Box<dyn SceneEleme
     };
     let chi = damping_factor(NormalLaw::Gonthier, stop.restitution);
     Box::new(Stop {
-        on: site.coordinate(),
+        on,
         middle,
         lower: lower - middle,
         upper: upper - middle,

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, Mount, SceneElement, law_of, point_of, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, law_of, point_of, push};
 use crate::jet::Jet;
 use crate::machine::{self, Mat3, Vec3};
 use crate::mechanism::Powers;
@@ -36,9 +36,9 @@ struct State {
     force: f64,
 }
 
-pub(super) fn make(tyre: &machine::Tyre, site: &Mount<'_>) -> Box<dyn SceneElement> {
+pub(super) fn make(tyre: &machine::Tyre, on: Anchor) -> Box<dyn SceneElement> {
     Box::new(Tyre {
-        on: site.anchors[0],
+        on,
         up: tyre.up,
         radius: tyre.radius,
         stiffness: tyre.stiffness,
