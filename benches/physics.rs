@@ -30,7 +30,7 @@ fn evaluation(watch: &Stopwatch, label: &str, scene: &Scene, time: f64) {
     let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
     simulation.advance_to(time).expect("a built-in scene runs");
     let t = simulation.time();
-    let y = simulation.state().to_vec();
+    let y = simulation.state_vector().to_vec();
     let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
     let joints = 0..mechanism.contacts.len();
     let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
@@ -111,7 +111,7 @@ fn chain(watch: &Stopwatch) {
         let scene = load("chain", &[("chain.links", &links.to_string())]);
         let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(2e-3).expect("a built-in scene runs");
-        let y = simulation.state().to_vec();
+        let y = simulation.state_vector().to_vec();
         let t = simulation.time();
         let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
         let memory = vec![Memory::default(); mechanism.contacts.len()];

@@ -12,17 +12,17 @@ use super::{Failure, provenance};
 use crate::files::{FileError, OutputFile, PROGRAM, PendingFile};
 use crate::scene::LiveScene;
 use crate::scene::{Scene, visible_line};
-use crate::simulate::SavedState;
+use crate::simulate::State;
 
 /// Version of the file layout.
-const FORMAT: u64 = 3;
+const FORMAT: u64 = 4;
 /// Size limit of a state file, bytes.
 const LARGEST: u64 = 1 << 30;
 
 /// Output file for the state of a run, claimed and known to be writable before the run starts.
 pub struct StateFile {
     file: OutputFile,
-    saved: Option<SavedState>,
+    saved: Option<State>,
 }
 
 impl StateFile {
@@ -39,7 +39,7 @@ impl StateFile {
     /// truncates, because a longer run would not truncate it.
     pub fn watch(&mut self, simulation: &LiveScene, end: f64) {
         if self.saved.is_none() && simulation.is_cut_by(end) {
-            self.saved = Some(simulation.saved());
+            self.saved = Some(simulation.state_vector().clone());
         }
     }
 
@@ -50,7 +50,7 @@ impl StateFile {
     pub fn text(&self, simulation: &LiveScene) -> Result<String, Failure> {
         let saved = match &self.saved {
             Some(saved) => saved,
-            None => &simulation.saved(),
+            None => simulation.state_vector(),
         };
         let scene = simulation.pending();
         let mut meta = provenance::meta(scene);
@@ -60,7 +60,7 @@ impl StateFile {
         meta.insert("step_end_s".into(), json!(saved.time()));
         provenance::insert_texts(&mut meta, scene);
         let state = serde_json::to_value(saved).unwrap_or_default();
-        if SavedState::deserialize(&state).ok().as_ref() != Some(saved) {
+        if State::deserialize(&state).ok().as_ref() != Some(saved) {
             let why = "the state holds a value that is not a number";
             return Err(FileError::cannot(self.file.path(), why).into());
         }
@@ -83,7 +83,7 @@ impl StateFile {
 /// A state from which a run resumes.
 pub struct Checkpoint {
     /// The state.
-    pub state: SavedState,
+    pub state: State,
     /// Time at which the run that saved it ended, s.
     pub time: f64,
 }
@@ -127,7 +127,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Checkpoint, Failure> {
     }
     check_scene(content.get("meta").unwrap_or(&Json::Null), scene).map_err(&refuse)?;
     let time = meta("time_s").as_f64();
-    let state = content.get("state").map(SavedState::deserialize);
+    let state = content.get("state").map(State::deserialize);
     let (Some(time), Some(state)) = (time, state) else {
         return Err(refuse("without a state, or its time".to_owned()));
     };

@@ -3,7 +3,7 @@
 
 use super::clock::Clock;
 use crate::machine::{Machine, Output, Vec3};
-use crate::simulate::{Frame, Simulation, Snapshot, StartError, Stopped, closed};
+use crate::simulate::{Frame, Simulation, StartError, State, Stopped, closed};
 use crate::view::output_point;
 
 /// Most snapshots; at this number every second one is dropped.
@@ -70,7 +70,7 @@ struct Motion {
     /// Frame at the latest requested instant reached.
     frame: Frame,
     /// Snapshots in order of time; the first is the start.
-    kept: Vec<(f64, Snapshot)>,
+    kept: Vec<(f64, State)>,
     apart: f64,
     stopped: Option<Stopped>,
 }
@@ -83,7 +83,7 @@ impl Ideal {
             let mut frame = Frame::default();
             simulation.sample(simulation.time(), &mut frame);
             Motion {
-                kept: vec![(simulation.time(), simulation.snapshot())],
+                kept: vec![(simulation.time(), simulation.state_vector().clone())],
                 simulation,
                 frame,
                 apart: APART,
@@ -169,7 +169,7 @@ impl Motion {
             let now = self.simulation.time();
             self.keep(now);
             let force = gravity.at(now);
-            if self.simulation.machine().gravity != force {
+            if self.simulation.conditions().gravity != force {
                 self.simulation.set_gravity(force);
             }
             self.stopped = self.simulation.step_until(gravity.next(now)).err();
@@ -191,7 +191,7 @@ impl Motion {
             });
             self.apart *= 2.0;
         }
-        self.kept.push((now, self.simulation.snapshot()));
+        self.kept.push((now, self.simulation.state_vector().clone()));
     }
 
     /// Restores the latest snapshot at or before `time`, s.

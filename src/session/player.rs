@@ -445,7 +445,7 @@ impl Player {
 
     /// Switches the ideal motion on or off. This never affects the run itself.
     pub fn set_ideal(&mut self, on: bool) {
-        self.ideal = on.then(|| Box::new(Ideal::new(self.simulation.machine())));
+        self.ideal = on.then(|| Box::new(Ideal::new(&self.simulation.running().machine)));
     }
 
     /// Starts a twin run from the present state, or ends it. This never affects the run itself.

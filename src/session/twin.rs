@@ -5,7 +5,7 @@ use crate::analysis::drive::common_period;
 use crate::analysis::exponent::{ALIGNMENT, Benettin, Exponent, offset, scaled_distance};
 use crate::analysis::orbit::Orbit as _;
 use crate::analysis::point::separation_of;
-use crate::simulate::{Frame, Simulation, Snapshot};
+use crate::simulate::{Frame, Simulation, State};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
@@ -35,7 +35,7 @@ struct Growth {
 impl Growth {
     /// Measures the growth from the present state of `run` on.
     fn new(run: &Simulation) -> Self {
-        let machine = run.machine();
+        let machine = &run.changed_machine();
         let interval = common_period(machine).ok().flatten().unwrap_or(UNDRIVEN);
         let mut benettin = Benettin::new(separation_of(machine), interval, ROOM);
         let mut twin = run.twin();
@@ -61,7 +61,7 @@ impl Growth {
 pub struct TwinMark {
     /// Start of that twin, s: no other can be restored from it.
     begins: f64,
-    state: Snapshot,
+    state: State,
     steps: u64,
 }
 
@@ -77,7 +77,7 @@ pub struct Twin {
     simulation: Simulation,
     /// Start, s, and the displaced state there. While the run retraces earlier time, the twin waits.
     begins: f64,
-    origin: Snapshot,
+    origin: State,
     frame: Frame,
     /// Time in s, distance in units of the scales.
     distances: Vec<[f64; 2]>,
@@ -95,19 +95,19 @@ pub struct Twin {
 impl Twin {
     /// A displaced copy of `run` in its present state.
     pub fn new(run: &Simulation) -> Self {
-        let mut simulation = Simulation::of(&run.snapshot());
+        let mut simulation = run.clone();
         let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
         simulation.displace(&away);
         let mut twin = Self {
             begins: run.time(),
-            origin: simulation.snapshot(),
+            origin: simulation.state_vector().clone(),
             simulation,
             frame: Frame::default(),
             distances: Vec::with_capacity(KEPT),
             stride: 1,
             steps: 0,
             goal: run.time(),
-            goal_state: run.state().to_vec(),
+            goal_state: run.state_vector().to_vec(),
             growth: Some(Growth::new(run)),
             ended: None,
         };
@@ -131,7 +131,7 @@ impl Twin {
 
     /// Saves the present state.
     pub fn mark(&self) -> TwinMark {
-        TwinMark { begins: self.begins, state: self.simulation.snapshot(), steps: self.steps }
+        TwinMark { begins: self.begins, state: self.simulation.state_vector().clone(), steps: self.steps }
     }
 
     /// Goes back with `run`, which was just restored to the instant of `mark`. Without a mark of this twin it waits for its
@@ -145,7 +145,7 @@ impl Twin {
         self.simulation.restore(state);
         (self.steps, self.ended) = (steps, None);
         self.goal = self.begins.max(run.time());
-        self.goal_state.copy_from_slice(run.state());
+        self.goal_state.copy_from_slice(run.state_vector());
         self.growth = None;
     }
 
@@ -167,7 +167,7 @@ impl Twin {
         }
         self.come_to(self.goal);
         self.goal = run.time();
-        self.goal_state.copy_from_slice(run.state());
+        self.goal_state.copy_from_slice(run.state_vector());
         match &mut self.growth {
             Some(growth) => growth.follow(run),
             None => self.growth = Some(Growth::new(run)),
@@ -196,7 +196,7 @@ impl Twin {
             return;
         }
         let scales = self.simulation.scales();
-        let distance = scaled_distance(&self.goal_state, self.simulation.state(), scales);
+        let distance = scaled_distance(&self.goal_state, self.simulation.state_vector(), scales);
         if self.distances.len() == KEPT {
             let mut keep = false;
             self.distances.retain(|_| {

@@ -122,7 +122,7 @@ fn run(scene: &Scene) -> Fate {
         }
         assert!(simulation.time() > before, "a step that takes no time");
     }
-    assert!(simulation.state().iter().all(|x| x.is_finite()));
+    assert!(simulation.state_vector().iter().all(|x| x.is_finite()));
     let peaks = &simulation.statistics().peak_normal;
     assert!(peaks.iter().all(|peak| *peak >= 0.0 && peak.is_finite()));
     for doubt in simulation.doubts() {

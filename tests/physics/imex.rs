@@ -106,7 +106,7 @@ fn on_settled_contacts_the_error_shrinks_with_the_step() {
     let start = exact.snapshot();
     let end = exact.time() + 0.02;
     crate::common::run_until(&mut exact, end);
-    let exact = exact.state().to_vec();
+    let exact = exact.state_vector().to_vec();
     let points = [200.0, 100.0, 50.0, 25.0].map(|step| {
         let mut simulation = LiveScene::new(&scene("spcmm", &[])).unwrap();
         simulation.restore(&start);
@@ -114,8 +114,13 @@ fn on_settled_contacts_the_error_shrinks_with_the_step() {
         simulation.set("solver.step", &format!("{step} us")).unwrap();
         crate::common::run_until(&mut simulation, end);
         let scale = simulation.mechanism().scale();
-        let error =
-            simulation.state().iter().zip(&exact).zip(scale).map(|((a, b), s)| (a - b).abs() / s).fold(0.0, f64::max);
+        let error = simulation
+            .state_vector()
+            .iter()
+            .zip(&exact)
+            .zip(scale)
+            .map(|((a, b), s)| (a - b).abs() / s)
+            .fold(0.0, f64::max);
         (step, error)
     });
     let found = slope(&points);

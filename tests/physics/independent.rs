@@ -146,8 +146,8 @@ fn the_measuring_mechanism_moves_the_same_under_another_solver() {
 /// How far the program's positions are from those of another solver, m or rad.
 fn off(simulation: &Simulation, theirs: &Run) -> f64 {
     let positions = Mechanism::new(simulation.machine()).unwrap().positions();
-    assert_eq!(simulation.state().len(), theirs.state.len());
-    let pairs = simulation.state()[..positions].iter().zip(&theirs.state);
+    assert_eq!(simulation.state_vector().len(), theirs.state.len());
+    let pairs = simulation.state_vector()[..positions].iter().zip(&theirs.state);
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 

@@ -220,14 +220,14 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     simulation.advance_to(0.025).unwrap();
     // Other changes still act now while that one waits.
     assert_eq!(simulation.set("contact.friction", "0.4"), Ok(Effect::Now));
-    assert_eq!(simulation.machine().ball_joints[0].contact.friction, 0.4);
+    assert_eq!(simulation.conditions().joints[0].friction, 0.4);
     assert_eq!(simulation.set("joint.S2.clearance", "0.4 mm"), Ok(Effect::Now));
     assert_eq!(clearances(&mut simulation), [0.3e-3, 0.4e-3, 0.3e-3]);
     simulation.reset().unwrap();
     assert_eq!(simulation.mechanism().summary().ideal_joints, 1);
     let frame = frame_now(&mut simulation);
     assert_eq!(frame.joints[0].state, jointplay::simulate::ContactState::Ideal);
-    assert_eq!(simulation.machine().ball_joints[1].contact.friction, 0.4);
+    assert_eq!(simulation.conditions().joints[1].friction, 0.4);
     // And back.
     assert_eq!(simulation.set("joint.S1.clearance", "0.2 mm"), Ok(Effect::AtReset));
     simulation.advance_to(0.01).unwrap();

@@ -90,7 +90,7 @@ fn projected(changes: &[(&str, &str)], exact: Option<&[f64]>) -> (f64, Vec<f64>,
     let ideal = [("joint.B.clearance", "0"), ("joint.C.clearance", "0")];
     let mut simulation = simulation("slider-crank", &[&ideal, changes].concat());
     run_until(&mut simulation, END);
-    let y = simulation.state().to_vec();
+    let y = simulation.state_vector().to_vec();
     let scale = simulation.mechanism().scale().to_vec();
     let error = exact.map_or(0.0, |exact| distance(&y, exact, &scale));
     (error, y, simulation.statistics().steps)

@@ -87,7 +87,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     let start = plain.state_hash();
     let steps = into_contact(&mut plain);
     let here = look(&mut plain);
-    let saved = serde_json::to_string(&plain.saved()).unwrap();
+    let saved = serde_json::to_string(&plain.state_vector()).unwrap();
     change(&mut plain);
     let (mut peaks, mut again) = (Vec::new(), Vec::new());
     let snapshot = plain.snapshot();
@@ -122,7 +122,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     change(&mut silent);
     (0..AFTER).for_each(|_| silent.step().unwrap());
     assert_eq!((silent.state_hash(), silent.ledger()), (first.0, None), "without a ledger");
-    assert_eq!((silent.state(), silent.statistics()), (plain.state(), plain.statistics()));
+    assert_eq!((silent.state_vector(), silent.statistics()), (plain.state_vector(), plain.statistics()));
 
     // Restored into itself, into one of other settings that never saw the run, and as a copy.
     let stranger = LiveScene::new(&crate::common::scene("spcmm", &[])).unwrap();

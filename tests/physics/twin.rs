@@ -8,7 +8,7 @@ use jointplay::simulate::Simulation;
 
 /// State with coordinate `i` moved by `by` and nothing else.
 fn moved(simulation: &mut Simulation, i: usize, by: f64) {
-    let mut offset = vec![0.0; simulation.state().len()];
+    let mut offset = vec![0.0; simulation.state_vector().len()];
     offset[i] = by;
     simulation.displace(&offset);
 }
@@ -27,7 +27,7 @@ fn a_displaced_state_goes_on_from_where_it_was_put() {
     for (a, b) in before.joints.iter().zip(&after.joints) {
         assert!(((b.eccentricity - a.eccentricity).x - 1e-5).abs() < 1e-14);
     }
-    let norm = |simulation: &Simulation| simulation.state()[3..7].iter().map(|q| q * q).sum::<f64>();
+    let norm = |simulation: &Simulation| simulation.state_vector()[3..7].iter().map(|q| q * q).sum::<f64>();
     moved(&mut simulation, 4, 1e-3);
     assert!((norm(&simulation) - 1.0).abs() < 1e-15);
     run_until(&mut simulation, 0.02);
@@ -42,7 +42,7 @@ fn contacts_follow_the_displacement_and_keep_their_memory() {
     assert!(settled.iter().all(|m| m.active));
     let impacts = simulation.statistics().impacts.clone();
     // Nothing moved: nothing changed.
-    let none = vec![0.0; simulation.state().len()];
+    let none = vec![0.0; simulation.state_vector().len()];
     simulation.displace(&none);
     assert_eq!(simulation.state_hash(), hash);
     // The balls hang, X points down: 50 um up lifts them off their walls, and 50 um down puts them back.
@@ -65,7 +65,7 @@ fn contacts_follow_the_displacement_and_keep_their_memory() {
 fn ideal_joints_stay_closed_under_a_displacement() {
     let mut simulation = simulation("slider-crank", &[]);
     run_until(&mut simulation, 0.05);
-    let offset: Vec<f64> = (0..simulation.state().len()).map(|i| 1e-4 * (i as f64).sin()).collect();
+    let offset: Vec<f64> = (0..simulation.state_vector().len()).map(|i| 1e-4 * (i as f64).sin()).collect();
     simulation.displace(&offset);
     let frame = frame_now(&mut simulation);
     assert!(frame.joints[0].eccentricity.norm() < 1e-12);

@@ -103,7 +103,7 @@ fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result
 fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunContext) -> Result<f64, AnalysisError> {
     let mut simulation = setting.start(scene)?;
     simulation.advance_to(loaded)?;
-    let (t, y) = (simulation.time(), simulation.state());
+    let (t, y) = (simulation.time(), simulation.state_vector());
     let mut mechanism = Mechanism::new(simulation.machine()).map_err(jointplay_physics::simulate::StartError)?;
     // Starting it determines its rank.
     mechanism.start().map_err(jointplay_physics::simulate::StartError)?;

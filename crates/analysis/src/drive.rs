@@ -146,7 +146,7 @@ impl Orbit for Simulation {
     }
 
     fn state(&self) -> &[f64] {
-        self.state()
+        self.state_vector()
     }
 
     fn scales(&self) -> &[f64] {
@@ -154,7 +154,7 @@ impl Orbit for Simulation {
     }
 
     fn twin(&self) -> Self {
-        Self::of(&self.snapshot())
+        self.clone()
     }
 
     fn displace(&mut self, offset: &[f64]) {
@@ -202,7 +202,7 @@ impl Orbit for ObservedRun {
     }
 
     fn state(&self) -> &[f64] {
-        self.simulation.state()
+        self.simulation.state_vector()
     }
 
     fn scales(&self) -> &[f64] {

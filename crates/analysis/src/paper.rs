@@ -42,8 +42,7 @@ impl Case {
 }
 
 /// Runs that differ in a single parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Series {
     /// Figures 5 to 10 and 18 to 20.
     Clearance,
@@ -130,8 +129,7 @@ impl Variants {
 }
 
 /// One of the two coordinates plotted in the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinate {
     /// Position, m.
     X,

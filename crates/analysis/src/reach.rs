@@ -113,8 +113,8 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<GoalResult
     let budget = WorkBudget { measured: 0.5, ..WorkBudget::REFERENCE };
     let (from, to) = goal.span();
     let speed = |setting: &Setting, context: &mut RunContext| {
-        let start = run_to(setting, scene, from, context, |_| {})?.snapshot();
-        let seconds = time_to(to, &budget, context, |_| Ok(Simulation::of(&start)))?;
+        let start = run_to(setting, scene, from, context, |_| {})?;
+        let seconds = time_to(to, &budget, context, |_| Ok(start.clone()))?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
     // Timed before and after the baseline, so that load setting in meanwhile slows both.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::timing::advance_capped;
 use super::{AnalysisError, End, RunContext, Setting, WorkBudget};
 use jointplay_physics::machine::Vec3;
-use jointplay_physics::simulate::{Frame, Peak, Simulation, Snapshot};
+use jointplay_physics::simulate::{Frame, Peak, Simulation};
 use jointplay_scene::Scene;
 
 /// Number of impacts compared.
@@ -64,7 +64,7 @@ pub struct SettledSpan {
     /// Mean magnitude of each joint's contact force (reaction of an ideal joint), N.
     pub means: Vec<f64>,
     /// State from which every run starts.
-    start: Snapshot,
+    start: Simulation,
 }
 
 /// Errors against the reference. `None`: the run did not get that far, or the scene has no such quantity.
@@ -266,10 +266,10 @@ impl ReferenceSolution {
 
     /// Finds settled motion and averages its forces.
     fn settle(&mut self, setting: &Setting, tighter: &Setting, context: &mut RunContext) -> Result<(), AnalysisError> {
-        let Some((start, started)) = settled_state(&self.scene, &mut context.part(0, 3))? else {
+        let Some(start) = settled_state(&self.scene, &mut context.part(0, 3))? else {
             return Ok(());
         };
-        let from = started + WARM_UP;
+        let from = start.time() + WARM_UP;
         self.settled = Some(SettledSpan {
             from,
             to: from + SETTLED_SPAN,
@@ -466,7 +466,7 @@ fn first_contacts(
 }
 
 /// The state in which every joint with clearance has been in contact for a while without a new impact.
-fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<(Snapshot, f64)>, AnalysisError> {
+fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simulation>, AnalysisError> {
     let setting = Setting::automatic(SETTLING);
     let mut simulation = setting.start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
@@ -485,7 +485,7 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<(Snap
         settled = simulation.time() - since >= QUIET;
         settled
     })?;
-    Ok(settled.then(|| (simulation.snapshot(), simulation.time())))
+    Ok(settled.then_some(simulation))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::AnalysisError;
 use jointplay_physics::integrate::Method;
 use jointplay_physics::machine::{Machine, Preset};
-use jointplay_physics::simulate::{Simulation, Snapshot};
+use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
 
 /// A method with its step size or tolerance.
@@ -68,10 +68,10 @@ impl Setting {
         Ok(Simulation::new(&self.of(&scene.machine))?)
     }
 
-    /// Continues from `snapshot` with this setting in place of its own.
-    pub(super) fn resume(&self, snapshot: &Snapshot) -> Result<Simulation, AnalysisError> {
-        let mut simulation = Simulation::of(snapshot);
-        let machine = self.of(simulation.machine());
+    /// Continues from the state of `start` with this setting in place of its own.
+    pub(super) fn resume(&self, start: &Simulation) -> Result<Simulation, AnalysisError> {
+        let mut simulation = start.clone();
+        let machine = self.of(&simulation.changed_machine());
         simulation.adopt(&machine)?;
         Ok(simulation)
     }

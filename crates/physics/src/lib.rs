@@ -26,6 +26,9 @@
 //! assert!(simulation.statistics().impacts[0] > 1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! A [`Simulation`](simulate::Simulation) is a constant [`Model`](simulate::Model), a [`State`](simulate::State) with all that
+//! changes, and a [`Workspace`](simulate::Workspace); several states of one model can be stepped side by side.
 
 pub mod contact;
 pub mod expression;

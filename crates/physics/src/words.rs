@@ -12,7 +12,7 @@ pub trait Words: Copy + 'static {
     fn of_word(word: &str) -> Option<Self>;
 }
 
-/// Implements `ALL`, `word` and [`Words`] for an enum, and prints and serialises each variant as its word. A variant without a
+/// Implements `ALL`, `word` and [`Words`] for an enum, and prints and serialises each variant as its word, from which it is read. A variant without a
 /// word does not compile.
 #[macro_export]
 macro_rules! named_by_words {
@@ -54,6 +54,14 @@ macro_rules! named_by_words {
         impl serde::Serialize for $name {
             fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 serializer.serialize_str(self.word())
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $name {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let word = <String as serde::Deserialize>::deserialize(deserializer)?;
+                let known = <Self as $crate::words::Words>::of_word(&word);
+                known.ok_or_else(|| serde::de::Error::unknown_variant(&word, <Self as $crate::words::Words>::WORDS))
             }
         }
     };

@@ -108,7 +108,7 @@ mod tests {
         let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
         let changes: Vec<(String, String)> = changes.iter().map(own).collect();
         let scene = Scene::parse(text, Some("mine.toml"), &changes).expect("reads");
-        let error = Simulation::new(&scene.machine).err().expect("cannot start");
+        let error = Simulation::new(&scene.machine).expect_err("cannot start");
         scene.locate(&error)
     }
 

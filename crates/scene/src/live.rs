@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use super::{Scene, SceneError, Value};
-use jointplay_physics::simulate::{ChangeError, Effect, Simulation, Snapshot, StartError};
+use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, StartError, State};
 
 /// Why a parameter of a running scene was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -30,14 +30,15 @@ pub struct LiveScene {
 pub struct SceneSnapshot {
     pending: Arc<Scene>,
     running: Arc<Scene>,
-    simulation: Snapshot,
+    model: Arc<Model>,
+    state: State,
 }
 
 impl Deref for SceneSnapshot {
-    type Target = Snapshot;
+    type Target = State;
 
-    fn deref(&self) -> &Snapshot {
-        &self.simulation
+    fn deref(&self) -> &State {
+        &self.state
     }
 }
 
@@ -123,22 +124,27 @@ impl LiveScene {
         SceneSnapshot {
             pending: self.pending.clone(),
             running: self.running.clone(),
-            simulation: self.simulation.snapshot(),
+            model: self.simulation.model().clone(),
+            state: self.simulation.state().clone(),
         }
     }
 
-    /// A live scene in the state of `snapshot`; see [`Simulation::of`].
+    /// A live scene in the state of `snapshot`.
     pub fn of(snapshot: &SceneSnapshot) -> Self {
         Self {
             pending: snapshot.pending.clone(),
             running: snapshot.running.clone(),
-            simulation: Simulation::of(&snapshot.simulation),
+            simulation: Simulation::of(snapshot.model.clone(), snapshot.state.clone()),
         }
     }
 
-    /// Restores a state of this scene or of any other; see [`Simulation::restore`].
+    /// Restores a state of this scene, which costs a copy, or of any other.
     pub fn restore(&mut self, snapshot: &SceneSnapshot) {
-        self.simulation.restore(&snapshot.simulation);
+        if Arc::ptr_eq(self.simulation.model(), &snapshot.model) {
+            self.simulation.restore(&snapshot.state);
+        } else {
+            self.simulation = Simulation::of(snapshot.model.clone(), snapshot.state.clone());
+        }
         self.pending = snapshot.pending.clone();
         self.running = snapshot.running.clone();
     }

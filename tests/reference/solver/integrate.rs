@@ -122,11 +122,11 @@ where
 {
     solver.set_stop_time(end).unwrap();
     loop {
-        let before = solver.state().t;
+        let before = solver.state_vector().t;
         let reason = solver.step().unwrap();
         let (t, root) = match reason {
             OdeSolverStopReason::RootFound(t, j) => (t, Some(j)),
-            _ => (solver.state().t, None),
+            _ => (solver.state_vector().t, None),
         };
         // Forces inside the step, for the peaks.
         for k in 1..=16 {

@@ -1,11 +1,9 @@
 //! Quantities that the paper reports for a run, and its numbers compared with this program's.
 
-use serde::{Deserialize, Deserializer, de::Error as _};
-
 use super::Coordinate::{Beta, X};
 use super::Published;
 use crate::response::{Extremes, Response};
-use jointplay_physics::words::{Words as _, words};
+use jointplay_physics::words::words;
 
 /// A scalar of a run shown in a figure, in SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,13 +35,6 @@ words!(FigureValue {
     Strongest => "largest contact force of any joint",
     LastSeparation => "last separation",
 });
-
-impl<'de> Deserialize<'de> for FigureValue {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let word = String::deserialize(deserializer)?;
-        Self::of_word(&word).ok_or_else(|| D::Error::unknown_variant(&word, Self::WORDS))
-    }
-}
 
 impl FigureValue {
     /// Contact forces, joint by joint.

@@ -15,6 +15,8 @@ pub use law::{
 pub use memory::Memory;
 pub use slip::FrictionPiece;
 
+use serde::{Deserialize, Serialize};
+
 use crate::words::words;
 
 type Vec3 = nalgebra::Vector3<f64>;
@@ -90,7 +92,7 @@ words!(ApproachSpeed {
 });
 
 /// Contact parameters of a ball joint. SI units.
-#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct Parameters {
     /// Radial clearance c = R - r, m; 0 makes the joint ideal.
     pub clearance: f64,

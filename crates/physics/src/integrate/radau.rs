@@ -41,8 +41,8 @@ const FAST: f64 = 0.05;
 /// Fraction of the allowed error that the iteration may leave (Hairer & Wanner II, IV.8).
 const LEFT: f64 = 0.03;
 
-/// Collocation polynomial of the latest step: its interpolant and the starting guess for the next step, and therefore part of a
-/// snapshot.
+/// Collocation polynomial of the latest attempt: its interpolant, and the starting guess for the next one. It belongs to the state
+/// of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Polynomial {
     /// Step size, s; 0 if there is none.
@@ -58,9 +58,53 @@ pub struct Polynomial {
 }
 
 impl Polynomial {
+    /// No polynomial yet, for `dimension` components.
+    pub fn new(dimension: usize) -> Self {
+        let z = std::array::from_fn(|_| vec![0.0; dimension]);
+        Self { h: 0.0, end: 0.0, z, contraction: 1.0, held: None }
+    }
+
     /// Whether the polynomial has `dimension` components.
     pub fn fits(&self, dimension: usize) -> bool {
         self.z.iter().all(|z| z.len() == dimension)
+    }
+
+    /// Discards the latest step after a change of state that is not a step.
+    pub fn clear(&mut self) {
+        self.h = 0.0;
+        self.contraction = 1.0;
+        self.held = None;
+    }
+
+    /// Truncates the latest attempt to the fraction `theta` of its length, with the same polynomial.
+    pub fn truncate(&mut self, theta: f64) {
+        let n = self.z[0].len();
+        for i in 0..n {
+            let course = DenseOutput::of(&std::array::from_fn(|j| self.z[j][i]));
+            for j in 0..3 {
+                self.z[j][i] = course.at(C[j] * theta - 1.0);
+            }
+        }
+        self.end -= (1.0 - theta) * self.h;
+        self.h *= theta;
+    }
+
+    /// Components `part` of the state at fraction `theta` of the latest attempt, which began at `y`.
+    pub fn interpolate(&self, part: Range<usize>, theta: f64, y: &[f64], out: &mut [f64]) {
+        let y = &y[part.clone()];
+        let z = self.z.each_ref().map(|z| &z[part.clone()]);
+        for (i, out) in out[part].iter_mut().enumerate() {
+            *out = y[i] + DenseOutput::of(&z.map(|z| z[i])).at(theta - 1.0);
+        }
+    }
+
+    /// Remembers the attempt of size `h` from `t` with the stage increments `z`.
+    fn remember(&mut self, moving: &[Range<usize>], t: f64, h: f64, z: &[Vec<f64>; 3]) {
+        for (to, z) in self.z.iter_mut().zip(z) {
+            copy(moving, to, z);
+        }
+        self.h = h;
+        self.end = t + h;
     }
 }
 
@@ -73,7 +117,6 @@ pub struct Radau {
     stage: Vec<f64>,
     error: Vec<f64>,
     linearised_at: Option<f64>,
-    previous: Polynomial,
     /// Largest contraction rate seen in the latest attempt; 0 if none was measured.
     contraction: f64,
     growth: f64,
@@ -98,29 +141,16 @@ impl Radau {
             contraction: 0.0,
             growth: f64::INFINITY,
             factorisations: 0,
-            previous: Polynomial { h: 0.0, end: 0.0, z: triple(), contraction: 1.0, held: None },
         }
     }
 
-    /// Discards the Jacobian and the previous step after a change of state that is not a step.
+    /// Discards the Jacobian after a change of state that is not a step.
     pub fn invalidate(&mut self) {
         self.linearised_at = None;
-        self.previous.h = 0.0;
-        self.previous.contraction = 1.0;
-        self.previous.held = None;
-    }
-
-    /// State that a resumed run needs to reproduce the same bits.
-    pub fn polynomial(&self) -> &Polynomial {
-        &self.previous
-    }
-
-    /// Restores this state, after [`Self::invalidate`].
-    pub fn set_polynomial(&mut self, polynomial: &Polynomial) {
-        self.previous.clone_from(polynomial);
     }
 
     /// As [`super::Stepper::attempt`]; `tolerance` also sets the convergence target of the iteration. Infinite if that fails.
+    /// `previous` is the polynomial of the previous attempt, and then of this one.
     pub fn attempt<S: StiffSystem>(
         &mut self,
         system: &mut S,
@@ -131,9 +161,10 @@ impl Radau {
         y_end: &mut [f64],
         k_end: &mut [f64],
         tolerance: f64,
+        previous: &mut Polynomial,
     ) -> f64 {
         self.factorisations = 0;
-        if self.begin(system.moving(), t, h) {
+        if self.begin(system.moving(), t, h, previous) {
             self.linearise_within(system, t, h, y);
         } else {
             if self.linearised_at != Some(t) {
@@ -142,15 +173,15 @@ impl Radau {
             }
             self.factor(system, h);
         }
-        let converged = self.iterate(system, t, h, y, tolerance);
+        let converged = self.iterate(system, t, h, y, tolerance, previous);
         self.growth = AIMED_CONTRACTION / self.contraction;
         if !converged {
-            self.previous.held = Some(HELD * h);
+            previous.held = Some(HELD * h);
             return f64::INFINITY;
         }
         if (f64::MIN_POSITIVE..FAST).contains(&self.contraction) {
-            self.previous.held = None;
-        } else if let Some(held) = &mut self.previous.held {
+            previous.held = None;
+        } else if let Some(held) = &mut previous.held {
             *held *= RELEASE;
             self.growth = self.growth.min(*held / h);
         }
@@ -159,7 +190,7 @@ impl Radau {
         system.derivative(t + h, y_end, k_end);
         // A diverged attempt is no guess for the next one.
         if error.is_finite() {
-            self.remember(system.moving(), t, h);
+            previous.remember(system.moving(), t, h, &self.z);
         }
         error
     }
@@ -176,10 +207,9 @@ impl Radau {
 
     /// Starting guess for the stages: the extrapolated polynomial of the previous step, or that of a longer attempt from the same
     /// point. Returns true for the former; an earlier attempt may have failed by diverging.
-    fn begin(&mut self, moving: &[Range<usize>], t: f64, h: f64) -> bool {
-        let again = self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
-        let follows =
-            self.previous.h > 0.0 && (self.previous.end - t).abs() <= 1e-9 * h && h <= FURTHEST * self.previous.h;
+    fn begin(&mut self, moving: &[Range<usize>], t: f64, h: f64, previous: &Polynomial) -> bool {
+        let again = previous.h > 0.0 && (previous.end - previous.h - t).abs() <= 1e-9 * h;
+        let follows = previous.h > 0.0 && (previous.end - t).abs() <= 1e-9 * h && h <= FURTHEST * previous.h;
         if !again && !follows {
             for j in 0..3 {
                 self.z[j].fill(0.0);
@@ -187,12 +217,12 @@ impl Radau {
             }
             return false;
         }
-        let ratio = h / self.previous.h;
+        let ratio = h / previous.h;
         // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
         let from = if again { -1.0 } else { 0.0 };
         let at = C.map(|c| from + c * ratio);
         for part in moving {
-            let before = self.previous.z.each_ref().map(|z| &z[part.clone()]);
+            let before = previous.z.each_ref().map(|z| &z[part.clone()]);
             let [z1, z2, z3] = self.z.each_mut().map(|z| &mut z[part.clone()]);
             let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[part.clone()]);
             for i in 0..part.len() {
@@ -224,13 +254,21 @@ impl Radau {
     }
 
     /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
-    fn iterate<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64], tolerance: f64) -> bool {
+    fn iterate<S: StiffSystem>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        tolerance: f64,
+        previous: &mut Polynomial,
+    ) -> bool {
         // The iteration error stays well below the step error.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(LEFT));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
         // After fast convergence in previous steps, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
-        let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
-        self.previous.contraction = trusted;
+        let trusted = libm::pow(previous.contraction.max(f64::EPSILON), 0.8);
+        previous.contraction = trusted;
         self.contraction = 0.0;
         let mut before = 0.0;
         let mut renewed = false;
@@ -286,8 +324,8 @@ impl Radau {
                 self.contraction = self.contraction.max(theta);
                 let mut fails = theta >= 0.99;
                 if !fails {
-                    self.previous.contraction = theta / (1.0 - theta);
-                    let left = self.previous.contraction * size;
+                    previous.contraction = theta / (1.0 - theta);
+                    let left = previous.contraction * size;
                     if left <= target {
                         return true;
                     }
@@ -340,36 +378,6 @@ impl Radau {
             for (i, error) in self.error[part.clone()].iter_mut().enumerate() {
                 *error += (ERROR[0] * z1[i] + ERROR[1] * z2[i] + ERROR[2] * z3[i]) / h;
             }
-        }
-    }
-
-    fn remember(&mut self, moving: &[Range<usize>], t: f64, h: f64) {
-        for (to, z) in self.previous.z.iter_mut().zip(&self.z) {
-            copy(moving, to, z);
-        }
-        self.previous.h = h;
-        self.previous.end = t + h;
-    }
-
-    /// Truncates the latest attempt to the fraction `theta` of its length, with the same polynomial.
-    pub fn truncate(&mut self, theta: f64) {
-        let n = self.stage.len();
-        for i in 0..n {
-            let course = DenseOutput::of(&std::array::from_fn(|j| self.previous.z[j][i]));
-            for j in 0..3 {
-                self.previous.z[j][i] = course.at(C[j] * theta - 1.0);
-            }
-        }
-        self.previous.end -= (1.0 - theta) * self.previous.h;
-        self.previous.h *= theta;
-    }
-
-    /// Components `part` of the state at `t + theta h`: the collocation polynomial.
-    pub fn interpolate(&self, part: Range<usize>, theta: f64, y: &[f64], out: &mut [f64]) {
-        let y = &y[part.clone()];
-        let z = self.previous.z.each_ref().map(|z| &z[part.clone()]);
-        for (i, out) in out[part].iter_mut().enumerate() {
-            *out = y[i] + DenseOutput::of(&z.map(|z| z[i])).at(theta - 1.0);
         }
     }
 }
@@ -517,12 +525,13 @@ mod tests {
     fn end(epsilon: f64, steps: u32) -> [f64; 2] {
         let mut system = VanDerPol::new(epsilon);
         let mut method = Radau::new(2);
+        let mut polynomial = Polynomial::new(2);
         let (mut y, mut k, mut y1, mut k1) = ([1.5, -1.0], [0.0; 2], [0.0; 2], [0.0; 2]);
         let h = 0.5 / f64::from(steps);
         for n in 0..steps {
             let t = f64::from(n) * h;
             system.derivative(t, &y, &mut k);
-            let error = method.attempt(&mut system, t, h, &y, &k, &mut y1, &mut k1, 1e-13);
+            let error = method.attempt(&mut system, t, h, &y, &k, &mut y1, &mut k1, 1e-13, &mut polynomial);
             assert!(error.is_finite(), "the iteration failed at {t}");
             y = y1;
         }
@@ -548,11 +557,12 @@ mod tests {
             let (mut y1, mut k1) = (y.clone(), k.clone());
             let mut system = VanDerPol::new(0.1);
             let mut method = Radau::new(y.len());
+            let mut polynomial = Polynomial::new(y.len());
             system.derivative(0.0, &y, &mut k);
             let mut error = 0.0;
             for n in 0..2 {
                 let t = 0.02 * f64::from(n);
-                error = method.attempt(&mut system, t, 0.02, &y, &k, &mut y1, &mut k1, 1e-9);
+                error = method.attempt(&mut system, t, 0.02, &y, &k, &mut y1, &mut k1, 1e-9, &mut polynomial);
                 std::mem::swap(&mut y, &mut y1);
                 std::mem::swap(&mut k, &mut k1);
             }

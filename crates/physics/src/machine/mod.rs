@@ -2,6 +2,7 @@
 
 mod body;
 mod check;
+mod conditions;
 mod doubts;
 mod drive;
 mod element;
@@ -15,6 +16,7 @@ mod solid;
 
 pub use body::*;
 pub use check::{ContactConflict, ContactFault, MachineFault, least_impact_steps};
+pub use conditions::Conditions;
 pub use doubts::*;
 pub use drive::*;
 pub use element::*;
@@ -101,19 +103,6 @@ impl Machine {
     pub fn cut_joints(&self) -> impl Iterator<Item = &str> {
         let balls = self.ball_joints.iter().map(|joint| joint.name.as_str());
         balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
-    }
-
-    /// Whether `next` differs from this machine only in gravity, contacts and stepper, which may change during a run.
-    pub fn differs_in_conditions_alone(&self, next: &Self) -> bool {
-        let mut like_next = self.clone();
-        like_next.gravity = next.gravity;
-        like_next.contact = next.contact;
-        for (joint, next) in like_next.ball_joints.iter_mut().zip(&next.ball_joints) {
-            joint.contact = next.contact;
-        }
-        let energy_ledger = like_next.solver.energy_ledger;
-        like_next.solver = Solver { energy_ledger, ..next.solver };
-        like_next == *next
     }
 
     /// Joints other than ball joints: tree joints, then loop-closing joints.

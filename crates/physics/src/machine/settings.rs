@@ -1,5 +1,7 @@
 //! Simulation settings of a machine: formulation, start rule, stepper.
 
+use serde::{Deserialize, Serialize};
+
 use crate::integrate::Method;
 use crate::words::words;
 
@@ -58,7 +60,7 @@ words!(Preset {
 });
 
 /// Stepper settings. An explicit method, step or tolerance takes precedence over the preset.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Solver {
     /// Preset, which supplies the settings not given.
     pub preset: Option<Preset>,

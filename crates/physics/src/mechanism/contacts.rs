@@ -92,18 +92,6 @@ impl Contacts {
         &self.joints[i]
     }
 
-    /// Whether joint `i` left the frozen branch of its law in an evaluation since [`Self::forget_left_pieces`].
-    pub fn has_left_piece(&self, i: usize) -> bool {
-        self.joints[i].left_piece
-    }
-
-    /// Clears the flags of [`Self::has_left_piece`].
-    pub fn forget_left_pieces(&mut self) {
-        for contact in &mut self.joints {
-            contact.left_piece = false;
-        }
-    }
-
     /// Gap of joint `i` at the latest evaluation.
     pub fn gap(&self, i: usize) -> &Gap {
         &self.joints[i].gap

@@ -59,9 +59,9 @@ use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT, NEARLY_DEPENDENT};
 use forest::Forest;
 use lagrange::Lagrange;
-use model::{Model, Motion};
+pub(crate) use model::Model;
+use model::Motion;
 use path::Path;
-use settled::Settled;
 use tree::Tree;
 
 /// Error in setting up the equations of a scene.
@@ -251,18 +251,9 @@ fn unclosed(stays: &[OpenJoint]) -> String {
     format!(": remaining gaps: {} (no joint can move that way)", each.join(", "))
 }
 
-/// Identifies the equations of a mechanism: states of mechanisms with equal structures are interchangeable.
-#[derive(Clone, Debug)]
-pub struct Structure {
-    model: Arc<Model>,
-    rank: Option<usize>,
-}
-
 /// The equations of motion of one scene in one formulation.
 pub struct Mechanism {
     model: Arc<Model>,
-    /// Rank of the rows of loop-closing joints, if some are dependent.
-    rank: Option<usize>,
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
@@ -285,8 +276,6 @@ pub struct Mechanism {
     evaluated: Option<f64>,
     /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
-    assembly: Assembly,
-    settled: Option<Settled>,
     /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
     evaluation_time: f64,
     free_flight_bodies: Vec<FreeFlightBody>,
@@ -301,16 +290,15 @@ impl Mechanism {
     /// start without play.
     pub fn new(machine: &Machine) -> Result<Self, MechanismError> {
         machine.check()?;
-        let model = Arc::new(Model::new(machine));
+        let mut model = Model::new(machine);
         if let Some(form) = &model.closed_form {
             form.check()?;
         }
         bounds::check(machine, &model)?;
-        let mut mechanism = Self::with_model(machine, model);
         if machine.start == StartRule::Settled {
-            mechanism.settled = Some(settled::settle(machine)?);
+            model.settled = Some(settled::settle(machine)?);
         }
-        Ok(mechanism)
+        Ok(Self::with_model(machine, Arc::new(model)))
     }
 
     fn with_model(machine: &Machine, model: Arc<Model>) -> Self {
@@ -329,7 +317,6 @@ impl Mechanism {
             pull: None,
             evaluated: None,
             model,
-            rank: None,
             equations,
             contacts,
             gravity: machine.gravity,
@@ -337,8 +324,6 @@ impl Mechanism {
             stiff: None,
             friction: None,
             implicit: None,
-            assembly: Assembly::default(),
-            settled: None,
             free_flight_bodies: Vec::new(),
             moving: ActiveRanges::default(),
         };
@@ -348,25 +333,24 @@ impl Mechanism {
         mechanism
     }
 
-    /// For resuming from a state of `structure` without computing a start state. Data unaffected by live changes is shared:
-    /// tolerance scales are those of the start.
-    pub fn resumed(machine: &Machine, structure: &Structure) -> Self {
-        let mut mechanism = Self::with_model(machine, structure.model.clone());
-        mechanism.rank = structure.rank;
-        if let Some(rank) = structure.rank {
+    /// The equations of `model` once more: `machine` compiled, and assembled by [`Self::start`], before.
+    pub(crate) fn of(machine: &Machine, model: Arc<Model>) -> Self {
+        let rank = model.assembled.get().and_then(|assembled| assembled.rank);
+        let mut mechanism = Self::with_model(machine, model);
+        if let Some(rank) = rank {
             mechanism.equations.treat_as_dependent(rank);
         }
         mechanism
     }
 
-    /// The part of a snapshot that concerns the equations.
-    pub fn structure(&self) -> Structure {
-        Structure { model: self.model.clone(), rank: self.rank }
+    /// The compiled machine.
+    pub(crate) fn model(&self) -> &Arc<Model> {
+        &self.model
     }
 
-    /// Whether `structure` belongs to these equations.
-    pub fn has_structure(&self, structure: &Structure) -> bool {
-        Arc::ptr_eq(&self.model, &structure.model)
+    /// Whether these are equations of `model`.
+    pub(crate) fn is_of(&self, model: &Arc<Model>) -> bool {
+        Arc::ptr_eq(&self.model, model)
     }
 
     /// Whether positions and velocities are projected onto the constraints after a step.

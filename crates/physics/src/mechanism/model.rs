@@ -1,11 +1,13 @@
 //! A scene compiled for the equations of motion: centroid frames, coordinate numbering, trees, drives.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::closed_form::{ClosedForm, ClosedMotion};
 use super::drives::{Law, Trajectory, trajectory_of};
 use super::factor::{NONE, Pattern};
+use super::settled::Settled;
 use super::spcmm::SliderTrajectory;
+use super::start::Assembled;
 use crate::jet::Jet;
 use crate::machine::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Quat, StartRule, Vec3};
 
@@ -179,6 +181,10 @@ pub struct Model {
     pub shortest_period: f64,
     /// Drive laws that bound steps.
     pub bounding: Vec<Arc<dyn Law>>,
+    /// The settled start, if the machine asks for one.
+    pub(super) settled: Option<Settled>,
+    /// What assembly found, once [`start`](super::Mechanism::start) has been called.
+    pub(super) assembled: OnceLock<Assembled>,
 }
 
 impl Model {
@@ -311,6 +317,8 @@ impl Model {
             output_body: machine.output.body,
             probe: machine.output.probe.map(|p| p - machine.bodies[machine.output.body].centre),
             shortest_period,
+            settled: None,
+            assembled: OnceLock::new(),
             bounding,
         };
         model.number_coordinates(machine, &root);

@@ -11,6 +11,7 @@ use crate::machine::{Formulation, Machine, StartRule, Vec3};
 const ROUNDS: usize = 4;
 
 /// A settled start.
+#[derive(Clone, Debug)]
 pub(super) struct Settled {
     /// Positions and velocities in the coordinates of the tree.
     pub state: Vec<f64>,

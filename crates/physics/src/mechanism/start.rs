@@ -38,6 +38,14 @@ pub struct Assembly {
     pub closed_form: bool,
 }
 
+/// What assembly at the start finds about a compiled machine.
+#[derive(Clone, Debug)]
+pub(super) struct Assembled {
+    pub assembly: Assembly,
+    /// Rank of the rows of loop-closing joints, if some are dependent.
+    pub rank: Option<usize>,
+}
+
 /// Displacement of a body by assembly.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placement {
@@ -48,9 +56,11 @@ pub struct Placement {
 }
 
 impl Mechanism {
-    /// Changes to the scene's values made by [`Self::start`].
+    /// Changes to the scene's values made by [`Self::start`]; none before.
     pub fn assembly(&self) -> &Assembly {
-        &self.assembly
+        static NONE: Assembly =
+            Assembly { bodies: Vec::new(), widest: None, most_turned: None, other_mode: false, closed_form: false };
+        self.model.assembled.get().map_or(&NONE, |assembled| &assembled.assembly)
     }
 
     /// State at t = 0: positions, then velocities.
@@ -65,7 +75,7 @@ impl Mechanism {
         let closes = !all.is_empty() || !model.closures.is_empty();
         // Poses alone need no mass matrix.
         let mut tree = if closes { Tree::new(model) } else { Tree::without_masses(model) };
-        let settled = self.settled.as_ref().map(|settled| &settled.state);
+        let settled = model.settled.as_ref().map(|settled| &settled.state);
         let mut y = settled.unwrap_or(&model.start_state).clone();
         let closed_form = model.closed_form.as_deref().filter(|_| assembled);
         if let Some(form) = closed_form {
@@ -125,11 +135,9 @@ impl Mechanism {
         if rank.is_some() {
             self.check_speeds(&mut tree, &y)?;
         }
-        self.assembly = match &self.settled {
-            Some(settled) => settled.assembly.clone(),
-            None => assembly,
-        };
-        self.rank = rank;
+        let settled = model.settled.as_ref().map(|settled| settled.assembly.clone());
+        // A second call would find the same.
+        model.assembled.get_or_init(|| Assembled { assembly: settled.unwrap_or(assembly), rank });
         if let Some(rank) = rank {
             self.equations.treat_as_dependent(rank);
         }

@@ -14,12 +14,19 @@ pub struct Evaluator<'a> {
     touching: ActiveSet<'a>,
     /// Evaluations made through it.
     pub counts: Counts,
+    left: &'a mut [bool],
 }
 
 impl Mechanism {
     /// Evaluator with `touching` as the active contacts.
     pub fn evaluator<'a>(&'a mut self, touching: ActiveSet<'a>) -> Evaluator<'a> {
-        Evaluator { mechanism: self, touching, counts: Counts::default() }
+        self.evaluator_watching(touching, &mut [])
+    }
+
+    /// The same; it sets the entry in `left` of each ball joint whose contact leaves the frozen branches of its laws in an
+    /// evaluation.
+    pub fn evaluator_watching<'a>(&'a mut self, touching: ActiveSet<'a>, left: &'a mut [bool]) -> Evaluator<'a> {
+        Evaluator { mechanism: self, touching, counts: Counts::default(), left }
     }
 }
 
@@ -43,7 +50,7 @@ impl Evaluator<'_> {
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
         let at = At { t, motion, touching: self.touching };
-        let mut loads = Loads { wrench, counts: &mut self.counts };
+        let mut loads = Loads { wrench, counts: &mut self.counts, left: &mut *self.left };
         contacts.load(&at, &mut loads);
         for element in elements {
             element.load(&at, &mut loads);

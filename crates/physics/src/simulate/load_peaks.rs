@@ -18,10 +18,10 @@ pub struct LoadPeaks {
 }
 
 impl LoadPeaks {
-    pub(super) fn new(machine: &Machine, mechanism: &Mechanism) -> Self {
+    pub(super) fn new(machine: &Machine) -> Self {
         let holding = machine.joints.iter().filter(|joint| joint.kind != JointKind::Free);
         let parts = machine.elements.len() + holding.count() + machine.closing_joints.len();
-        Self { parts: vec![[None; 2]; parts], seen: 0.0, actuators: vec![0.0; mechanism.drives()] }
+        Self { parts: vec![[None; 2]; parts], seen: 0.0, actuators: vec![0.0; machine.driven().count()] }
     }
 
     /// Force and torque of each part.

@@ -1,44 +1,49 @@
-//! A running simulation: state, stepping, live changes, recorded channels, divergence guard.
+//! Simulation: a constant [`Model`], a [`State`] and a [`Workspace`]; stepping, live changes, recorded channels, divergence guard.
 
 mod angles;
 mod channels;
 mod doubt;
+mod doubts;
 mod frame;
 mod history;
+mod ideal;
 mod impacts;
 mod ledger;
 mod load_peaks;
+mod model;
 mod pace;
 mod peaks;
 mod report;
+mod run;
 mod simulation;
+mod state;
 mod stepper;
 mod stopped;
 mod wear;
+mod workspace;
 
 pub use angles::angles_of;
 pub use channels::*;
 pub use doubt::{Doubt, Joints, LedgerTerm};
 pub use frame::*;
 pub use history::{Bin, History, Mark};
+pub use ideal::{ProbeFault, closed};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
+pub use model::Model;
 pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
-pub use simulation::ideal::{ProbeFault, closed};
-pub use simulation::live::ChangeError;
-pub use simulation::saved::{SavedState, StateMismatch};
-pub use simulation::{CLEARANCE_SPEED, Simulation};
+pub use run::{CLEARANCE_SPEED, ChangeError};
+pub use simulation::Simulation;
+pub use state::{State, StateMismatch};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
+pub use workspace::Workspace;
 
 use serde::{Deserialize, Serialize};
 
-use std::sync::Arc;
-
-use crate::machine::Machine;
 pub use crate::mechanism::Pull;
-use crate::mechanism::{Counts, MechanismError, Structure};
+use crate::mechanism::{Counts, MechanismError};
 
 /// The longest run, s: at its end a double still resolves 0.1 ns.
 pub const LONGEST_RUN: f64 = 1e6;
@@ -148,37 +153,10 @@ impl Statistics {
     }
 }
 
-/// The whole state of a simulation: resuming from it reproduces the same bits.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    machine: Arc<Machine>,
-    structure: Structure,
-    state: simulation::State,
-    polynomial: Option<crate::integrate::Polynomial>,
-    reference: simulation::ideal::IdealTip<simulation::ideal::Kept>,
-}
-
-impl Snapshot {
-    /// Time of the state, s.
-    pub fn time(&self) -> f64 {
-        self.state.time()
-    }
-
-    /// Accepted steps up to it.
-    pub fn steps(&self) -> u64 {
-        self.state.steps()
-    }
-
-    /// Approximate size in bytes, without the shared scene.
-    pub fn bytes(&self) -> usize {
-        self.state.bytes()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Attachment, BallJoint, MachineFault, Vec3};
+    use crate::machine::{Attachment, BallJoint, Machine, MachineFault, Vec3};
 
     #[test]
     fn a_machine_whose_parts_do_not_fit_does_not_start() {

@@ -1,5 +1,6 @@
 //! Fills a [`Frame`] from the latest evaluation of the equations.
 
+use super::Model;
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactState, Frame, JointReport};
 use crate::contact::Memory;
@@ -10,11 +11,12 @@ use crate::mechanism::Mechanism;
 /// contact memory `memory`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
-    machine: &Machine,
+    model: &Model,
     memory: &[Memory],
     (time, y): (f64, &[f64]),
     out: &mut Frame,
 ) {
+    let machine = model.machine();
     out.time = time;
     out.bodies.clear();
     for (b, m) in mechanism.motion()[..machine.bodies.len()].iter().enumerate() {

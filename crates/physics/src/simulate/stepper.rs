@@ -74,19 +74,9 @@ impl AnyStepper {
         }
     }
 
-    /// The implicit method's latest polynomial, for a snapshot.
-    pub(super) fn polynomial(&self) -> Option<&Polynomial> {
-        match self {
-            Self::Radau(stiff) | Self::Automatic { stiff, .. } => Some(stiff.polynomial()),
-            _ => None,
-        }
-    }
-
-    /// Restores the implicit method's polynomial.
-    pub(super) fn set_polynomial(&mut self, polynomial: &Polynomial) {
-        if let Self::Radau(stiff) | Self::Automatic { stiff, .. } = self {
-            stiff.set_polynomial(polynomial);
-        }
+    /// Number of components of the method's [`Polynomial`]: those of the state, or none.
+    pub(super) fn polynomial_size(method: Method, dimension: usize) -> usize {
+        if matches!(method, Method::Radau5 | Method::Automatic) { dimension } else { 0 }
     }
 
     /// Upper bound on the step-size factor after the latest attempt, in addition to the limit set by its error.
@@ -125,6 +115,7 @@ impl AnyStepper {
         y_end: &mut [f64],
         k_end: &mut [f64],
         tolerance: f64,
+        polynomial: &mut Polynomial,
     ) -> f64 {
         match self {
             Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
@@ -137,7 +128,9 @@ impl AnyStepper {
             Self::Automatic { friction: s, member: ActiveScheme::Friction, .. } => {
                 s.attempt(&mut system.friction_alone(), t, h, y, k, y_end, k_end)
             }
-            Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.attempt(system, t, h, y, k, y_end, k_end, tolerance),
+            Self::Radau(s) | Self::Automatic { stiff: s, .. } => {
+                s.attempt(system, t, h, y, k, y_end, k_end, tolerance, polynomial)
+            }
         }
     }
 
@@ -160,12 +153,12 @@ impl AnyStepper {
     }
 
     /// Ends the latest attempt at fraction `theta` of it, on its interpolant.
-    pub(super) fn truncate(&mut self, theta: f64) {
+    pub(super) fn truncate(&mut self, theta: f64, polynomial: &mut Polynomial) {
         match self {
             Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
                 s.truncate(theta)
             }
-            Self::Radau(s) | Self::Automatic { stiff: s, member: ActiveScheme::Implicit, .. } => s.truncate(theta),
+            Self::Radau(_) | Self::Automatic { member: ActiveScheme::Implicit, .. } => polynomial.truncate(theta),
             _ => {}
         }
     }
@@ -195,6 +188,7 @@ impl AnyStepper {
         k: &[f64],
         y_end: &[f64],
         k_end: &[f64],
+        polynomial: &Polynomial,
         out: &mut [f64],
     ) {
         match self {
@@ -209,7 +203,7 @@ impl AnyStepper {
             Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
                 s.interpolate(part, theta, h, y, k, out)
             }
-            Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.interpolate(part, theta, y, out),
+            Self::Radau(_) | Self::Automatic { .. } => polynomial.interpolate(part, theta, y, out),
         }
     }
 }

@@ -33,13 +33,11 @@ pub struct Contact {
     pub joint: BallJoint,
     pub law: Coefficients,
     pub gap: Gap,
-    /// In one of the latest evaluations, the sliding speed or penetration rate left the frozen branch of the law.
-    pub left_piece: bool,
 }
 
 impl Contact {
     pub fn new(index: usize, joint: BallJoint, law: Coefficients) -> Self {
-        Self { index, joint, law, gap: Gap::default(), left_piece: false }
+        Self { index, joint, law, gap: Gap::default() }
     }
 
     /// Whether it has clearance.
@@ -146,7 +144,9 @@ impl ForceElement for Contact {
             let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
             law.slip_velocity(&separation.normal, &velocity, ball, socket)
         });
-        self.left_piece |= law.leaves_piece(memory, &separation, &force);
+        if let Some(left) = loads.left.get_mut(self.index) {
+            *left |= law.leaves_piece(memory, &separation, &force);
+        }
         gap.normal_force = force.normal;
         gap.friction = force.friction;
         gap.slip_speed = force.slip_speed;

@@ -88,6 +88,8 @@ pub(super) struct Loads<'a> {
     /// Loads on the bodies about their centroids; the last is the world's.
     pub wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
+    /// By ball joint: set where a contact leaves the frozen branches of its laws. Empty if nobody asks.
+    pub left: &'a mut [bool],
 }
 
 /// Linearisation of the force between two points with respect to their relative motion.

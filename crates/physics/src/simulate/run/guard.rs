@@ -1,6 +1,6 @@
 //! The divergence guard: checks that every accepted step must pass.
 
-use super::{OPEN_LOOP, Simulation};
+use super::{OPEN_LOOP, Run};
 use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
@@ -12,7 +12,7 @@ const MOST_OVERSHOOT: f64 = 4.0;
 /// Violation beyond which stabilised constraints no longer hold the mechanism together, m.
 const MOST_DRIFT: f64 = 1e-3;
 
-impl Simulation {
+impl Run<'_> {
     /// Fault of the step of size `h` just attempted, if any.
     pub(super) fn divergence(&self, open: f64, h: f64) -> Option<StopFault> {
         if !(open <= OPEN_LOOP) {
@@ -34,7 +34,7 @@ impl Simulation {
             if !(penetration <= LEFT_SOCKET * radius) {
                 return Some(StopFault::LeftSocket { joint: self.machine.ball_joints[j].name.clone(), penetration });
             }
-            if !self.machine.solver.method.is_adaptive()
+            if !self.state.conditions.solver.method.is_adaptive()
                 && let Some(times) = self.energy_of_overshoot(j, h)
             {
                 return Some(StopFault::Overshoot {

@@ -1,10 +1,9 @@
 //! Reasons to doubt a result, from the scene's settings and from the course of the run.
 
-use super::Simulation;
-use crate::contact::{FrictionVelocity, settled_penetration};
+use super::{Doubt, Joints, Ledger, LedgerTerm, Model, State};
+use crate::contact::{Coefficients, FrictionVelocity, settled_penetration};
 use crate::integrate::Method;
-use crate::machine::{BallJoint, least_impact_steps};
-use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
+use crate::machine::{BallJoint, Machine, least_impact_steps};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
 const MOST_FLOORED: f64 = 0.5;
@@ -34,13 +33,24 @@ const CREEP: f64 = 0.1;
 const MOST_HELD: f64 = 0.1;
 const LOOSEST_HELD: f64 = 3e-5;
 
-impl Simulation {
+/// A state and its machine under the state's conditions.
+struct Examined<'a> {
+    machine: Machine,
+    state: &'a State,
+}
+
+/// As [`Model::doubts`].
+pub(super) fn doubts(model: &Model, state: &State) -> Vec<Doubt> {
+    Examined { machine: model.machine().under(&state.conditions), state }.doubts()
+}
+
+impl Examined<'_> {
     /// Reasons not to trust the results since the last reset; empty if there are none. Begins with
     /// [`crate::machine::Machine::doubts`] of the machine as it is running.
-    pub fn doubts(&self) -> Vec<Doubt> {
+    fn doubts(&self) -> Vec<Doubt> {
         let machine = self.machine.doubts().into_iter().map(Doubt::Machine);
         let mut doubts: Vec<Doubt> = machine.collect();
-        let statistics = self.statistics();
+        let statistics = self.state.statistics();
         let part = |part: &[u64], j: usize| part[j] as f64 / statistics.impacts[j].max(1) as f64;
         let unresolved = self.worst(0.0, |j| part(&statistics.coarse, j));
         doubts.extend(unresolved.map(|(joints, j)| Doubt::Unresolved {
@@ -64,7 +74,7 @@ impl Simulation {
         }));
         let patch = self.worst(LARGEST_PATCH, |j| self.largest_patch(j));
         doubts.extend(patch.map(|(joints, j)| Doubt::Patch { joints, radii: self.largest_patch(j) }));
-        let usual = |j: usize| self.mechanism.contacts.coefficients(j).damping;
+        let usual = |j: usize| self.coefficients(j).damping;
         let damping = self.worst(MOST_DAMPING, |j| statistics.damping[j] - usual(j));
         doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
             joints,
@@ -82,7 +92,7 @@ impl Simulation {
         if distance > least.map_or(DRIFT, |c| DRIFT.min(DRIFT_OF_CLEARANCE * c)) {
             doubts.push(Doubt::Drift { distance });
         }
-        if let Some(ledger) = self.ledger() {
+        if let Some(ledger) = self.state.ledger() {
             doubts.extend(self.energy_doubt(ledger));
         }
         doubts.extend(self.stability_doubt());
@@ -135,7 +145,7 @@ impl Simulation {
     /// about how much energy settled contacts lose.
     fn stability_doubt(&self) -> Option<Doubt> {
         let solver = &self.machine.solver;
-        let share = self.statistics().stability_limited_time / self.state.now.t;
+        let share = self.state.statistics().stability_limited_time / self.state.now.t;
         let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_HELD;
         (loose && share > MOST_HELD).then_some(Doubt::Held {
             share,
@@ -153,14 +163,19 @@ impl Simulation {
         Some((joints, worst))
     }
 
+    /// Coefficients of joint `j`.
+    fn coefficients(&self, j: usize) -> Coefficients {
+        Coefficients::new(&self.machine.ball_joints[j].contact, self.state.clearance(j))
+    }
+
     /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint.
     fn largest_patch(&self, j: usize) -> f64 {
-        if !self.mechanism.contacts.has_clearance(j) {
+        if self.machine.ball_joints[j].contact.clearance == 0.0 {
             return 0.0;
         }
-        let c = self.mechanism.contacts.coefficients(j);
-        let (radius, clearance) = (c.ball_radius, self.mechanism.contacts.clearance(j));
-        let depth = settled_penetration(c.stiffness, self.statistics().peak_normal[j]);
+        let c = self.coefficients(j);
+        let (radius, clearance) = (c.ball_radius, c.clearance);
+        let depth = settled_penetration(c.stiffness, self.state.statistics().peak_normal[j]);
         // Hertz: a^2 = delta R r / (R - r).
         (depth * (radius + clearance) / (clearance * radius)).sqrt()
     }

@@ -1,7 +1,7 @@
 //! Edges of force elements as events. During a step a stop or a tyre either presses or does not, and the step ends where that
 //! changes. The force has a kink or a jump there, and a step across it has an error that its estimate does not see.
 
-use super::Simulation;
+use super::Run;
 use super::flights::put_flights;
 use crate::integrate::find_root;
 
@@ -10,7 +10,7 @@ const PARTS: u32 = 4;
 /// An edge earlier than this fraction of the step was passed at its start.
 pub(super) const AT_START: f64 = 1e-9;
 
-impl Simulation {
+impl Run<'_> {
     /// Fixes the side of each element that has edges for the next step, if the method ends steps there, which takes an
     /// interpolant as accurate as its steps.
     pub(super) fn hold_sides(&mut self) {
@@ -78,7 +78,7 @@ impl Simulation {
         let Self { mechanism, stepper, state, attempt, scratch_y, .. } = self;
         let (now, end) = (&state.now, &attempt.end);
         let all = 0..now.y.len();
-        stepper.interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, scratch_y);
+        stepper.interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         let time = now.t + theta * h;
         put_flights(mechanism, &state.flights, time, scratch_y);
         mechanism.measure(time, scratch_y);

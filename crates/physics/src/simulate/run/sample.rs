@@ -1,66 +1,59 @@
 //! Sampling of an instant within the latest step.
 
-use super::Simulation;
+use super::Run;
 use super::flights::put_flights;
-use super::ideal::IdealTip;
 use crate::integrate::hermite;
+use crate::machine::Vec3;
 use crate::mechanism::ActiveSet;
+use crate::simulate::ideal::IdealSource;
 use crate::simulate::{Frame, report};
 
-impl Simulation {
-    /// Largest normal force of ball joint `j` (reaction, if ideal) since the last reset, and its time, (N, s): the value in
-    /// [`Statistics`](crate::simulate::Statistics), found from the ends of steps, or a larger one from a sample.
-    pub fn peak(&self, j: usize) -> (f64, f64) {
-        let statistics = self.statistics();
-        let found = (statistics.peak_normal[j], statistics.peak_time[j]);
-        if self.sampled[j].0 > found.0 { self.sampled[j] } else { found }
-    }
-
-    /// Samples the latest state.
-    pub fn sample_now(&mut self, out: &mut Frame) {
-        self.sample(self.time(), out);
-    }
-
-    /// Samples the state at `time`, interpolated within the latest step; forces come from the interpolated state. Allocates only
-    /// while `out` is too small.
-    pub fn sample(&mut self, time: f64, out: &mut Frame) {
-        let time = time.clamp(self.state.before.t, self.state.now.t);
+impl Run<'_> {
+    /// As [`Model::sample`](crate::simulate::Model::sample).
+    pub(in crate::simulate) fn sample(&mut self, time: f64, out: &mut Frame) {
+        let time = time.clamp(self.before.t, self.state.now.t);
         self.look(time);
-        let (memory, at) = (&self.scratch_memory, (time, &self.scratch_y[..]));
-        report::fill(&mut self.mechanism, &self.machine, memory, at, out);
-        for (sampled, report) in self.sampled.iter_mut().zip(&out.joints) {
+        let (memory, at) = (&*self.scratch_memory, (time, &*self.scratch_y));
+        report::fill(self.mechanism, self.model, memory, at, out);
+        for (sampled, report) in self.state.sampled.iter_mut().zip(&out.joints) {
             let force = report.normal_force.norm();
             if force > sampled.0 {
                 *sampled = (force, time);
             }
         }
-        if let Some(loads) = &mut self.loads {
-            loads.take(&mut self.mechanism, time);
+        if let Some(loads) = &mut self.state.loads {
+            loads.take(self.mechanism, time);
         }
         out.ledger = self.ledger_of(out);
-        if !matches!(self.reference, IdealTip::ClosedForm) {
-            out.probe_error = self.reference.error(out);
+        match self.model.ideal() {
+            IdealSource::ClosedForm => {}
+            IdealSource::SelfReference => out.probe_error = Some(Vec3::zeros()),
+            IdealSource::None(_) => out.probe_error = None,
+            IdealSource::Simulated(ideal) => {
+                let both = self.state.ideal.as_deref_mut().zip(self.ideal.as_deref_mut());
+                out.probe_error = both.and_then(|(state, work)| ideal.error(state, work, out));
+            }
         }
     }
 
     /// Evaluates everything at `time` within the latest step, so that the mechanism can be read; not counted as an
     /// evaluation.
     pub(super) fn look(&mut self, time: f64) {
-        let h = self.state.now.t - self.state.before.t;
+        let h = self.state.now.t - self.before.t;
         let inside = h > 0.0 && time < self.state.now.t;
         if inside {
-            let theta = (time - self.state.before.t) / h;
+            let theta = (time - self.before.t) / h;
             self.interpolate(theta, h);
         } else {
             self.scratch_y.copy_from_slice(&self.state.now.y);
         }
         let flies = self.look_at_all();
         let located = self.locates();
-        let Self { mechanism, state, scratch_y, scratch_k, scratch_memory, .. } = self;
+        let Self { mechanism, state, before, scratch_y, scratch_k, scratch_memory, .. } = self;
         if inside {
             mechanism.project(time, scratch_y);
         }
-        let (before, now) = (&state.before.memory, &state.now.memory);
+        let (before, now) = (&before.memory, &state.now.memory);
         for (j, memory) in scratch_memory.iter_mut().enumerate() {
             // A contact that began within a fixed step has its approach speed from then on.
             let known = !inside || (!located && !before[j].active);
@@ -76,20 +69,20 @@ impl Simulation {
     /// Writes the state at fraction `theta` of the latest step, of size `h`, from the method's interpolant to the scratch state.
     pub(super) fn interpolate(&mut self, theta: f64, h: f64) {
         self.interpolate_stepped(theta, h);
-        let (state, time) = (&self.state, self.state.before.t + theta * h);
-        put_flights(&self.mechanism, &state.flights, time, &mut self.scratch_y);
+        let (state, time) = (&self.state, self.before.t + theta * h);
+        put_flights(self.mechanism, &state.flights, time, self.scratch_y);
     }
 
     /// The same without the bodies in flight.
     pub(super) fn interpolate_stepped(&mut self, theta: f64, h: f64) {
-        let Self { mechanism, stepper, state, scratch_y, .. } = self;
-        let (before, now) = (&state.before, &state.now);
+        let Self { mechanism, stepper, state, before, scratch_y, .. } = self;
+        let now = &state.now;
         let (y0, k0, y, k) = (&before.y, &before.k, &now.y, &now.k);
         if mechanism.is_kinematic() {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {
             for part in mechanism.moving() {
-                stepper.interpolate(part.clone(), theta, h, y0, k0, y, k, scratch_y);
+                stepper.interpolate(part.clone(), theta, h, y0, k0, y, k, &state.polynomial, scratch_y);
             }
         }
     }
@@ -99,6 +92,7 @@ impl Simulation {
 mod tests {
     use super::*;
     use crate::scene::Scene;
+    use crate::simulate::Simulation;
 
     #[test]
     fn both_forms_report_the_same_coordinates_of_joints() {

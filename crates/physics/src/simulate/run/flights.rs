@@ -1,19 +1,19 @@
 //! Bodies in free flight: while nothing touches a free body, its motion is known in advance, and the steps that resolve impacts
 //! elsewhere exclude it.
 
-use super::{LONGEST_STEP, Simulation, StepEnd};
+use super::{Instant, LONGEST_STEP, Run};
 use crate::integrate::{Method, System as _};
 use crate::mechanism::{ActiveSet, Flight, Mechanism};
 
 /// With fewer free bodies than this, excluding some saves less than it costs.
 const FEWEST_FLYERS: usize = 3;
 
-impl Simulation {
+impl Run<'_> {
     /// Chooses the bodies to exclude from a step that ends by `limit`: those that touch nothing and whose motion is known until
     /// then.
     pub(super) fn choose_flights(&mut self, limit: f64) {
         let free_flight_bodies = self.mechanism.free_flight_bodies().len();
-        if self.machine.solver.method != Method::Automatic || free_flight_bodies < FEWEST_FLYERS {
+        if self.state.conditions.solver.method != Method::Automatic || free_flight_bodies < FEWEST_FLYERS {
             return;
         }
         let Self { mechanism, state, .. } = self;
@@ -42,12 +42,12 @@ impl Simulation {
         }
         clear_flights(mechanism, &state.flights, &mut state.now.k);
         self.leave_out_flights();
-        self.stepper.invalidate();
+        self.invalidate();
         if some_land {
             // The derivative of a body that landed is still that of its flight.
             let located = self.locates();
             let Self { mechanism, state, .. } = self;
-            let StepEnd { t, y, k, memory, .. } = &mut state.now;
+            let Instant { t, y, k, memory, .. } = &mut state.now;
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
             evaluator.derivative(*t, y, k);
             let counts = evaluator.counts;
@@ -74,7 +74,7 @@ impl Simulation {
     /// failed step.
     pub(super) fn forget_flown(&mut self) {
         if self.state.flights.iter().any(Option::is_some) {
-            self.state.discard_previous_step();
+            self.discard_previous_step();
         }
     }
 

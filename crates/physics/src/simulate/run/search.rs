@@ -1,6 +1,6 @@
 //! Search for peaks inside a step, which is sampled as for an output row.
 
-use super::Simulation;
+use super::Run;
 use crate::simulate::LoadPeaks;
 use crate::simulate::peaks::PenetrationCubic;
 
@@ -11,7 +11,7 @@ const LOADS_EVERY: f64 = 1e-4;
 /// Fractions at which a fixed step is sampled.
 const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
-impl Simulation {
+impl Run<'_> {
     /// Records the reactions at the end of the step just accepted and fully evaluated. Without contacts they are smooth, and
     /// their peaks lie on the parabola through three step ends.
     pub(super) fn track_reactions(&mut self) {
@@ -33,11 +33,11 @@ impl Simulation {
     pub(super) fn find_strongest(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
-            let memory = self.state.before.memory[j].unsplit();
+            let memory = self.before.memory[j].unsplit();
             if !memory.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let course = PenetrationCubic::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
+            let course = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
             let (force, theta) = course.strongest(&c, &memory);
             self.attempt.strongest[j] = (force, theta);
@@ -47,7 +47,7 @@ impl Simulation {
             if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
                 continue;
             }
-            self.look(self.state.before.t + theta * h);
+            self.look(self.before.t + theta * h);
             let inside = self.mechanism.contacts.gap(j).normal_force;
             let ends = course.stronger_end(&c, &memory);
             self.attempt.strongest[j] = if inside > ends.0 { (inside, theta) } else { ends };
@@ -61,28 +61,23 @@ impl Simulation {
         self.search_reactions();
         let smooth = !(0..self.state.now.gaps.len()).any(|j| self.mechanism.contacts.has_clearance(j));
         let time = self.state.now.t;
-        if self.loads.as_ref().is_some_and(|loads| near || smooth || loads.age(time) >= LOADS_EVERY) {
+        if self.state.loads.as_ref().is_some_and(|loads| near || smooth || loads.age(time) >= LOADS_EVERY) {
             self.look_at_loads();
         }
     }
 
-    /// Tracks load peaks from now on. This does not affect the steps.
-    pub fn keep_load_peaks(&mut self) {
-        self.loads = Some(LoadPeaks::new(&self.machine, &self.mechanism));
+    /// As [`Simulation::keep_load_peaks`](crate::simulate::Simulation::keep_load_peaks).
+    pub(in crate::simulate) fn keep_load_peaks(&mut self) {
+        self.state.loads = Some(LoadPeaks::new(self.machine));
         self.look_at_loads();
-    }
-
-    /// Load peaks at the ends of steps and in samples, if tracked.
-    pub fn load_peaks(&self) -> Option<&LoadPeaks> {
-        self.loads.as_ref()
     }
 
     /// Records the loads at the latest state.
     fn look_at_loads(&mut self) {
         let time = self.state.now.t;
         self.look(time);
-        if let Some(loads) = &mut self.loads {
-            loads.evaluate(&mut self.mechanism, time);
+        if let Some(loads) = &mut self.state.loads {
+            loads.evaluate(self.mechanism, time);
         }
     }
 
@@ -93,7 +88,7 @@ impl Simulation {
         if !near || self.locates() {
             return;
         }
-        let (t0, t) = (self.state.before.t, self.state.now.t);
+        let (t0, t) = (self.before.t, self.state.now.t);
         for part in PARTS {
             let time = t0 + part * (t - t0);
             self.look(time);
@@ -119,7 +114,7 @@ impl Simulation {
         if !self.mechanism.has_reactions() || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j)) {
             return;
         }
-        let (t0, t) = (self.state.before.t, self.state.now.t);
+        let (t0, t) = (self.before.t, self.state.now.t);
         for j in 0..joints {
             let Some((start, end)) = self.state.record.reactions[j].ends(t0, t) else {
                 continue;

@@ -1,16 +1,12 @@
 //! Perturbations of the state, for a twin run and its renormalisation.
 
-use super::Simulation;
+use super::{Attempt, Run};
 use crate::contact::Memory;
-use crate::simulate::Stopped;
+use crate::simulate::state::Control;
 
-impl Simulation {
-    /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there. Quaternions are
-    /// renormalised, ideal joints closed again. A ball moved into its wall is now in contact, a ball lifted off is not; every
-    /// other contact retains its memory. Counters are unchanged; a wear map is dropped.
-    ///
-    /// Components of `offset` beyond the state's are ignored, missing ones are 0.
-    pub fn displace(&mut self, offset: &[f64]) {
+impl Run<'_> {
+    /// As [`Simulation::displace`](crate::simulate::Simulation::displace).
+    pub(in crate::simulate) fn displace(&mut self, offset: &[f64]) {
         let Self { mechanism, state, .. } = self;
         for (y, offset) in state.now.y.iter_mut().zip(offset) {
             *y += offset;
@@ -44,50 +40,26 @@ impl Simulation {
         self.record_change();
     }
 
-    /// Moves the stored approach speeds of the contacts towards those of `other`, a run in nearly the same state, by the fraction
-    /// `part` of their difference.
-    pub fn remember_like(&mut self, other: &Self, part: f64) {
-        for (own, other) in self.state.now.memory.iter_mut().zip(&other.state.now.memory) {
-            own.approach_speed += part * (other.approach_speed - own.approach_speed);
-        }
+    /// Lets the next step end where and how the latest step of another run did, of which `attempt` is left.
+    pub(in crate::simulate) fn reproduce(&mut self, attempt: &Attempt) {
+        self.attempt.beside = attempt.whole;
     }
 
-    /// Steps to the time of `other`, a run in nearly the same state, by reproducing its latest step and the way it ended. A step
-    /// merely truncated there would have a different error, by about the tolerance.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn step_beside(&mut self, other: &Self) -> Result<(), Stopped> {
-        if self.state.now.t == other.step_start() {
-            self.attempt.beside = other.attempt.whole;
-        }
-        while self.state.now.t < other.state.now.t {
-            self.step_until(other.state.now.t)?;
-        }
-        Ok(())
-    }
-
-    /// Adopts the step control of `other`, a run in nearly the same state: its step size and its scheme of the automatic method.
-    /// Two runs that choose their own have different errors and seem to diverge.
-    pub fn step_like(&mut self, other: &Self) {
-        let turns = self.state.control.member != other.state.control.member;
-        self.state.control.clone_from(&other.state.control);
+    /// Adopts the step control of another run in nearly the same state.
+    pub(in crate::simulate) fn step_like(&mut self, control: &Control) {
+        let turns = self.state.control.member != control.member;
+        self.state.control.clone_from(control);
         if turns {
             self.freeze_branches(false);
-            self.stepper.invalidate();
+            self.invalidate();
         }
-    }
-
-    /// Scale of each component of [`Self::state`]: the error scales of the tolerance.
-    pub fn scales(&self) -> &[f64] {
-        self.mechanism.scale()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::scene::Scene;
+    use crate::simulate::Simulation;
 
     #[test]
     fn a_twin_that_steps_like_its_run_takes_the_same_steps() {
@@ -96,7 +68,7 @@ mod tests {
         let mut run = Simulation::new(&scene.machine).expect("starts");
         run.advance_to(0.3).expect("runs");
         let twin = |offset: f64| {
-            let mut twin = Simulation::of(&run.snapshot());
+            let mut twin = run.clone();
             twin.displace(&[offset; 8]);
             twin
         };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Simulation, shortest_step};
+use super::{Run, shortest_step};
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{LARGEST_DENSE, Mechanism, MechanismError};
 use crate::simulate::stepper::ActiveScheme;
@@ -79,7 +79,7 @@ impl Trial {
 
 /// State of the automatic choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct SchemeSelector {
+pub(in crate::simulate) struct SchemeSelector {
     /// Steps other than implicit ones since the latest contact began, and how many of them were limited by stability.
     since_contact: u32,
     limited: u32,
@@ -100,15 +100,15 @@ impl SchemeSelector {
     }
 }
 
-impl Simulation {
+impl Run<'_> {
     /// Starts with the implicit scheme if balls touch from the start and their laws have no damping: explicit steps would sustain
     /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
     pub(super) fn choose_first_member(&mut self) {
-        let Self { mechanism, machine, state, .. } = self;
+        let Self { mechanism, state, .. } = self;
         let touching = || state.now.memory.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
         let undamped = |j| mechanism.contacts.coefficients(j).damping == 0.0;
         let velocities = state.now.y.len() - mechanism.positions();
-        if machine.solver.method == Method::Automatic
+        if state.conditions.solver.method == Method::Automatic
             && velocities <= mechanism.largest_implicit()
             && touching().next().is_some()
             && touching().all(undamped)
@@ -137,14 +137,14 @@ impl Simulation {
         self.state.control.controller = controller_of(Method::Automatic, member);
         // Only schemes with their own interpolant locate corners.
         self.freeze_branches(false);
-        self.stepper.invalidate();
+        self.invalidate();
     }
 
     /// After an unstable explicit step: switches to the friction scheme if friction on its ramp may be the cause; returns whether
     /// it did so.
     pub(super) fn try_friction_scheme(&mut self) -> bool {
         let touches = self.state.now.memory.iter().any(|m| m.active);
-        let turns = self.machine.solver.method == Method::Automatic
+        let turns = self.state.conditions.solver.method == Method::Automatic
             && self.state.control.member == ActiveScheme::Explicit
             && self.state.control.choice.friction.wait == 0
             && touches
@@ -159,7 +159,7 @@ impl Simulation {
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> ActiveScheme {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
-        let tries_friction = self.machine.solver.tolerance < TRIED_BELOW;
+        let tries_friction = self.state.conditions.solver.tolerance < TRIED_BELOW;
         let state = &mut self.state;
         let member = state.control.member;
         let algebra = match member {
@@ -248,7 +248,7 @@ impl Simulation {
 }
 
 /// Step-size control for the order of the method's error estimate.
-pub(super) fn controller_of(method: Method, member: ActiveScheme) -> Controller {
+pub(in crate::simulate) fn controller_of(method: Method, member: ActiveScheme) -> Controller {
     Controller::new(match (method, member) {
         (Method::Rosenbrock, _) | (Method::Automatic, ActiveScheme::Friction) => 2,
         (Method::Radau5, _) | (Method::Automatic, ActiveScheme::Implicit) => 3,
@@ -257,7 +257,7 @@ pub(super) fn controller_of(method: Method, member: ActiveScheme) -> Controller 
 }
 
 /// Allocates the workspace of an implicit method.
-pub(super) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
+pub(in crate::simulate) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
     let velocities = mechanism.dimension() - mechanism.positions();
     if mechanism.is_kinematic() {
         return Ok(());
@@ -283,24 +283,29 @@ pub(super) fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Res
 mod tests {
     use super::*;
     use crate::scene::Scene;
+    use crate::simulate::Simulation;
 
     #[test]
     fn a_failed_trial_leaves_a_step_that_advances_time() {
         let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap().machine).unwrap();
         simulation.advance_to(1.0).unwrap();
-        assert_eq!(simulation.state.control.member, ActiveScheme::Implicit);
-        simulation.state.control.choice = SchemeSelector {
+        let (model, mut state) = (simulation.model(), simulation.state().clone());
+        let mut workspace = model.workspace(&state);
+        assert_eq!(state.control.member, ActiveScheme::Implicit);
+        state.control.choice = SchemeSelector {
             h_explicit: 1e-16,
             explicit_progress: 1.0,
             explicit_cost: 1e-3,
             implicit: Trial { steps: TRIAL_STEPS - 1, ..Trial::default() },
             ..SchemeSelector::default()
         };
-        simulation.choose_member(1e-3, 0.0, 10.0);
-        let (control, t) = (&simulation.state.control, simulation.state.now.t);
+        Run::new(model, &mut state, &mut workspace).choose_member(1e-3, 0.0, 10.0);
+        let (control, t) = (&state.control, state.now.t);
         assert_eq!(control.member, ActiveScheme::Explicit);
         assert!(t + control.h_next > t);
         assert!(control.h_next >= shortest_step(t));
-        simulation.advance_to(1.1).unwrap();
+        while state.time() < 1.1 {
+            model.step(&mut state, &mut workspace).unwrap();
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Corners of the contact laws as events. During a step each touching joint stays on one piece of the friction law and one of the
 //! approach-speed rule; the step ends where its sliding speed or penetration rate leaves that piece.
 
-use super::{Simulation, State};
+use super::{Run, State};
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 use crate::integrate::{Method, find_root};
 use crate::simulate::stepper::ActiveScheme;
@@ -57,11 +57,11 @@ impl Corner {
     }
 }
 
-impl Simulation {
+impl Run<'_> {
     /// Whether the method locates corners. This takes the method's own interpolant: over a step longer than the contact's
     /// oscillation, a cubic through both ends overshoots, and a step that ends on it gains energy.
     fn locates_corners(&self) -> bool {
-        let method = self.machine.solver.method;
+        let method = self.state.conditions.solver.method;
         let whole = self.state.control.member == ActiveScheme::Friction;
         method.is_adaptive() && method != Method::Rosenbrock && !whole
     }
@@ -106,7 +106,7 @@ impl Simulation {
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
         let mut first: Option<Corner> = None;
         for j in 0..self.state.now.memory.len() {
-            if !self.mechanism.contacts.has_left_piece(j) {
+            if !self.attempt.left[j] {
                 continue;
             }
             let memory = self.state.now.memory[j];
@@ -197,7 +197,7 @@ impl Simulation {
         let all = 0..now.y.len();
         for part in mechanism.measured(j).unwrap_or(std::slice::from_ref(&all)) {
             let part = part.clone();
-            stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch_y);
+            stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &state.polynomial, scratch_y);
         }
         let time = now.t + theta * h;
         for flyer in mechanism.flyers_of(j) {
@@ -243,12 +243,12 @@ impl Simulation {
         let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
         for part in self.mechanism.moving() {
             let part = part.clone();
-            self.stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
+            self.stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, &self.state.polynomial, scratch);
         }
         for part in self.mechanism.moving() {
             end.y[part.clone()].copy_from_slice(&scratch[part.clone()]);
         }
-        self.stepper.truncate(theta);
+        self.stepper.truncate(theta, &mut self.state.polynomial);
         self.attempt.stiffness = 0.0;
         self.evaluate_end(t_end);
     }

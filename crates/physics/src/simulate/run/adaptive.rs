@@ -2,7 +2,7 @@
 
 use super::automatic::STABILITY_LIMIT;
 use super::corners::LawBranch;
-use super::{LONGEST_STEP, NEARLY, Simulation, edges, shortest_step};
+use super::{LONGEST_STEP, NEARLY, Run, edges, shortest_step};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
@@ -46,7 +46,7 @@ struct SignedGap {
     rate: f64,
 }
 
-impl Simulation {
+impl Run<'_> {
     /// Takes a step whose size follows the error estimate, truncated at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
         self.choose_flights(limit);
@@ -63,11 +63,11 @@ impl Simulation {
             let shortest = shortest_step(self.state.now.t);
             if !(self.state.control.h_next >= shortest) {
                 self.state.record.statistics.count(self.attempt.counts);
-                self.state.control.h_next = self.machine.solver.step;
+                self.state.control.h_next = self.state.conditions.solver.step;
                 if self.mechanism.is_nearly_singular() {
                     return Err(self.stopped(StopFault::SingularLoops, StopAdvice::Dependent));
                 }
-                let tolerance = self.machine.solver.tolerance;
+                let tolerance = self.state.conditions.solver.tolerance;
                 let advice = StopAdvice::LooserTolerance { tolerance };
                 return Err(self.stopped(StopFault::ShortStep { shortest }, advice));
             }
@@ -78,7 +78,7 @@ impl Simulation {
         if stiffness > STABILITY_LIMIT {
             self.state.record.statistics.stability_limited_time += h;
         }
-        if self.machine.solver.method == Method::Automatic {
+        if self.state.conditions.solver.method == Method::Automatic {
             self.choose_member(h, stiffness, evaluations as f64);
         }
         Ok(())
@@ -86,7 +86,7 @@ impl Simulation {
 
     /// Largest scaled error of an acceptable step.
     fn allowed_error(&self) -> f64 {
-        let solver = &self.machine.solver;
+        let solver = &self.state.conditions.solver;
         let allowed = match (solver.method, self.state.control.member) {
             (Method::Automatic, ActiveScheme::Explicit) => solver.tolerance.min(OF_IMPACTS),
             _ => solver.tolerance,
@@ -99,7 +99,7 @@ impl Simulation {
     /// `h_next`.
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.now.t;
-        let tolerance = self.machine.solver.tolerance;
+        let tolerance = self.state.conditions.solver.tolerance;
         let asked = self.state.control.h_next;
         let beside = self.attempt.beside.take();
         self.attempt.whole = None;
@@ -152,7 +152,7 @@ impl Simulation {
             // Retry once on the other branch; if that leads back here, either branch will do.
             self.attempt.turned = true;
             corner.next.put(&mut self.state.now.memory[corner.joint]);
-            self.stepper.invalidate();
+            self.invalidate();
             self.state.control.h_next = asked;
             self.state.control.contact_began = contact_began;
             return None;

@@ -1,8 +1,9 @@
 //! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
-use super::{Record, Simulation, State};
+use super::Run;
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
 use crate::simulate::ledger::{Account, Energies, weights};
+use crate::simulate::state::{Record, State};
 use crate::simulate::{Frame, Ledger};
 
 /// Past step ends used to integrate the works of a kinematic scene: its powers are smooth, and its steps short compared with
@@ -13,18 +14,12 @@ const SHORTEST_PAST: f64 = 0.1;
 /// Interior nodes of such a step while there are too few past ends.
 const MIDDLE: [f64; 1] = [0.5];
 
-impl Simulation {
-    /// Energy exchanged since the start (the last reset); `None` where `solver.energy_ledger` is off.
-    pub fn ledger(&self) -> Option<&Ledger> {
-        let account = &self.state.record.account;
-        account.on.then(|| account.ledger())
-    }
-
+impl Run<'_> {
     /// Starts a new ledger at the current state, which has just been fully evaluated.
     pub(super) fn start_ledger(&mut self) {
         let Self { mechanism, state, .. } = self;
         let energies = energies(mechanism, state);
-        state.record.account = Account::start(self.machine.solver.energy_ledger, energies);
+        state.record.account = Account::start(state.conditions.solver.energy_ledger, energies);
     }
 
     /// Records the effect of a live change on the energies; the state has just been fully evaluated.
@@ -47,7 +42,7 @@ impl Simulation {
             return;
         }
         let located = self.locates();
-        let Self { mechanism, state, scratch_k, .. } = self;
+        let Self { mechanism, state, before, scratch_k, .. } = self;
         if !mechanism.is_evaluated_at(state.now.t) {
             mechanism.measure(state.now.t, &state.now.y);
         }
@@ -60,10 +55,10 @@ impl Simulation {
             }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
-            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.before.memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.memory));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             if self.state.record.wear.is_some() {
-                let touching = ActiveSet::by(located, &self.state.before.memory);
+                let touching = ActiveSet::by(located, &self.before.memory);
                 self.mechanism.complete_gaps(touching, &self.state.now.y);
                 self.begin_wear_of_step();
             }
@@ -85,23 +80,24 @@ impl Simulation {
     /// Starts recording the step just accepted in the wear map: the contacts that began at its end, and the forces there, from
     /// the latest evaluation.
     fn begin_wear_of_step(&mut self) {
-        let State { before, now, record, .. } = &mut self.state;
+        let Self { before, state, mechanism, stepper, .. } = self;
+        let State { now, record, .. } = &mut **state;
         let Some(wear) = &mut record.wear else {
             return;
         };
-        let instants = self.stepper.quadrature();
+        let instants = stepper.quadrature();
         wear.begin_step(instants[0] == 0.0 && record.account.powers.is_some());
         for (j, (before, now)) in before.memory.iter().zip(&now.memory).enumerate() {
             if now.active && !before.active {
-                wear.begin_contact(j, &self.mechanism.wall_direction(j));
+                wear.begin_contact(j, &mechanism.wall_direction(j));
             }
         }
-        wear.read(instants.len() - 1, &self.mechanism);
+        wear.read(instants.len() - 1, mechanism);
     }
 
     /// Chooses the quadrature nodes for the works of the step just accepted; `end` are the powers at its end.
     fn lay_out_course(&mut self, h: f64, end: Powers) {
-        let (from, to) = (self.state.before.t, self.state.now.t);
+        let (from, to) = (self.before.t, self.state.now.t);
         let kinematic = self.mechanism.is_kinematic();
         // Past ends are of no use across a jump of a derivative.
         if kinematic && !self.mechanism.has_broken_drives() {
@@ -132,10 +128,10 @@ impl Simulation {
         // Bodies in flight are left out: only gravity acts on them.
         self.interpolate_stepped(theta, h);
         let located = self.locates();
-        let Self { mechanism, stepper, state, scratch_y, scratch_k, .. } = self;
+        let Self { mechanism, stepper, state, before, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
-        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.before.memory));
-        let powers = evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k);
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.memory));
+        let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {
             // No quadrature node in a kinematic scene: no ball is in contact there.
             let instant = stepper.quadrature().iter().position(|at| *at == theta);
@@ -147,9 +143,9 @@ impl Simulation {
     /// Ledger at the instant of `frame`, within the latest step.
     pub(super) fn ledger_of(&self, frame: &Frame) -> Option<Ledger> {
         let account = &self.state.record.account;
-        let (from, to) = (self.state.before.t, self.state.now.t);
+        let (from, to) = (self.before.t, self.state.now.t);
         if frame.time >= to {
-            return self.ledger().copied();
+            return self.state.ledger().copied();
         }
         let energies = Energies {
             kinetic: frame.kinetic,

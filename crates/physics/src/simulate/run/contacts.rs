@@ -1,7 +1,7 @@
 //! Contact memory and continuous-time peaks of the step just accepted.
 
 use super::search::NEAR_PEAK;
-use super::{Simulation, State};
+use super::{Run, State};
 use crate::contact::{Coefficients, Memory, Separation};
 use crate::machine::least_impact_steps;
 use crate::simulate::peaks::PenetrationCubic;
@@ -37,10 +37,11 @@ impl State {
         memory
     }
 
-    /// Records a step of contact `j`, from fraction `from` on, with the largest normal force `force` (N).
+    /// Records a step of contact `j` that began at `start` (s), from fraction `from` on, with the largest normal force `force` (N).
     fn follow(
         &mut self,
         j: usize,
+        start: f64,
         course: &PenetrationCubic,
         c: &Coefficients,
         force: f64,
@@ -51,18 +52,19 @@ impl State {
         self.record.impacts.follow(j, course, force, damping);
         if damping > self.record.statistics.damping[j] {
             self.record.statistics.damping[j] = damping;
-            self.record.statistics.damping_time[j] = self.before.t + theta * (self.now.t - self.before.t);
+            self.record.statistics.damping_time[j] = start + theta * (self.now.t - start);
         }
     }
 }
 
-impl Simulation {
+impl Run<'_> {
     /// Initialises the contacts that exist at the start. Their onset is unknown, so the floor serves as approach speed; a ball at
     /// its wall to within rounding begins its contact there, at its current rate.
     pub(super) fn begin_contacts_at_start(&mut self) {
-        let Self { mechanism, machine, state, .. } = self;
+        let Self { mechanism, state, .. } = self;
         mechanism.measure(state.now.t, &state.now.y);
-        for (j, joint) in machine.ball_joints.iter().enumerate() {
+        for j in 0..state.conditions.joints.len() {
+            let contact = state.conditions.joints[j];
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
@@ -71,8 +73,8 @@ impl Simulation {
             if !(penetration > 0.0) {
                 continue;
             }
-            if penetration <= AT_WALL * joint.contact.clearance && rate > 0.0 {
-                state.now.memory[j] = state.begin(j, 0.0, rate, UNKNOWN, joint.contact.restitution, coefficients);
+            if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
+                state.now.memory[j] = state.begin(j, 0.0, rate, UNKNOWN, contact.restitution, coefficients);
             } else {
                 state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.impacts[j] += 1;
@@ -83,12 +85,13 @@ impl Simulation {
     /// Begins the contacts of balls that are exactly at their walls and move into them: the next step would show no sign change.
     /// The force is still 0.
     pub(super) fn begin_contacts_at_walls(&mut self) {
-        let Self { mechanism, machine, state, .. } = self;
+        let Self { mechanism, state, .. } = self;
         let mut begins = false;
-        for (j, joint) in machine.ball_joints.iter().enumerate() {
+        for j in 0..state.conditions.joints.len() {
             let gap = state.now.gaps[j];
             if mechanism.contacts.has_clearance(j) && gap.arrives() && !state.now.memory[j].active {
-                let (asked, coefficients) = (joint.contact.restitution, mechanism.contacts.coefficients(j));
+                let (asked, coefficients) =
+                    (state.conditions.joints[j].restitution, mechanism.contacts.coefficients(j));
                 state.now.memory[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN, asked, coefficients);
                 state.record.contact_steps[j] = 0;
                 begins = true;
@@ -103,20 +106,20 @@ impl Simulation {
     pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
         let located = self.attempt.located.take();
         let fixed = !self.locates();
-        let Self { mechanism, machine, state, attempt, .. } = self;
+        let Self { mechanism, state, before, attempt, .. } = self;
         let strongest = &attempt.strongest;
-        let least = least_impact_steps(machine.solver.method);
+        let least = least_impact_steps(state.conditions.solver.method);
         let mut switched = Switched { contacts: false, forces: false };
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let (start, end) = (state.before.gaps[j], state.now.gaps[j]);
+            let (start, end) = (before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
             if state.now.memory[j].active {
                 let course = PenetrationCubic::new(start, end, h);
                 let memory = state.now.memory[j].unsplit();
-                state.follow(j, &course, coefficients, strongest[j].0, &memory, 0.0);
+                state.follow(j, before.t, &course, coefficients, strongest[j].0, &memory, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
@@ -142,8 +145,8 @@ impl Simulation {
                 let crosses = start.penetration <= 0.0 && end.penetration > 0.0;
                 let theta = if crosses { course.crossing() } else { 1.0 };
                 let rate = if crosses { course.at(theta).1 } else { end.rate };
-                let time = state.before.t + theta * h;
-                let asked = machine.ball_joints[j].contact.restitution;
+                let time = before.t + theta * h;
+                let asked = state.conditions.joints[j].restitution;
                 let push = (rate - start.rate) / (theta * h);
                 let mut memory = state.begin(j, time, rate, push, asked, coefficients);
                 if !fixed && located != Some(j) && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
@@ -154,7 +157,7 @@ impl Simulation {
                 if fixed {
                     memory.rise(coefficients, end.rate, || course.fastest(theta).0);
                     let (force, _) = course.strongest(coefficients, &memory);
-                    state.follow(j, &course, coefficients, force, &memory, theta);
+                    state.follow(j, before.t, &course, coefficients, force, &memory, theta);
                 }
                 state.now.memory[j] = memory;
             } else {
@@ -162,7 +165,7 @@ impl Simulation {
                 let (time, rate) = if crosses && located != Some(j) {
                     let course = PenetrationCubic::new(start, end, h);
                     let theta = course.crossing();
-                    (state.before.t + theta * h, course.at(theta).1)
+                    (before.t + theta * h, course.at(theta).1)
                 } else {
                     (state.now.t, end.rate)
                 };
@@ -186,26 +189,26 @@ impl Simulation {
     /// Largest contact forces of the step just accepted, in continuous time.
     pub(super) fn track_peaks(&mut self, h: f64) {
         let immediate = !self.locates();
-        let Self { mechanism, state, attempt, .. } = self;
+        let Self { mechanism, state, before, attempt, .. } = self;
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let (start, end) = (state.before.gaps[j], state.now.gaps[j]);
+            let (start, end) = (before.gaps[j], state.now.gaps[j]);
             let grazes = immediate && start.rate > 0.0 && end.rate < 0.0;
             if start.penetration <= 0.0 && end.penetration <= 0.0 && !grazes {
                 continue;
             }
             let coefficients = mechanism.contacts.coefficients(j);
             let course = PenetrationCubic::new(start, end, h);
-            let (force, theta) = if state.before.memory[j].active {
+            let (force, theta) = if before.memory[j].active {
                 attempt.strongest[j]
             } else if state.now.memory[j].active {
                 course.strongest(coefficients, &state.now.memory[j].unsplit())
             } else {
                 course.strongest(coefficients, &Memory::passing(coefficients))
             };
-            let time = state.before.t + theta * h;
+            let time = before.t + theta * h;
             attempt.near_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];
             if force > state.record.statistics.peak_normal[j] {
                 state.record.statistics.peak_normal[j] = force;

@@ -1,12 +1,12 @@
-//! Ideal motion with which a probe is compared. If it has no closed form, the same scene with every ball joint ideal is simulated
+//! Ideal motion with which a probe is compared. If it has no closed form, the same machine with every ball joint ideal is simulated
 //! alongside.
 
 use serde::{Deserialize, Serialize};
 
-use super::Simulation;
+use super::run::Run;
+use super::{Frame, Model, StartError, State, StateMismatch, Stopped, Workspace};
 use crate::integrate::Method;
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
-use crate::simulate::{Frame, Snapshot, StartError, Stopped};
 
 /// Tolerance of the ideal motion: without impacts, accuracy is cheap.
 const TOLERANCE: f64 = 1e-10;
@@ -26,17 +26,36 @@ pub enum ProbeFault {
     Stopped(Stopped),
 }
 
-/// Source of the ideal tip. `M` is a second simulation, or its state in a snapshot.
-#[derive(Clone, Debug)]
-pub(in crate::simulate) enum IdealTip<M = IdealMotion> {
+/// Source of the ideal tip of a model.
+pub(super) enum IdealSource {
     /// There is no probe, or the drives' closed form gives it.
     ClosedForm,
     /// Every ball joint is ideal: the motion is its own reference.
     SelfReference,
-    /// A second simulation.
-    Simulated(Box<M>),
+    /// A simulation alongside.
+    Simulated(Box<IdealModel>),
     /// The ideal mechanism cannot start.
     None(StartError),
+}
+
+/// The ideal machine, and the point on its output body that is followed.
+pub(super) struct IdealModel {
+    pub(super) model: Model,
+    body: usize,
+    probe: Vec3,
+}
+
+/// State of the ideal motion, and past positions of its tip.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct IdealState {
+    state: State,
+    tips: TipHistory,
+}
+
+/// Workspace of the ideal motion.
+pub(super) struct IdealWorkspace {
+    workspace: Workspace,
+    frame: Frame,
 }
 
 /// Tip at the end of a step: position, velocity and acceleration.
@@ -46,18 +65,9 @@ struct Mark {
     tip: [Vec3; 3],
 }
 
-/// Simulation of the ideal scene, and past positions of its tip.
-pub(in crate::simulate) struct IdealMotion {
-    pub(super) simulation: Simulation,
-    body: usize,
-    probe: Vec3,
-    frame: Frame,
-    pub(super) marks: TipHistory,
-}
-
 /// Tip at the latest step ends, and why the motion stopped, if it did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct TipHistory {
+struct TipHistory {
     /// Ring buffer.
     ring: Vec<Mark>,
     count: usize,
@@ -65,14 +75,7 @@ pub(super) struct TipHistory {
     stopped: Option<Stopped>,
 }
 
-/// State of the ideal motion in a snapshot.
-#[derive(Clone, Debug)]
-pub(in crate::simulate) struct Kept {
-    snapshot: Snapshot,
-    marks: TipHistory,
-}
-
-impl IdealTip {
+impl IdealSource {
     /// Chooses the source for `machine`; `closed_form` if its mechanism knows the ideal motion in closed form.
     pub(super) fn of(machine: &Machine, closed_form: bool) -> Self {
         let Some(probe) = machine.output.probe.filter(|_| !closed_form) else {
@@ -81,75 +84,106 @@ impl IdealTip {
         if machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
             return Self::SelfReference;
         }
-        match IdealMotion::new(machine, probe) {
-            Ok(motion) => Self::Simulated(Box::new(motion)),
+        match Model::new(&closed(machine)) {
+            Ok(model) => Self::Simulated(Box::new(IdealModel { model, body: machine.output.body, probe })),
             Err(error) => Self::None(error),
         }
     }
 
-    /// Tip in `frame` minus the ideal tip at its time, m.
-    pub(super) fn error(&mut self, frame: &Frame) -> Option<Vec3> {
+    /// The model that is simulated alongside, if any.
+    pub(super) fn simulated(&self) -> Option<&IdealModel> {
         match self {
-            Self::ClosedForm | Self::None(_) => None,
-            Self::SelfReference => Some(Vec3::zeros()),
-            Self::Simulated(motion) => {
-                let body = &frame.bodies[motion.body];
-                let tip = body.position + body.rotation * motion.probe;
-                Some(tip - motion.tip(frame.time)?)
-            }
+            Self::Simulated(ideal) => Some(ideal),
+            Self::ClosedForm | Self::SelfReference | Self::None(_) => None,
         }
     }
 
-    /// Why there is no ideal motion, if it failed.
-    pub(super) fn fault(&self) -> Option<ProbeFault> {
+    /// The state alongside at t = 0, if there is one.
+    pub(super) fn start(&self) -> Option<Box<IdealState>> {
+        self.simulated().map(|ideal| Box::new(ideal.start()))
+    }
+
+    /// Why there is no ideal motion, if it failed; `state` is that alongside.
+    pub(super) fn fault(&self, state: Option<&IdealState>) -> Option<ProbeFault> {
         match self {
             Self::ClosedForm | Self::SelfReference => None,
             Self::None(error) => Some(ProbeFault::NoStart(error.clone())),
-            Self::Simulated(motion) => motion.marks.stopped.clone().map(ProbeFault::Stopped),
+            Self::Simulated(_) => state?.tips.stopped.clone().map(ProbeFault::Stopped),
         }
+    }
+}
+
+impl IdealModel {
+    fn start(&self) -> IdealState {
+        let mut state = IdealState {
+            state: self.model.start(),
+            tips: TipHistory { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
+        };
+        let mut work = self.workspace(&state);
+        self.mark(&mut state, &mut work);
+        state
+    }
+
+    pub(super) fn workspace(&self, state: &IdealState) -> Box<IdealWorkspace> {
+        Box::new(IdealWorkspace { workspace: self.model.workspace(&state.state), frame: Frame::default() })
+    }
+
+    /// Records the current tip.
+    fn mark(&self, state: &mut IdealState, work: &mut IdealWorkspace) {
+        let IdealWorkspace { workspace, frame } = work;
+        let time = state.state.time();
+        self.model.sample(&mut state.state, workspace, time, frame);
+        let body = &frame.bodies[self.body];
+        let (arm, w) = (body.rotation * self.probe, body.angular_velocity);
+        let acceleration = body.acceleration + body.angular_acceleration.cross(&arm) + w.cross(&w.cross(&arm));
+        let velocity = body.velocity + w.cross(&arm);
+        let tips = &mut state.tips;
+        tips.ring[tips.count % MARKS] = Mark { time: frame.time, tip: [body.position + arm, velocity, acceleration] };
+        tips.count += 1;
+    }
+
+    /// The tip at `time`, m; `None` before the oldest mark, and after the motion stopped.
+    fn tip(&self, state: &mut IdealState, work: &mut IdealWorkspace, time: f64) -> Option<Vec3> {
+        while state.state.time() < time && state.tips.stopped.is_none() {
+            match self.model.step(&mut state.state, &mut work.workspace) {
+                Ok(()) => self.mark(state, work),
+                Err(stopped) => state.tips.stopped = Some(stopped),
+            }
+        }
+        state.tips.tip(time)
+    }
+
+    /// Tip in `frame` minus the ideal tip at its time, m.
+    pub(super) fn error(&self, state: &mut IdealState, work: &mut IdealWorkspace, frame: &Frame) -> Option<Vec3> {
+        let body = &frame.bodies[self.body];
+        let tip = body.position + body.rotation * self.probe;
+        Some(tip - self.tip(state, work, frame.time)?)
     }
 
     /// Sets gravity from `time` on, m/s^2.
-    pub(super) fn set_gravity(&mut self, time: f64, gravity: Vec3) {
-        if let Self::Simulated(motion) = self {
-            motion.set_gravity(time, gravity);
-        }
-    }
-
-    pub(super) fn kept(&self) -> IdealTip<Kept> {
-        self.map(|motion| Kept { snapshot: motion.simulation.snapshot(), marks: motion.marks.clone() })
-    }
-
-    /// Restores the state of a reference with the same equations.
-    pub(super) fn restore(&mut self, kept: &IdealTip<Kept>) {
-        if let (Self::Simulated(motion), IdealTip::Simulated(kept)) = (self, kept) {
-            motion.simulation.restore(&kept.snapshot);
-            motion.marks = kept.marks.clone();
-        }
+    pub(super) fn set_gravity(&self, state: &mut IdealState, work: &mut IdealWorkspace, time: f64, gravity: Vec3) {
+        self.tip(state, work, time);
+        let mut run = Run::new(&self.model, &mut state.state, &mut work.workspace);
+        run.go_back_to(time);
+        run.set_gravity(gravity);
+        // Marks after `time` are no longer valid.
+        state.tips.forget_after(time);
+        self.mark(state, work);
     }
 }
 
-impl IdealTip<Kept> {
-    /// Recreates the reference of `machine`.
-    pub(super) fn resume(&self, machine: &Machine) -> IdealTip {
-        self.map(|kept| IdealMotion {
-            simulation: Simulation::of(&kept.snapshot),
-            body: machine.output.body,
-            probe: machine.output.probe.unwrap_or_default(),
-            frame: Frame::default(),
-            marks: kept.marks.clone(),
-        })
+impl IdealState {
+    /// As [`State::bytes`].
+    pub(super) fn bytes(&self) -> usize {
+        self.state.bytes() + std::mem::size_of_val(&self.tips.ring[..])
     }
-}
 
-impl<M> IdealTip<M> {
-    fn map<N>(&self, turn: impl FnOnce(&M) -> N) -> IdealTip<N> {
-        match self {
-            Self::ClosedForm => IdealTip::ClosedForm,
-            Self::SelfReference => IdealTip::SelfReference,
-            Self::Simulated(motion) => IdealTip::Simulated(Box::new(turn(motion))),
-            Self::None(error) => IdealTip::None(error.clone()),
+    /// Checks a state that was read against `own`, a state of `model`.
+    pub(super) fn check(&self, model: &Model, own: &Self) -> Result<(), StateMismatch> {
+        if self.tips.ring.len() != MARKS {
+            return Err(StateMismatch);
         }
+        self.state.check(model, &own.state)
     }
 }
 
@@ -172,58 +206,7 @@ pub fn closed(machine: &Machine) -> Machine {
     ideal
 }
 
-impl IdealMotion {
-    fn new(machine: &Machine, probe: Vec3) -> Result<Self, StartError> {
-        let mut motion = Self {
-            simulation: Simulation::new(&closed(machine))?,
-            body: machine.output.body,
-            probe,
-            frame: Frame::default(),
-            marks: TipHistory { ring: vec![Mark::default(); MARKS], count: 0, stopped: None },
-        };
-        motion.mark();
-        Ok(motion)
-    }
-
-    /// Records the current tip.
-    fn mark(&mut self) {
-        self.simulation.sample(self.simulation.time(), &mut self.frame);
-        let body = &self.frame.bodies[self.body];
-        let (arm, w) = (body.rotation * self.probe, body.angular_velocity);
-        let acceleration = body.acceleration + body.angular_acceleration.cross(&arm) + w.cross(&w.cross(&arm));
-        let velocity = body.velocity + w.cross(&arm);
-        self.marks.ring[self.marks.count % MARKS] =
-            Mark { time: self.frame.time, tip: [body.position + arm, velocity, acceleration] };
-        self.marks.count += 1;
-    }
-
-    /// The tip at `time`, m; `None` before the oldest mark, and after the motion stopped.
-    fn tip(&mut self, time: f64) -> Option<Vec3> {
-        while self.simulation.time() < time && self.marks.stopped.is_none() {
-            match self.simulation.step() {
-                Ok(()) => self.mark(),
-                Err(stopped) => self.marks.stopped = Some(stopped),
-            }
-        }
-        self.marks.tip(time)
-    }
-
-    fn set_gravity(&mut self, time: f64, gravity: Vec3) {
-        self.tip(time);
-        self.simulation.go_back_to(time);
-        self.simulation.set_gravity(gravity);
-        // Marks after `time` are no longer valid.
-        self.marks.forget_after(time);
-        self.mark();
-    }
-}
-
 impl TipHistory {
-    /// Whether the ring buffer has its full length.
-    pub(super) fn fits(&self) -> bool {
-        self.ring.len() == MARKS
-    }
-
     fn tip(&self, time: f64) -> Option<Vec3> {
         let oldest = self.count.saturating_sub(MARKS);
         let at = |k: usize| &self.ring[k % MARKS];
@@ -258,7 +241,7 @@ fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
 mod tests {
     use super::*;
     use crate::scene::Scene;
-    use crate::simulate::Effect;
+    use crate::simulate::{Effect, Simulation};
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
         let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
@@ -270,7 +253,10 @@ mod tests {
     fn the_motion_alongside_is_the_closed_form_of_the_paper() {
         let scene = scene("spcmm", &[]);
         let probe = scene.machine.output.probe.expect("has a probe");
-        let mut alongside = IdealMotion::new(&scene.machine, probe).expect("starts");
+        let model = Model::new(&closed(&scene.machine)).expect("starts");
+        let ideal = IdealModel { model, body: scene.machine.output.body, probe };
+        let mut alongside = ideal.start();
+        let mut work = ideal.workspace(&alongside);
         let mut simulation = Simulation::new(&scene.machine).expect("starts");
         let mut frame = Frame::default();
         for k in 0..40 {
@@ -281,7 +267,7 @@ mod tests {
             let body = &frame.bodies[scene.machine.output.body];
             let tip = body.position + body.rotation * probe;
             let closed = tip - frame.probe_error.expect("has a closed form");
-            let off = (alongside.tip(frame.time).expect("goes on") - closed).norm();
+            let off = (ideal.tip(&mut alongside, &mut work, frame.time).expect("goes on") - closed).norm();
             assert!(off < 1e-10, "{off:e} at {time}");
         }
     }
@@ -300,15 +286,17 @@ mod tests {
         simulation.sample(change, &mut frame);
         assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
         // Without gravity a rod in an ideal joint rotates uniformly: its tip stays on its circle, at its speed.
-        let IdealTip::Simulated(motion) = &mut simulation.reference else {
-            panic!("nothing alongside");
-        };
+        let model = simulation.model().clone();
+        let ideal = model.ideal().simulated().expect("simulated alongside");
+        let mut alongside = simulation.state().ideal.clone().expect("alongside");
+        let mut work = ideal.workspace(&alongside);
+        let mut tip = |time: f64| ideal.tip(&mut alongside, &mut work, time).expect("goes on");
         let times = [0.0, 0.01, 0.02].map(|ahead| change + ahead);
-        let tips = times.map(|time| motion.tip(time).expect("goes on"));
+        let tips = times.map(&mut tip);
         let angle = |a: Vec3, b: Vec3| libm::atan2(a.cross(&b).norm(), a.dot(&b));
         let (first, second) = (angle(tips[0], tips[1]), angle(tips[1], tips[2]));
         assert!(first > 0.01 && (first - second).abs() < 1e-9, "{first} {second}");
-        let before = motion.tip(change - 0.005).expect("goes on");
+        let before = tip(change - 0.005);
         assert!((angle(before, tips[0]) - 0.5 * first).abs() > 1e-6);
     }
 }

@@ -1,14 +1,13 @@
 //! Parameters changed while the simulation runs.
 
-use std::sync::Arc;
-
 use super::automatic::{SchemeSelector, controller_of, prepare_implicit};
-use super::{CLEARANCE_SPEED, Simulation};
+use super::{CLEARANCE_SPEED, Run, sync_parameters};
 use crate::contact::Memory;
+use crate::integrate::Polynomial;
 use crate::machine::{Machine, Vec3};
-use crate::mechanism::{ElementReport, MechanismError, Pull, Ramp};
+use crate::mechanism::{MechanismError, Pull, Ramp};
+use crate::simulate::Effect;
 use crate::simulate::stepper::{ActiveScheme, AnyStepper};
-use crate::simulate::{Effect, Frame};
 
 /// Largest distance of a hand, or of the point it holds, m: beyond it a pull makes no sense.
 const FARTHEST_HAND: f64 = 1e6;
@@ -35,40 +34,52 @@ pub enum ChangeError {
     },
 }
 
-impl Simulation {
-    /// Adopts the gravity, contacts and stepper of `next`. Returns [`Effect::AtReset`] and changes nothing if `next` differs in
-    /// anything else, or if a ball joint becomes or ceases to be ideal, which changes the equations.
-    ///
-    /// # Errors
-    /// If the method is too costly for the equations; nothing has changed then.
-    pub fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
+/// As [`Simulation::check_pull`](crate::simulate::Simulation::check_pull), for a pull on a body of `machine`.
+pub(in crate::simulate) fn check_pull(machine: &Machine, pull: &Pull) -> Result<(), ChangeError> {
+    let (body, bodies) = (pull.body, machine.bodies.len());
+    let far = pull.hand.amax().max(pull.point.amax());
+    if body >= bodies {
+        Err(ChangeError::NoBody { body, bodies })
+    } else if far > FARTHEST_HAND {
+        Err(ChangeError::TooFar { far })
+    } else {
+        Ok(())
+    }
+}
+
+impl Run<'_> {
+    /// As [`Simulation::adopt`](crate::simulate::Simulation::adopt).
+    pub(in crate::simulate) fn adopt(&mut self, next: &Machine) -> Result<Effect, ChangeError> {
         let pairs = self.machine.ball_joints.iter().zip(&next.ball_joints);
         let clearances = pairs.map(|(a, b)| (a.contact.clearance, b.contact.clearance));
         let changes_equations = clearances.into_iter().any(|(a, b)| (a == 0.0) != (b == 0.0));
         if changes_equations || !self.machine.differs_in_conditions_alone(next) {
             return Ok(Effect::AtReset);
         }
-        if next.solver.method != self.machine.solver.method {
-            prepare_implicit(&mut self.mechanism, next.solver.method)?;
+        let solver = next.solver;
+        let other_method = solver.method != self.state.conditions.solver.method;
+        if other_method {
+            prepare_implicit(self.mechanism, solver.method)?;
         }
-        let before = std::mem::replace(&mut self.machine, Arc::new(next.clone()));
-        if self.machine.gravity != before.gravity {
-            let gravity = self.machine.gravity;
-            self.reference.set_gravity(self.state.now.t, gravity);
+        let before = std::mem::replace(&mut self.state.conditions, next.conditions());
+        if next.gravity != before.gravity {
+            self.set_ideal_gravity();
         }
-        for j in 0..self.machine.ball_joints.len() {
-            let contact = self.machine.ball_joints[j].contact;
-            if contact != before.ball_joints[j].contact {
-                self.change_contact(j, &contact);
+        for (j, old) in before.joints.iter().enumerate() {
+            if self.state.conditions.joints[j] != *old {
+                self.change_contact(j);
             }
         }
-        if self.machine.solver != before.solver {
-            let solver = &self.machine.solver;
-            if solver.method != before.solver.method {
-                self.stepper = AnyStepper::new(solver.method, self.state.now.y.len());
-                self.state.control.member = ActiveScheme::Explicit;
-                self.state.control.controller = controller_of(solver.method, ActiveScheme::Explicit);
-                self.state.control.choice = SchemeSelector::default();
+        if solver != before.solver {
+            if other_method {
+                let dimension = self.state.now.y.len();
+                *self.stepper = AnyStepper::new(solver.method, dimension);
+                let control = &mut self.state.control;
+                control.member = ActiveScheme::Explicit;
+                control.controller = controller_of(solver.method, ActiveScheme::Explicit);
+                control.choice = SchemeSelector::default();
+                let components = AnyStepper::polynomial_size(solver.method, dimension);
+                self.state.polynomial = Polynomial::new(components);
             }
             self.state.control.h_next = self.state.control.h_next.min(solver.step);
         }
@@ -79,87 +90,49 @@ impl Simulation {
     }
 
     /// Starts, changes or (with `None`) ends the pull of a hand on a body.
-    ///
-    /// # Errors
-    /// As [`Self::check_pull`]: the running simulation is unchanged.
-    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), ChangeError> {
-        pull.map_or(Ok(()), |pull| self.check_pull(&pull))?;
+    pub(in crate::simulate) fn pull(&mut self, pull: Option<Pull>) {
         self.state.pull = pull;
         self.sync_parameters();
         self.refresh();
         self.record_change();
-        Ok(())
-    }
-
-    /// Checks whether a pull is possible.
-    ///
-    /// # Errors
-    /// An unknown body, or a position out of reach.
-    pub fn check_pull(&self, pull: &Pull) -> Result<(), ChangeError> {
-        let bodies = self.machine.bodies.len();
-        let far = pull.hand.amax().max(pull.point.amax());
-        if pull.body >= bodies {
-            let body = pull.body;
-            Err(ChangeError::NoBody { body, bodies })
-        } else if far > FARTHEST_HAND {
-            Err(ChangeError::TooFar { far })
-        } else {
-            Ok(())
-        }
-    }
-
-    /// Force of the pulling hand, if any, with the bodies as in `frame`.
-    pub fn pull_in(&self, frame: &Frame) -> Option<ElementReport> {
-        let pull = self.state.pull?;
-        let motion = frame.bodies.get(pull.body)?;
-        let arm = motion.rotation * pull.point;
-        let velocity = motion.velocity + motion.angular_velocity.cross(&arm);
-        Some(pull.report(motion.position + arm, velocity))
-    }
-
-    /// The current pull, if any.
-    pub fn pulled(&self) -> Option<Pull> {
-        self.state.pull
     }
 
     /// Sets gravity from now on, m/s^2, and changes nothing else.
-    pub fn set_gravity(&mut self, gravity: Vec3) {
-        Arc::make_mut(&mut self.machine).gravity = gravity;
+    pub(in crate::simulate) fn set_gravity(&mut self, gravity: Vec3) {
+        self.state.conditions.gravity = gravity;
         self.sync_parameters();
         self.refresh();
     }
 
-    /// Copies the parameters that live changes affect from machine and state to the mechanism.
-    pub(super) fn sync_parameters(&mut self) {
-        let Self { mechanism, state, machine, .. } = self;
-        mechanism.gravity = machine.gravity;
-        if mechanism.pull() != state.pull {
-            mechanism.set_pull(machine, state.pull);
+    /// The same for the ideal motion alongside.
+    fn set_ideal_gravity(&mut self) {
+        let (time, gravity) = (self.state.now.t, self.state.conditions.gravity);
+        let both = self.state.ideal.as_deref_mut().zip(self.ideal.as_deref_mut());
+        if let (Some(ideal), Some((state, work))) = (self.model.ideal().simulated(), both) {
+            ideal.set_gravity(state, work, time, gravity);
         }
-        for (j, joint) in machine.ball_joints.iter().enumerate() {
-            if joint.contact.clearance > 0.0 {
-                let contacts = &mut mechanism.contacts;
-                contacts.set_ramp(j, state.ramps[j]);
-                contacts.set_parameters(j, &joint.contact, state.clearances[j]);
-            }
-        }
+    }
+
+    fn sync_parameters(&mut self) {
+        sync_parameters(self.mechanism, self.model, self.state);
     }
 
     /// Rewinds to `time` within the latest step, on its interpolant; only for a simulation without contacts.
     pub(in crate::simulate) fn go_back_to(&mut self, time: f64) {
-        let h = self.state.now.t - self.state.before.t;
-        if !(time < self.state.now.t && time >= self.state.before.t) {
+        let h = self.state.now.t - self.before.t;
+        if !(time < self.state.now.t && time >= self.before.t) {
             return;
         }
-        self.interpolate((time - self.state.before.t) / h, h);
+        self.interpolate((time - self.before.t) / h, h);
         self.state.now.t = time;
-        self.state.now.y.copy_from_slice(&self.scratch_y);
+        self.state.now.y.copy_from_slice(self.scratch_y);
         self.mechanism.project(time, &mut self.state.now.y);
         self.refresh();
     }
 
     /// Applies new contact parameters from this instant; a clearance that would place the ball inside the wall is ramped.
-    fn change_contact(&mut self, j: usize, contact: &crate::contact::Parameters) {
+    fn change_contact(&mut self, j: usize) {
+        let contact = self.state.conditions.joints[j];
         if contact.clearance == 0.0 {
             return;
         }

@@ -1,0 +1,162 @@
+//! A machine compiled for simulation.
+
+use std::sync::Arc;
+
+use super::ideal::{IdealSource, ProbeFault};
+use super::run::Run;
+use super::state::{State, StateMismatch};
+use super::workspace::Workspace;
+use super::{Doubt, Frame, StartError, Stopped};
+use crate::machine::Machine;
+use crate::mechanism::{self, Mechanism};
+
+/// A machine compiled for simulation. It is constant, and threads may share it; what changes is a [`State`], which is stepped in a
+/// [`Workspace`].
+///
+/// ```
+/// # use jointplay_physics::{machine::*, simulate::*};
+/// # let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
+/// # let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
+/// # let joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
+/// # machine.ball_joints.push(joint.with_clearance(0.2e-3));
+/// let model = Model::new(&machine)?;
+/// let mut state = model.start();
+/// let mut workspace = model.workspace(&state);
+/// while state.time() < 0.01 {
+///     model.step(&mut state, &mut workspace)?;
+/// }
+/// // A copy continues with the same bits, in this workspace or another one.
+/// let mut copy = state.clone();
+/// model.step(&mut state, &mut workspace)?;
+/// model.step(&mut copy, &mut workspace)?;
+/// assert_eq!(copy, state);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Model {
+    machine: Machine,
+    compiled: Arc<mechanism::Model>,
+    ideal: IdealSource,
+    start: State,
+}
+
+impl Model {
+    /// Compiles `machine` and computes its start.
+    ///
+    /// # Errors
+    /// If ball joints do not close, or the rods cannot follow the prescribed trajectory.
+    pub fn new(machine: &Machine) -> Result<Self, StartError> {
+        Self::with_workspace(machine).map(|(model, _)| model)
+    }
+
+    /// The same, with a workspace for its states.
+    pub(super) fn with_workspace(machine: &Machine) -> Result<(Self, Workspace), StartError> {
+        let mut mechanism = Mechanism::new(machine)?;
+        let y = mechanism.start()?;
+        let mut start = State::new(machine.conditions(), &mechanism, y);
+        let ideal = IdealSource::of(machine, mechanism.has_closed_form());
+        start.ideal = ideal.start();
+        let compiled = mechanism.model().clone();
+        let mut model = Self { machine: machine.clone(), compiled, ideal, start };
+        let mut workspace = model.workspace_in(mechanism, &model.start)?;
+        let mut start = model.start.clone();
+        Run::new(&model, &mut start, &mut workspace).begin()?;
+        model.start = start;
+        Ok((model, workspace))
+    }
+
+    fn workspace_in(&self, mechanism: Mechanism, state: &State) -> Result<Workspace, StartError> {
+        let mut workspace = Workspace::new(self, mechanism, state.conditions.solver.method)?;
+        workspace.ideal = self.ideal.simulated().zip(state.ideal.as_ref()).map(|(ideal, state)| ideal.workspace(state));
+        Ok(workspace)
+    }
+
+    /// A workspace that follows `state`, a state of this model.
+    pub fn workspace(&self, state: &State) -> Workspace {
+        let mechanism = Mechanism::of(&self.machine, self.compiled.clone());
+        self.workspace_in(mechanism, state).expect("checked when the state adopted its method")
+    }
+
+    /// The state at t = 0.
+    pub fn start(&self) -> State {
+        self.start.clone()
+    }
+
+    /// The machine, as it starts.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// The compiled equations.
+    pub(super) fn compiled(&self) -> &Arc<mechanism::Model> {
+        &self.compiled
+    }
+
+    /// Source of the ideal motion with which a probe is compared.
+    pub(super) fn ideal(&self) -> &IdealSource {
+        &self.ideal
+    }
+
+    /// Model of the ideal motion, if it is simulated alongside.
+    pub(super) fn ideal_model(&self) -> Option<&Self> {
+        self.ideal.simulated().map(|ideal| &ideal.model)
+    }
+
+    /// Takes one accepted step.
+    ///
+    /// # Errors
+    /// If the divergence guard stops the run; the state is then the last good one.
+    ///
+    /// # Panics
+    /// A state or a workspace of another model.
+    pub fn step(&self, state: &mut State, workspace: &mut Workspace) -> Result<(), Stopped> {
+        Run::new(self, state, workspace).advance(f64::INFINITY)
+    }
+
+    /// Takes one step that ends no later than `end`, s, and exactly there if it would overshoot.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    ///
+    /// # Panics
+    /// As [`Self::step`].
+    pub fn step_until(&self, state: &mut State, workspace: &mut Workspace, end: f64) -> Result<(), Stopped> {
+        if state.now.t >= end {
+            return Ok(());
+        }
+        Run::new(self, state, workspace).advance(end)
+    }
+
+    /// Samples the state at `time`, s, interpolated within the latest step; forces come from the interpolated state. Allocates
+    /// only while `out` is too small. Of the state, this changes the largest sampled forces and loads alone.
+    ///
+    /// # Panics
+    /// As [`Self::step`].
+    pub fn sample(&self, state: &mut State, workspace: &mut Workspace, time: f64, out: &mut Frame) {
+        Run::new(self, state, workspace).sample(time, out);
+    }
+
+    /// Reasons not to trust the results since the start; empty if there are none. Begins with [`Machine::doubts`] of the machine
+    /// under the state's conditions.
+    pub fn doubts(&self, state: &State) -> Vec<Doubt> {
+        super::doubts::doubts(self, state)
+    }
+
+    /// Why the probe has no ideal motion to be compared with: the ideal mechanism cannot start, or could not continue.
+    pub fn probe_fault(&self, state: &State) -> Option<ProbeFault> {
+        self.ideal.fault(state.ideal.as_deref())
+    }
+
+    /// Checks a state that was read from a file.
+    ///
+    /// # Errors
+    /// It cannot belong to a run of this model.
+    pub fn check(&self, state: &State) -> Result<(), StateMismatch> {
+        state.check(self, &self.start)
+    }
+}
+
+impl std::fmt::Debug for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Model").field("bodies", &self.machine.bodies.len()).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,434 @@
+//! Steps, events and live changes of a state. Reads no clock.
+
+mod adaptive;
+mod automatic;
+mod contacts;
+mod corners;
+mod displace;
+mod edges;
+mod energy;
+mod flights;
+mod guard;
+mod live;
+mod sample;
+mod search;
+mod wear;
+
+use super::ideal::IdealWorkspace;
+use super::peaks::{Approach, Recent};
+use super::state::{Instant, State};
+use super::stepper::AnyStepper;
+use super::workspace::{Workspace, sync_parameters};
+use super::{Frame, Indeterminate, Model, StartError, StopAdvice, StopFault, Stopped};
+use crate::contact::Memory;
+use crate::integrate::System as _;
+use crate::machine::Machine;
+use crate::mechanism::{ActiveSet, Counts, Mechanism, MechanismError};
+use adaptive::Whole;
+pub(super) use automatic::{SchemeSelector, controller_of, prepare_implicit};
+use corners::LawBranch;
+use flights::{clear_flights, put_flights};
+pub use live::ChangeError;
+pub(super) use live::check_pull;
+
+/// Rate at which a clearance shrinks when a jump would place the ball inside its socket wall, m/s: an impact at this speed gives
+/// a force of the order of the static ones.
+pub const CLEARANCE_SPEED: f64 = 2e-3;
+/// Longest step of an adaptive method, s.
+pub(super) const LONGEST_STEP: f64 = 10e-3;
+/// Shortest step of an adaptive method, s.
+const SHORTEST_STEP: f64 = 1e-14;
+/// A step that would end within this fraction of its length of a limit ends at the limit.
+const NEARLY: f64 = 1e-6;
+/// Distance of an ideal motion from its closed form, m, beyond which it has switched to another branch.
+const OTHER_BRANCH: f64 = 1e-6;
+/// Shortest retry of a kinematic step, s: how closely it approaches a pose that it cannot pass.
+const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
+/// First step after a contact begins, before a workable one is known, s: a tenth of a typical impact.
+pub(super) const FIRST_CONTACT_STEP: f64 = 1e-5;
+/// Loops still open by more than this after projection have come apart, m.
+const OPEN_LOOP: f64 = 1e-7;
+
+/// Shortest adaptive step, s, that still advances the time `t`.
+fn shortest_step(t: f64) -> f64 {
+    SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
+}
+
+/// A state of a model being stepped in a workspace that follows it.
+pub(super) struct Run<'a> {
+    model: &'a Model,
+    machine: &'a Machine,
+    state: &'a mut State,
+    mechanism: &'a mut Mechanism,
+    stepper: &'a mut AnyStepper,
+    /// Start of the latest step.
+    before: &'a mut Instant,
+    attempt: &'a mut Attempt,
+    scratch_y: &'a mut [f64],
+    scratch_k: &'a mut [f64],
+    scratch_memory: &'a mut [Memory],
+    ideal: Option<&'a mut IdealWorkspace>,
+}
+
+/// The step being taken.
+pub(super) struct Attempt {
+    end: Instant,
+    /// Joint whose contact starts or ends at the step's end.
+    located: Option<usize>,
+    /// Joint that switches to another branch of a law there, and that branch.
+    corner: Option<(usize, LawBranch)>,
+    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::pressed`]; empty if steps do
+    /// not end at edges of elements.
+    sides: Vec<f64>,
+    /// Whether it ends at an edge.
+    edge: bool,
+    /// Contact indicators at both ends of a part of the step.
+    pressed: [Vec<f64>; 2],
+    /// Whether it was restarted on another branch.
+    turned: bool,
+    /// Joints whose contact left the frozen branches of its laws in an evaluation.
+    left: Vec<bool>,
+    /// The full step, if an event truncated it, and the full step that the next one must reproduce to follow another run.
+    whole: Option<Whole>,
+    beside: Option<Whole>,
+    /// Whether it may contain the largest force of a contact.
+    near_peak: bool,
+    /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
+    strongest: Vec<(f64, f64)>,
+    /// Step size times the largest eigenvalue seen; 0 if unknown.
+    stiffness: f64,
+    /// Evaluations spent so far, and factorisations.
+    counts: Counts,
+    factorisations: u32,
+}
+
+impl Attempt {
+    /// For the steps of a state of `dimension` components.
+    pub(super) fn new(machine: &Machine, dimension: usize, joints: usize) -> Self {
+        let edges = 2 * machine.elements.len();
+        Self {
+            end: Instant::new(vec![0.0; dimension], joints),
+            located: None,
+            corner: None,
+            sides: Vec::with_capacity(edges),
+            edge: false,
+            pressed: std::array::from_fn(|_| Vec::with_capacity(edges)),
+            turned: false,
+            left: vec![false; joints],
+            whole: None,
+            beside: None,
+            near_peak: false,
+            strongest: vec![(0.0, 0.0); joints],
+            stiffness: 0.0,
+            counts: Counts::default(),
+            factorisations: 0,
+        }
+    }
+
+    /// Forgets how the latest step ended, which belongs to another state.
+    pub(super) fn clear(&mut self) {
+        self.located = None;
+        self.corner = None;
+        self.whole = None;
+        self.beside = None;
+        self.near_peak = false;
+    }
+}
+
+impl<'a> Run<'a> {
+    /// Brings `workspace` to `state` first, if it follows another.
+    pub(super) fn new(model: &'a Model, state: &'a mut State, workspace: &'a mut Workspace) -> Self {
+        workspace.follow(model, state);
+        let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_memory, ideal, .. } =
+            workspace;
+        let machine = model.machine();
+        let ideal = ideal.as_deref_mut();
+        Self { model, machine, state, mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_memory, ideal }
+    }
+}
+
+impl Run<'_> {
+    /// Completes the start: contacts, derivative, first peaks, ledger.
+    pub(super) fn begin(&mut self) -> Result<(), StartError> {
+        self.begin_contacts_at_start();
+        self.choose_first_member();
+        self.refresh();
+        self.state.record.determinant_positive = self.mechanism.is_determinant_positive();
+        if self.mechanism.distance_from_ideal() > OTHER_BRANCH {
+            return Err(MechanismError::OtherBranch.into());
+        }
+        self.track_peaks(0.0);
+        self.track_reactions();
+        self.start_ledger();
+        self.state.record.starts_inside = self.deepest_in_stop();
+        Ok(())
+    }
+
+    /// Discards what the stepper computed at a state that is no longer current.
+    fn invalidate(&mut self) {
+        self.stepper.invalidate();
+        self.state.polynomial.clear();
+    }
+
+    /// Discards the previous step.
+    fn discard_previous_step(&mut self) {
+        self.before.copy_from(&self.state.now);
+        self.state.control.grid_origin = self.state.now.t;
+        self.state.control.grid_count = 0;
+    }
+
+    /// Computes [`Record::starts_inside`] from the latest evaluation.
+    fn deepest_in_stop(&self) -> Option<(usize, [f64; 2], f64)> {
+        let reports = self.mechanism.element_reports(self.state.now.t).enumerate();
+        let inside = reports.filter_map(|(i, report)| {
+            let force = report.torque.unwrap_or(report.force).norm();
+            report.depth.filter(|[depth, usual]| depth > usual).map(|depth| (i, depth, force))
+        });
+        inside.max_by(|a, b| (a.1[0] / a.1[1]).total_cmp(&(b.1[0] / b.1[1])))
+    }
+
+    /// Whether the method locates the instants at which contacts begin and end.
+    fn locates(&self) -> bool {
+        self.state.conditions.solver.method.is_adaptive()
+    }
+
+    /// Recomputes derivative and gaps after a change of state other than a step; discards the previous step.
+    fn refresh(&mut self) {
+        self.end_flights();
+        self.freeze_branches(true);
+        let located = self.locates();
+        let Self { mechanism, state, .. } = self;
+        let State { now, .. } = state;
+        let touching = ActiveSet::by(located, &now.memory);
+        let mut evaluator = mechanism.evaluator(touching);
+        evaluator.derivative(now.t, &now.y, &mut now.k);
+        mechanism.complete_gaps(touching, &now.y);
+        store_gaps(mechanism, &mut now.gaps);
+        // Forces jump here: a parabola across the jump would have a spurious peak.
+        state.record.reactions.fill(Recent::default());
+        self.invalidate();
+        self.begin_contacts_at_walls();
+        self.discard_previous_step();
+    }
+
+    /// Takes one accepted step that ends no later than `end`, s.
+    pub(super) fn advance(&mut self, end: f64) -> Result<(), Stopped> {
+        // Done here and not at the end of the previous step, because samples inside that step must still see the clearance move.
+        self.finish_ramps();
+        let limit = end.min(self.ramp_end());
+        // Fixed steps ignore this limit: their size is the user's choice.
+        let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
+        self.attempt.sides.clear();
+        self.attempt.edge = false;
+        if self.mechanism.is_kinematic() {
+            self.kinematic_step(follows_drives)?;
+        } else if self.state.conditions.solver.method.is_adaptive() {
+            let step = self.adaptive_step(follows_drives);
+            if step.is_err() {
+                self.forget_flown();
+            }
+            step?;
+        } else {
+            self.fixed_step(limit)?;
+        }
+        Ok(())
+    }
+
+    fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let step = self.state.conditions.solver.step;
+        let control = &self.state.control;
+        let mut t_end = control.grid_origin + (control.grid_count + 1) as f64 * step;
+        if t_end >= limit - NEARLY * step {
+            t_end = limit;
+        }
+        let h = t_end - self.state.now.t;
+        self.attempt.counts = Counts::default();
+        self.try_step(h);
+        self.accept(t_end, h)?;
+        let control = &mut self.state.control;
+        if t_end == limit {
+            // The next grid begins where this one was cut.
+            control.grid_origin = t_end;
+            control.grid_count = 0;
+        } else {
+            control.grid_count += 1;
+        }
+        Ok(())
+    }
+
+    /// Tries a step of size `h` from the current state; returns the scaled error estimate.
+    fn try_step(&mut self, h: f64) -> f64 {
+        let located = self.locates();
+        let Self { mechanism, stepper, state, attempt, .. } = self;
+        let State { now, conditions, polynomial, .. } = &mut **state;
+        let Instant { t, y, k, memory, .. } = &*now;
+        mechanism.hold_elements(&attempt.sides);
+        attempt.left.fill(false);
+        let mut evaluator = mechanism.evaluator_watching(ActiveSet::by(located, memory), &mut attempt.left);
+        let end = &mut attempt.end;
+        let tolerance = conditions.solver.tolerance;
+        let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance, polynomial);
+        attempt.counts += evaluator.counts;
+        attempt.factorisations += stepper.factorisations();
+        attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
+        mechanism.hold_elements(&[]);
+        error
+    }
+
+    /// Evaluates derivative and gaps at the end `t_end` of the current step.
+    fn evaluate_end(&mut self, t_end: f64) {
+        let located = self.locates();
+        let Self { mechanism, state, attempt, .. } = self;
+        let end = &mut attempt.end;
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.now.memory));
+        evaluator.derivative(t_end, &end.y, &mut end.k);
+        attempt.counts += evaluator.counts;
+        self.finish_gaps(t_end);
+    }
+
+    /// Computes bodies in flight, and gaps, at the end `t_end` of the current step, after an evaluation there.
+    fn finish_gaps(&mut self, t_end: f64) {
+        let touching = ActiveSet::by(self.locates(), &self.state.now.memory);
+        let end = &mut self.attempt.end;
+        put_flights(self.mechanism, &self.state.flights, t_end, &mut end.y);
+        clear_flights(self.mechanism, &self.state.flights, &mut end.k);
+        self.mechanism.complete_gaps(touching, &end.y);
+        store_gaps(self.mechanism, &mut end.gaps);
+    }
+
+    /// Takes a step of a kinematic scene: predict, close the loops, compute the reactions. A failed step is retried with shorter
+    /// ones, so that the last good state is close to the failure.
+    fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let t = self.state.now.t;
+        let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
+        loop {
+            let t_end = if t + step >= limit - NEARLY * step { limit } else { t + step };
+            let (now, end) = (&self.state.now, &mut self.attempt.end);
+            self.mechanism.predict(t_end - t, &now.y, &now.k, self.scratch_k, &mut end.y);
+            self.attempt.counts = Counts::default();
+            match self.accept(t_end, t_end - t) {
+                Err(_) if step > SHORTEST_KINEMATIC_STEP => {
+                    self.state.record.statistics.rejected += 1;
+                    step *= 0.25;
+                }
+                result => return result,
+            }
+        }
+    }
+
+    /// Accepts the attempted step: projection, guard, contact memory, peaks.
+    fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
+        let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
+        let mean_rates = self.stepper.has_mean_rates();
+        if mean_rates {
+            // Forces at the end of the step belong to a contact that may end long before the next step does: the mean over the
+            // step is more informative.
+            let (mechanism, now) = (&mut self.mechanism, &self.state.now);
+            let Instant { y, k, .. } = &mut self.attempt.end;
+            mechanism.measure(t_end, y);
+            mechanism.position_rate(y, k);
+            for i in mechanism.positions()..y.len() {
+                k[i] = (y[i] - now.y[i]) / h;
+            }
+            store_gaps(mechanism, &mut self.attempt.end.gaps);
+        } else if !self.stepper.ends_with_derivative() || self.mechanism.projects() {
+            self.evaluate_end(t_end);
+        }
+        self.state.record.statistics.count(self.attempt.counts);
+        // Past a singular pose the loops may close again on another branch.
+        let passed = self.mechanism.is_determinant_positive() != self.state.record.determinant_positive
+            || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
+        let fault = if passed { Some(StopFault::SingularLoops) } else { self.divergence(open, h) };
+        if let Some(fault) = fault {
+            let solver = &self.state.conditions.solver;
+            let advice = if passed || open.is_nan() || open > OPEN_LOOP {
+                StopAdvice::Dependent
+            } else if solver.method.is_adaptive() {
+                StopAdvice::GentlerMotion { tolerance: solver.tolerance }
+            } else {
+                StopAdvice::ShorterStep { step: solver.step }
+            };
+            return Err(self.stopped(fault, advice));
+        }
+        let State { now, record, .. } = &mut *self.state;
+        std::mem::swap(self.before, now);
+        std::mem::swap(now, &mut self.attempt.end);
+        now.t = t_end;
+        now.memory.copy_from_slice(&self.before.memory);
+        let statistics = &mut record.statistics;
+        statistics.steps += 1;
+        let drift = self.mechanism.constraint_drift();
+        statistics.constraint_drift = statistics.constraint_drift.max(drift);
+        let located = self.locates();
+        if located {
+            self.track_reactions();
+        }
+        self.find_strongest(h);
+        let switched = self.switch_contacts(h);
+        self.track_peaks(h);
+        let again = (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
+        if !again && !located {
+            self.track_reactions();
+        }
+        self.record_step(h, switched.contacts || switched.forces);
+        self.pass_corner();
+        // The force now depends on the approach speed just found. Reactions of ideal joints need the derivative at the end even
+        // if the method does not.
+        if again {
+            let Self { mechanism, state, scratch_k, .. } = self;
+            let Instant { t, y, k, memory, .. } = &mut state.now;
+            let rate: &mut [f64] = if mean_rates { scratch_k } else { k };
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
+            evaluator.derivative(*t, y, rate);
+            let counts = evaluator.counts;
+            mechanism.forget_evaluation();
+            state.record.statistics.count(counts);
+            if !located {
+                self.track_reactions();
+            }
+        }
+        self.search_peaks();
+        Ok(())
+    }
+
+    fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {
+        let dependent = self.mechanism.has_dependent_rows();
+        Stopped { time: self.state.now.t, fault, advice: if dependent { StopAdvice::Dependent } else { advice } }
+    }
+
+    /// As [`Simulation::not_unique`](super::Simulation::not_unique).
+    pub(super) fn not_unique(&mut self) -> Indeterminate {
+        self.sample(self.state.now.t, &mut Frame::default());
+        let mechanism = &mut self.mechanism;
+        Indeterminate {
+            reactions: (0..mechanism.cut_joints()).filter(|&j| !mechanism.is_reaction_unique(j)).collect(),
+            actuators: (0..mechanism.drives()).filter(|&i| !mechanism.is_actuator_unique(i)).collect(),
+        }
+    }
+}
+
+/// As [`Simulation::is_cut_by`](super::Simulation::is_cut_by).
+pub(super) fn is_cut_by(state: &State, mechanism: &Mechanism, end: f64) -> bool {
+    let (t, control, solver) = (state.now.t, &state.control, &state.conditions.solver);
+    let (t_end, h) = if mechanism.is_kinematic() {
+        let h = mechanism.kinematic_step().min(LONGEST_STEP);
+        (t + h, h)
+    } else if solver.method.is_adaptive() {
+        let h = control.h_next.min(LONGEST_STEP);
+        (t + h, h)
+    } else {
+        let next = (control.grid_count + 1) as f64;
+        (control.grid_origin + next * solver.step, solver.step)
+    };
+    t_end >= end - NEARLY * h
+}
+
+fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
+    for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
+        *out = Approach {
+            penetration: gap.separation.penetration,
+            rate: gap.separation.rate,
+            speed: gap.eccentricity_rate.norm(),
+        };
+    }
+}

@@ -1,0 +1,129 @@
+//! Scratch memory in which a state is stepped.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::ideal::IdealWorkspace;
+use super::run::{Attempt, prepare_implicit};
+use super::state::{Instant, State};
+use super::stepper::AnyStepper;
+use super::{Model, StartError};
+use crate::contact::Memory;
+use crate::integrate::Method;
+use crate::mechanism::Mechanism;
+
+/// What stepping needs besides [`Model`] and [`State`]: matrices, stages, the latest step for samples within it, and forces of the
+/// latest evaluation. It follows one state at a time; given another, it is first brought to that state, which evaluates nothing.
+/// Steps then allocate nothing.
+pub struct Workspace {
+    pub(super) mechanism: Mechanism,
+    pub(super) stepper: AnyStepper,
+    /// Method for which the two are prepared.
+    method: Method,
+    /// Start of the latest step: samples lie between it and the state.
+    pub(super) before: Instant,
+    pub(super) attempt: Attempt,
+    pub(super) scratch_y: Vec<f64>,
+    pub(super) scratch_k: Vec<f64>,
+    pub(super) scratch_memory: Vec<Memory>,
+    /// For the ideal motion alongside.
+    pub(super) ideal: Option<Box<IdealWorkspace>>,
+    follows: Follows,
+}
+
+/// Ties a state to the workspace that follows it: both hold the same number, drawn anew whenever a workspace turns to a state. A
+/// clone of a state, and a state that was read, are followed by none. The numbers do not enter any computation.
+#[derive(Debug, Default)]
+pub(super) struct Follows(u64);
+
+impl Follows {
+    fn next() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        Self(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        self.0 != 0 && self.0 == other.0
+    }
+}
+
+impl Clone for Follows {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+/// Equal states may be followed by different workspaces.
+impl PartialEq for Follows {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Workspace {
+    /// A workspace for the states of `model` in which `mechanism` evaluates.
+    ///
+    /// # Errors
+    /// The method is too costly for the equations.
+    pub(super) fn new(model: &Model, mechanism: Mechanism, method: Method) -> Result<Self, StartError> {
+        let (n, joints) = (mechanism.dimension(), mechanism.contacts.len());
+        let mut workspace = Self {
+            stepper: AnyStepper::new(method, n),
+            method,
+            before: Instant::new(vec![0.0; n], joints),
+            attempt: Attempt::new(model.machine(), n, joints),
+            scratch_y: vec![0.0; n],
+            scratch_k: vec![0.0; n],
+            scratch_memory: vec![Memory::default(); joints],
+            ideal: None,
+            follows: Follows::default(),
+            mechanism,
+        };
+        prepare_implicit(&mut workspace.mechanism, method)?;
+        Ok(workspace)
+    }
+
+    /// Equations of motion at the latest evaluation.
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// Turns to `state`, if it follows another.
+    pub(super) fn follow(&mut self, model: &Model, state: &mut State) {
+        assert!(self.mechanism.is_of(model.compiled()), "a workspace of another model");
+        if self.follows.is_same(&state.follows) {
+            return;
+        }
+        let number = Follows::next();
+        state.follows = Follows(number.0);
+        self.follows = number;
+        let method = state.conditions.solver.method;
+        if method != self.method {
+            prepare_implicit(&mut self.mechanism, method).expect("checked when the state adopted the method");
+            self.stepper = AnyStepper::new(method, state.now.y.len());
+            self.method = method;
+        }
+        self.stepper.invalidate();
+        self.stepper.choose(state.control.member);
+        // The interpolant of the latest step is not part of the state.
+        self.before.copy_from(&state.now);
+        self.attempt.clear();
+        self.mechanism.forget_evaluation();
+        sync_parameters(&mut self.mechanism, model, state);
+        let flights = &state.flights;
+        self.mechanism.suspend(|flyer| flights[flyer].is_some());
+    }
+}
+
+/// Prepares the equations for the conditions, clearances and pull of `state`.
+pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &State) {
+    mechanism.gravity = state.conditions.gravity;
+    if mechanism.pull() != state.pull {
+        mechanism.set_pull(model.machine(), state.pull);
+    }
+    for (j, contact) in state.conditions.joints.iter().enumerate() {
+        if contact.clearance > 0.0 {
+            mechanism.contacts.set_ramp(j, state.ramps[j]);
+            mechanism.contacts.set_parameters(j, contact, state.clearances[j]);
+        }
+    }
+}
