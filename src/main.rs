@@ -40,8 +40,8 @@ fn explain_panics() {
         let place = info.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
         let _ = writeln!(
             std::io::stderr(),
-            "error: jointplay {} failed inside: {}{place}. This is a mistake in the program; please report this line \
-             and the command that led to it.",
+            "internal error in jointplay {}: {}{place}. This is a bug in the program; please report this line and the \
+             command that led to it.",
             jointplay::VERSION,
             visible_line(what),
         );

@@ -130,7 +130,7 @@ export function makeHost(laboratory, lost) {
                 return undefined;
             }
             const messages = [];
-            const failed = (reason) => messages.push(JSON.stringify({ Failed: `the computation broke off: ${reason}` }));
+            const failed = (reason) => messages.push(JSON.stringify({ Failed: `the computation was aborted: ${reason}` }));
             worker.addEventListener('message', ({ data }) => messages.push(data));
             worker.addEventListener('error', (event) => {
                 // Told in the window instead of as a failure of the page.

@@ -124,7 +124,12 @@ impl Accuracy {
         let said: Vec<&str> = player.warnings().collect();
         let doubts = player.simulation().doubts().into_iter();
         let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
-        let none = if doubts.is_empty() { "No warnings so far" } else { "No warnings but those beside the controls" };
+        let none = if doubts.is_empty() {
+            "No warnings so far"
+        } else {
+            "No warnings other than those beside the \
+                                                                         controls"
+        };
         doubts.retain(|doubt| !said.contains(&&**doubt));
         reserved(ui, "doubts", DOUBTS, |ui| {
             if let Some(problem) = &self.problem {
@@ -147,8 +152,8 @@ impl Accuracy {
         } else {
             (
                 "Measure preset",
-                "Runs this scene with its present values under the preset and under a reference that is converged, beside the \
-                 running one, and compares forces and speed. Takes seconds.",
+                "Runs this scene in the background with its current values, once with the preset and once as a \
+                 converged reference, and compares forces and speed. Takes a few seconds.",
             )
         };
         ui.horizontal(|ui| {
@@ -156,7 +161,7 @@ impl Accuracy {
             let clicked = ui
                 .add_enabled(running || preset.is_some(), button)
                 .on_hover_text(help)
-                .on_disabled_hover_text("Only presets are measured; the present method and tolerance are not one")
+                .on_disabled_hover_text("Only presets are measured; the current method and tolerance are not a preset")
                 .clicked();
             if running {
                 let bar = ProgressBar::new(self.progress as f32).show_percentage();
@@ -181,9 +186,9 @@ impl Accuracy {
         let own = self.found.as_ref();
         let here = own.filter(|found| Some(found.preset) == preset && found.scene == scene);
         let (measured, place) = match (here, preset) {
-            (Some(found), _) => (Some(found.measured), "on this scene with its present values"),
+            (Some(found), _) => (Some(found.measured), "on this scene with its current values"),
             (None, Some(preset)) if scene.changes.is_empty() && player.pending().source.file.is_none() => {
-                (presets::measured(&player.pending().name, preset), "on this scene as it comes with the program")
+                (presets::measured(&player.pending().name, preset), "on this built-in scene with its default values")
             }
             _ => (None, ""),
         };
@@ -247,7 +252,7 @@ fn joint(player: &Player, index: usize) -> &str {
 }
 
 fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
-    let name = preset.map_or_else(|| "no preset".to_owned(), |preset| format!("what the preset {} has", preset.word()));
+    let name = preset.map_or_else(|| "no preset".to_owned(), |preset| format!("those of the preset {}", preset.word()));
     AccuracyLine {
         label: "Runs with",
         value: value::solver(player.pending()),
@@ -298,7 +303,8 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             "Latest impact",
             Some(what),
             false,
-            "Ball joint of the latest impact whose end is known. Disturbed: another joint was in contact meanwhile, or the parameters of the \
+            "Ball joint of the latest impact that has ended. Disturbed: another joint was in contact meanwhile, or \
+             the parameters of the \
              contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
              floor, so it rebounds higher than asked. Soft: weight and drives did more than a hundredth of its energy as work \
              while it lasted. Undisturbed: none of these."
@@ -351,8 +357,8 @@ fn residual(player: &Player) -> AccuracyLine {
         value: share.map_or_else(|| NONE.to_owned(), |share| format!("{}, relative", value::power_of_ten(share))),
         doubtful: share.is_some_and(|share| share > BALANCED),
         help: format!(
-            "Energy that the ledger cannot account for since the start, over the most that the machine held at once and what it lost \
-             since. {exchanged} Amber beyond {}.",
+            "Unaccounted energy since the start, relative to the largest energy that the machine held at once plus \
+             its losses since then. {exchanged} Amber beyond {}.",
             value::power_of_ten(BALANCED)
         ),
     }

@@ -95,7 +95,7 @@ impl App {
             // A body that cannot be pulled stays unchanged.
             let _ = kept.run_mut().pull(pull);
         }
-        if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show the present machine alone").clicked() {
+        if !plain && ui.put(close, Button::new("Close")).on_hover_text("Show only the current machine").clicked() {
             plots.comparison.show_alone();
         }
         now

@@ -203,7 +203,7 @@ impl Pending {
     #[cfg(not(target_arch = "wasm32"))]
     pub fn wait(mut self) -> Result<Image, RenderError> {
         self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
-        let never = || Err(device_error("the picture never came back"));
+        let never = || Err(device_error("the picture could not be read back"));
         self.take().unwrap_or_else(never)
     }
 

@@ -96,7 +96,7 @@ impl Kept {
         let all = value::differences(self.run.running(), player.running(), &[]);
         let ends = self.run.stopped().map(|stopped| format!("It {stopped}"));
         let all: Vec<String> = all.into_iter().chain(ends).collect();
-        if all.is_empty() { "The same parameters as now".to_owned() } else { all.join("\n") }
+        if all.is_empty() { "Same parameters as now".to_owned() } else { all.join("\n") }
     }
 }
 
@@ -299,7 +299,7 @@ impl Comparison {
                     }
                     let beside = self.beside == Some(kept.place);
                     let help =
-                        "Show this machine beside the present one, at the same instant and from the same point of view";
+                        "Show this machine beside the current one, at the same instant and from the same point of view";
                     let switch = egui::Button::new("Side by side").selected(beside);
                     if ui.add(switch).on_hover_text(help).clicked() {
                         self.beside = (!beside).then_some(kept.place);

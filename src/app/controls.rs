@@ -189,7 +189,7 @@ impl Controls {
         let beats = player.keys_overriding_preset();
         if key == PRESET && !beats.is_empty() {
             let names: Vec<&str> = beats.iter().filter_map(|k| k.split('.').nth(1)).collect();
-            let words = format!("The scene's file gives {}: it wins over a preset", names.join(", "));
+            let words = format!("The scene file sets {}, which overrides the preset", names.join(", "));
             ui.label(RichText::new(words).small().weak());
         }
         if player.is_waiting(key) {

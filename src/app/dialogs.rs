@@ -80,7 +80,7 @@ impl Dialog {
             Self::Load { .. } => "Change the running scene?",
             Self::Ready { .. } => "Replace the running scene?",
             #[cfg(not(target_arch = "wasm32"))]
-            Self::StartAsNew => "Start as new?",
+            Self::StartAsNew => "Start fresh?",
         }
     }
 
@@ -99,7 +99,7 @@ impl Dialog {
             Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
             Self::Ready { .. } => Some(("Replace and sweep", Some(Answer::Sweep))),
             #[cfg(not(target_arch = "wasm32"))]
-            Self::StartAsNew => Some(("Start as new", Some(Answer::StartAsNew))),
+            Self::StartAsNew => Some(("Start fresh", Some(Answer::StartAsNew))),
         }
     }
 }
@@ -162,8 +162,8 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player, renderer: &
                 }
                 #[cfg(not(target_arch = "wasm32"))]
                 Dialog::StartAsNew => {
-                    let words = "Forgets the size of the window and of the type, theme, last scene and recent files, and opens the \
-                                 first scene. The run on show is lost.";
+                    let words = "Forgets window size, type size, theme, last scene and recent files, and opens the \
+                                 default scene. The current run is lost.";
                     list(ui, words, &[])
                 }
             })
@@ -244,7 +244,7 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
         ui.monospace(format!("{:016x}", player.simulation().state_hash()));
     })
     .response
-    .on_hover_text("Names the whole state at the latest step: equal hashes are equal states, bit for bit");
+    .on_hover_text("Identifies the complete state at the latest step: equal hashes mean equal states, bit for bit");
     if !scene.changes.is_empty() {
         ui.label("Changed parameters");
         for (key, value) in &scene.changes {
@@ -256,14 +256,14 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
 
 fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> bool {
     ui.label(
-        "A link, the path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the window, \
-         together with those that it names, and a link pasted into it.",
+        "A link, the path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the \
+         window, together with the files that it names, and a link can be pasted.",
     );
     path_field(ui, path, "https://…#scene=…, scene.toml or pendulum", error)
 }
 
 fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>) -> bool {
-    ui.label("Path of the file. A name without folders goes to the folder that the program was started in.");
+    ui.label("Path of the file. A name without a folder is saved in the folder in which the program was started.");
     if let [first, rest @ ..] = files {
         for file in rest {
             let ending = file.name.strip_prefix(&first.name).unwrap_or(&file.name);

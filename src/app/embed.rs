@@ -88,7 +88,7 @@ impl App {
     pub fn embedding(&self) -> Result<String, String> {
         let address = self.page_address();
         if address.is_empty() {
-            let why = "There is no page to show in a frame: --page or JOINTPLAY_PAGE gives the address of one";
+            let why = "No page address is set for the frame; set one with --page or JOINTPLAY_PAGE";
             return Err(why.to_owned());
         }
         let panels = self.embedded.clone();
@@ -113,7 +113,7 @@ impl App {
         match self.embedding() {
             Ok(line) => {
                 ctx.copy_text(line);
-                self.say("Line for another page copied".to_owned());
+                self.say("HTML line copied".to_owned());
             }
             Err(reason) => self.problem = Some(reason),
         }

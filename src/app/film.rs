@@ -67,7 +67,7 @@ impl Wanted {
         }
         if self.frames() > MOST_FRAMES {
             return Some(format!(
-                "More than {MOST_FRAMES} frames: a shorter stretch, a faster time scale or fewer frames a second"
+                "More than {MOST_FRAMES} frames: choose a shorter range, a faster time scale or fewer frames per second"
             ));
         }
         let fault = self.format.check(self.size, self.rate).err();

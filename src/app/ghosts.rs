@@ -51,9 +51,9 @@ impl App {
     /// Switch for the ideal ghost in the view menu.
     pub(super) fn ideal_switch(&mut self, ui: &mut Ui) {
         let mut on = self.player.ideal().is_some();
-        let help = "The same machine with every ball joint closed, at the same drives and gravity, drawn pale over the \
-                    run, and an arrow from its tip to the run's: the error of the play (key G). The plot Tip error records it. The \
-                    run itself does not change by a bit.";
+        let help = "The same machine with ideal ball joints, the same drives and gravity, drawn pale over the run. An \
+                    arrow from its tip to that of the run shows the tip error (key G), which the plot Tip error \
+                    records. The run itself is not affected.";
         if ui.checkbox(&mut on, "Ideal ghost").on_hover_text(help).changed() {
             self.show_ideal(on);
         }

@@ -132,7 +132,7 @@ impl App {
             .height(0.85 * ui.ctx().content_rect().height())
             .selected_text(&name)
             .show_ui(ui, |ui| {
-                let help = "A link that somebody gave you, the name of a scene, or a file";
+                let help = "Open a link, a scene by its name, or a file";
                 let other = ui.selectable_label(false, "Link…").on_hover_text(help);
                 link = other.clicked();
                 ui.separator();
@@ -196,7 +196,7 @@ impl App {
     fn save_menu(&mut self, ui: &mut Ui) {
         self.picture_menu(ui);
         ui.separator();
-        let help = "A film of a stretch of the timeline, MP4 or GIF";
+        let help = "A film of a range of the timeline, MP4 or GIF";
         if ui.button("Film…").on_hover_text(help).clicked() {
             let wanted = self.film_to_make();
             self.dialog = Some(Dialog::Film { wanted });
@@ -220,7 +220,7 @@ impl App {
             layout::close_menu(ui);
         }
         ui.separator();
-        let help = "Copies the line of HTML that shows this scene in this state and view within another page: course page, slides";
+        let help = "Copies the HTML line that embeds this scene, in this state and view, in another page or in slides";
         if ui.button("Embed").on_hover_text(help).clicked() {
             self.copy_embedding(ui.ctx());
             layout::close_menu(ui);
@@ -271,7 +271,8 @@ impl App {
         let row = plate(ui, ui.visuals().weak_text_color()).show(ui, |ui| {
             ui.horizontal_wrapped(|ui| {
                 ui.label(words);
-                let help = "The scene as its file gives it. Its joints rattle for 70 ms and come to rest; at 6 Hz they rattle at every turn";
+                let help = "The scene as in its file. Its joints rattle for 70 ms and come to rest; at 6 Hz they \
+                            rattle in every period";
                 let paper = ui.button("The paper's settings").on_hover_text(help).clicked();
                 (paper, ui.button("Dismiss").clicked())
             })
@@ -317,7 +318,7 @@ impl App {
         ];
         for (words, fraction) in ways {
             let stop = if self.filming().is_some() {
-                ("Cancel", "Makes no film; the run returns to where it was (Esc)")
+                ("Cancel", "Cancels the film; the run returns to where it was (Esc)")
             } else {
                 ("Stop here", "Stay at the time that the run has reached (Esc)")
             };

@@ -20,7 +20,7 @@ const ROWS: f32 = 9.0;
 type Column = (&'static str, f32, &'static str);
 
 const COLUMNS: [Column; 9] = [
-    ("No.", 44.0, "Number of the impact in this run, in the order in which impacts began"),
+    ("No.", 44.0, "Number of the impact in this run, in the order of their beginnings"),
     ("Joint", 58.0, "Ball joint"),
     ("Time", 82.0, "Instant at which it began"),
     ("Duration", 62.0, "From its beginning to its end"),

@@ -71,7 +71,7 @@ pub const BINDINGS: [Binding; 41] = [
         Key::Comma,
         Action::Impact { forward: false },
         ", and .",
-        "Peak of the previous and of the next impact of the ball joint that is followed, or else of any",
+        "Peak of the previous or next impact of the followed ball joint, otherwise of any",
     ),
     bind(Group::Run, Key::Period, Action::Impact { forward: true }, "", ""),
     bind(Group::Run, Key::J, Action::Backwards, "J", "Play backwards"),
@@ -138,7 +138,7 @@ pub fn action(key: Key) -> Option<Action> {
 /// Mouse and touch gestures for the overlay.
 pub const POINTER: [(&str, &str); 13] = [
     ("Drag beside the machine, one finger", "Turn the view"),
-    ("Drag on a body; a finger stays first", "Pull it by a spring; with shift along the line of sight"),
+    ("Drag on a body; with a finger, hold first", "Pull it by a spring; with shift along the line of sight"),
     ("Right or middle drag, shift-drag, two fingers", "Pan the view"),
     ("Wheel, pinch", "Zoom in on what is under the cursor"),
     ("Hover", "Details of a part"),

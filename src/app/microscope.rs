@@ -176,7 +176,7 @@ impl Microscope {
         );
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
         if report.state == ContactState::Ideal || report.clearance <= 0.0 {
-            draw::empty(ui, rect, "An ideal joint has no clearance: there is no play to see");
+            draw::empty(ui, rect, "An ideal joint has no clearance and shows no play");
             return;
         }
         let now = player.pacer.shown();
@@ -187,10 +187,10 @@ impl Microscope {
         let sheet = Sheet::new(ui, rect, sight);
         self.circle = Some(draw::sphere(&sheet, axes, path, now, speed));
         response.on_hover_text(
-            "The circle is the clearance: the ball's centre cannot leave it but by what it presses into the wall. The \
-             path reaches back over the latest six impacts, the older the fainter, seen from the socket (of the first 12 \
-             ball joints). The dot is orange while the ball touches, with the wall and its normal where it does; the \
-             arrow is the velocity of the ball's centre, in contact that of sliding as friction reads it.",
+            "The circle is the clearance; the ball's centre leaves it only by the penetration. The path, seen from \
+             the socket, covers the latest six impacts and fades with age (recorded for the first 12 ball joints). In \
+             contact the dot is orange, and wall and normal are shown. The arrow is the velocity of the ball's \
+             centre, in contact the sliding velocity of the friction law.",
         );
     }
 }
@@ -224,7 +224,7 @@ fn section(ui: &mut Ui, sight: &Sight) {
     draw::section(&Sheet::new(ui, rect, sight), patch);
     response.on_hover_text(
         "Ball and wall as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
-         R = (r + c) r / c. What lies below the wall is taken up elastically over the patch, the thick line, of radius \
+         R = (r + c) r / c. The overlap is taken up elastically over the contact patch, the thick line, of radius \
          a = √(R δ) by Hertz. The scale follows the latest impact's depth.",
     );
 }
@@ -251,7 +251,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
         (
             "Towards the eye",
             draw::length(f64::from(towards), 3),
-            "The part of it that the picture does not show, along the line of sight",
+            "Its component along the line of sight, which the picture does not show",
         ),
         ("Gap", beside, "Between ball and wall, where they are nearest"),
         ("Indentation", pressed, "How deep the ball presses into the wall"),
@@ -265,11 +265,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
             if sight.normal.is_some() { speed(report.penetration_rate) } else { NONE.to_owned() },
             "Rate at which the ball approaches the wall now; negative while it recedes",
         ),
-        (
-            "Sliding",
-            sight.sliding.map_or(NONE.to_owned(), |v| speed(v.norm())),
-            "Sliding speed that the friction law reads",
-        ),
+        ("Sliding", sight.sliding.map_or(NONE.to_owned(), |v| speed(v.norm())), "Sliding speed in the friction law"),
         (
             "Normal force",
             value::quantity(report.normal_force.norm(), "N", 4),
@@ -300,7 +296,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
         (
             "Restitution asked",
             impact.map_or(NONE.to_owned(), |impact| given(impact.asked)),
-            "Coefficient of restitution that the joint asks for",
+            "Coefficient of restitution set for the joint",
         ),
         (
             "By its law",

@@ -131,7 +131,7 @@ impl App {
                 ui.selectable_value(&mut picture.times, Some(times), format!("{times}×")).on_hover_text(help);
             }
             let own = Button::selectable(picture.times.is_none(), "Own size");
-            if ui.add(own).on_hover_text("Any width and height").clicked() {
+            if ui.add(own).on_hover_text("Choose width and height").clicked() {
                 picture.times = None;
             }
         });
@@ -182,7 +182,7 @@ impl App {
         let Some(image) = pending.take() else {
             if now - *since > TIMEOUT {
                 self.picture.forget();
-                self.problem = Some("The picture never came back from the graphics adapter".into());
+                self.problem = Some("The graphics adapter did not return the picture".into());
             }
             ctx.request_repaint();
             return;

@@ -243,8 +243,8 @@ impl Plots {
     pub fn header(&mut self, ui: &mut Ui, player: &Player) {
         ui.horizontal_wrapped(|ui| {
             spoken::heading(&ui.label(RichText::new("Plots").strong()), "Plots");
-            let menu = egui::containers::menu::MenuConfig::new()
-                .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+            let menu =
+                egui::containers::menu::MenuConfig::new().close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
             egui::containers::menu::MenuButton::new("Choose plots")
                 .config(menu)
                 .ui(ui, |ui| layout::entries(ui, |ui| self.menu(ui, player)));
@@ -266,8 +266,8 @@ impl Plots {
                 })
                 .response
                 .on_hover_text(
-                    "Simulated time that the plots show. Over a plot: wheel or pinch for nearer, drag to shift, click to put \
-                     an instant on show, double-click for the window chosen here",
+                    "Time window of the plots. Over a plot: wheel or pinch to zoom, drag to pan, click to go to an \
+                     instant, double-click to restore the window chosen here",
                 )
                 .accessible_name("Window");
             self.comparison.ui(ui, player);
@@ -299,13 +299,11 @@ impl Plots {
     /// Controls for picking channels by name.
     fn channels(&mut self, ui: &mut Ui, player: &Player) {
         ui.add(
-            TextEdit::singleline(&mut self.search)
-                .hint_text("Search channels: angle, *.force")
-                .desired_width(220.0),
+            TextEdit::singleline(&mut self.search).hint_text("Search channels: angle, *.force").desired_width(220.0),
         )
         .on_hover_text(
-            "Any channel by its name, as of `run --channels`. It is recorded from the moment it is picked; * stands for any \
-             characters, ? for one",
+            "Any channel by its name, as for `run --channels`. It is recorded from the moment it is picked; * matches \
+             any characters, ? one character",
         )
         .accessible_name("Search channels");
         let search = self.search.trim().to_owned();
@@ -334,7 +332,7 @@ impl Plots {
             }
         });
         if player.channels().picked().len() == MOST_PICKED {
-            let note = format!("At most {MOST_PICKED} of them are recorded");
+            let note = format!("At most {MOST_PICKED} channels are recorded");
             ui.label(RichText::new(note).small().weak());
         }
         if let Some((name, on)) = toggled {

@@ -248,8 +248,8 @@ impl App {
 
     /// Menu entry that resets all settings.
     pub(super) fn new_entry(&mut self, ui: &mut Ui) {
-        let help = "As if for the first time: forgets window size, theme, type size, last scene and recent files";
-        if ui.button("Start as new…").on_hover_text(help).clicked() {
+        let help = "Forgets window size, theme, type size, last scene and recent files";
+        if ui.button("Start fresh…").on_hover_text(help).clicked() {
             self.dialog = Some(Dialog::StartAsNew);
             layout::close_menu(ui);
         }

@@ -32,8 +32,8 @@ impl App {
 
     pub(super) fn sound_switch(&mut self, ui: &mut Ui) {
         let mut on = self.sound.on;
-        let help = "A click for every impact that ends while the run plays forward: the louder, the larger its impulse; the \
-                    higher, the shorter the contact. Slow motion spreads the clicks and leaves their pitch (key M)";
+        let help = "A click for every impact that ends while the run plays forward. A larger impulse is louder, a \
+                    shorter contact higher. Slow motion spreads the clicks without changing their pitch (key M)";
         if ui.checkbox(&mut on, "Sound").on_hover_text(help).clicked() {
             self.set_sound(on);
         }

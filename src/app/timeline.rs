@@ -349,8 +349,9 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         let words = format!("Contacts before {} are no longer stored", value::time(known));
         ui.label(words);
     }
-    let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half colour: \
-                sliding; full colour: creeping, too slow for full friction; mark: contact begins; pale: still to come, or abandoned.";
+    let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half \
+                colour: sliding; full colour: creeping, too slow for full friction; mark: contact begins; pale: not \
+                yet replayed, or abandoned.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
 }
 

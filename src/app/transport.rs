@@ -167,8 +167,10 @@ fn time(ui: &mut Ui, player: &Player) {
 
 fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     let mut scale = player.pacer.scale();
-    ui.label("Time scale")
-        .on_hover_text("Simulated against real time: 1:50 shows a fiftieth of a second in a second (keys + and -)");
+    ui.label("Time scale").on_hover_text(
+        "Simulated time over real time: at 1:50 a second shows a fiftieth of a simulated second (keys \
+                        + and -)",
+    );
     ui.spacing_mut().slider_width = if narrow { 90.0 } else { 150.0 };
     let slider = Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1).logarithmic(true).show_value(false);
     let response = keys::slider(ui, slider).on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
@@ -196,7 +198,7 @@ fn scales(ui: &mut Ui, player: &mut Player) {
             }
         })
         .response
-        .on_hover_text("Simulated against real time: choose one, or drag to the right for faster")
+        .on_hover_text("Simulated time over real time: choose a value, or drag to the right for faster")
         .accessible_name("Time scale preset");
     // The list itself senses the drag: a separate widget on top would intercept its clicks.
     let drag = list.interact(Sense::DRAG);
@@ -237,19 +239,19 @@ fn reached(ui: &mut Ui, player: &Player) {
     };
     let words = format!("reached {}", value::time_scale(reached));
     let Some(limit) = player.limit() else {
-        ui.label(RichText::new(words).weak()).on_hover_text("Simulated against real time, as measured");
+        ui.label(RichText::new(words).weak()).on_hover_text("Simulated time over real time, as measured");
         return;
     };
     let (by, help) = match limit {
         Limit::Computing => (
             "limited by computing",
-            "This machine cannot step as fast as the time scale asks: the simulation runs slower, and skips nothing. A looser \
-             tolerance or the preview preset of the solver helps.",
+            "This computer cannot step as fast as the time scale asks. The simulation runs slower and skips nothing. \
+             A looser tolerance or the preset preview helps.",
         ),
         Limit::Drawing => (
             "limited by drawing",
-            "Stepping alone would be faster, but pictures and panels take the time: the simulation runs slower, and skips \
-             nothing. A smaller window and fewer plots and instruments help.",
+            "Drawing takes too much time for the time scale. The simulation runs slower and skips nothing. A smaller \
+             window, fewer plots and fewer instruments help.",
         ),
     };
     let colour = ui.visuals().warn_fg_color;

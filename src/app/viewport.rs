@@ -733,8 +733,8 @@ impl Viewport {
     pub fn options_ui(&mut self, ui: &mut Ui) {
         let options = &mut self.options;
         ui.label("Magnification of the clearance").on_hover_text(
-            "Draws eccentricity and clearance larger than they are, together, so that the ball never leaves its \
-             socket. The motion of the machine stays as it is. Key X.",
+            "Draws eccentricity and clearance enlarged by the same factor, so the ball stays in its socket. The \
+             motion of the machine is not magnified. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0).logarithmic(true).prefix("×").max_decimals(1);
         let slider = keys::slider(ui, slider).accessible_name("Magnification of the clearance");
@@ -758,7 +758,7 @@ impl Viewport {
         let mut automatic = options.arrows.reference.is_none();
         if ui
             .checkbox(&mut automatic, "Automatic scale")
-            .on_hover_text("The scale follows the largest force; off, it stays")
+            .on_hover_text("The scale follows the largest force; when off, it stays fixed")
             .changed()
         {
             options.arrows.reference = if automatic { None } else { Some(self.marks.reference(&options.arrows)) };
@@ -776,8 +776,7 @@ impl Viewport {
             .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
         ui.checkbox(&mut options.joint_names, "Joint names").on_hover_text("Names beside the ball joints");
         ui.horizontal(|ui| {
-            ui.checkbox(&mut options.sockets, "Sockets")
-                .on_hover_text("The cut-open sockets; without them the balls stand free");
+            ui.checkbox(&mut options.sockets, "Sockets").on_hover_text("The sockets, cut open");
             ui.checkbox(&mut options.hinges, "Hinges and slides")
                 .on_hover_text("Pins and rails where the scene draws none of its own");
         });
@@ -787,14 +786,14 @@ impl Viewport {
         ui.checkbox(&mut options.trail, "Trail of the tip").on_hover_text("Where the probe tip has been");
         ui.add_space(4.0);
         ui.label("Wear map").on_hover_text(
-            "Colours the inner faces of the sockets by what they took since the reset, in cells of equal area; the balls are then \
-             seen through. The scale is logarithmic and follows the largest value.",
+            "Colours the inner faces of the sockets by impulse or friction work since the reset, in cells of equal \
+             area; the balls become translucent. The scale is logarithmic and follows the largest value.",
         );
         ui.horizontal(|ui| {
             for (map, name, help) in [
                 (WearMap::Off, "Off", "Sockets as they are"),
                 (WearMap::Impulse, "Impulse", "How often and how hard: time integral of the normal force, N s/mm²"),
-                (WearMap::FrictionWork, "Friction work", "Size of the work that friction took, mJ/mm²"),
+                (WearMap::FrictionWork, "Friction work", "Magnitude of the friction work, mJ/mm²"),
             ] {
                 ui.radio_value(&mut options.wear, map, name)
                     .on_hover_text(help)
@@ -802,14 +801,12 @@ impl Viewport {
             }
         });
         let mut follows = self.pace.is_some();
-        let quality = ui
-            .checkbox(&mut follows, "Reduce detail to keep up")
-            .on_hover_text(
-                "While the picture moves and its frames take longer than 1/24 s: without the shade between balls and sockets, \
-                 then with one sample per pixel instead of four, with coarser and hard shadows, and at last with fewer pixels, \
-                 down to half of them along each edge. With time to spare it has more again. At rest, in saved pictures and \
-                 films it has all of it.",
-            );
+        let quality = ui.checkbox(&mut follows, "Reduce detail to keep up").on_hover_text(
+            "Reduces detail while the picture moves and a frame takes longer than 1/24 s: first the ambient \
+                 shading between balls and sockets, then one sample per pixel instead of four, coarser and hard \
+                 shadows, and finally fewer pixels, down to half along each edge. Detail returns when there is time \
+                 to spare. At rest, and in saved pictures and films, it is complete.",
+        );
         if quality.changed() {
             self.follow_frame_rate(follows);
         }

@@ -26,10 +26,10 @@ pub enum Command {
     View(ViewArguments),
     /// List the built-in scenes, and the benchmarks with which `validate` compares the program.
     Scenes,
-    /// List the built-in lessons; or compute what a lesson measures, print it with its values and answers, and say what in it
-    /// does not hold.
+    /// List the built-in lessons, or check a lesson: compute its measures, print its texts with values and answers, and report
+    /// errors and claims that fail.
     Lessons(LessonArguments),
-    /// Say what a scene contains, what will be computed and what will not.
+    /// Print what a scene contains, what will be computed and what will not.
     Check(CheckArguments),
     /// Simulate without a window and write rows at equal intervals.
     Run(RunArguments),
@@ -45,13 +45,13 @@ pub enum Command {
     Merge(MergeArguments),
     /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
-    /// Compute the cases whose answers are known otherwise, and set the right values beside ours: `docs/validation.md` (Markdown).
+    /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
     Validate(ValidateArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
-    /// Print the page about scene files: a guide, and the reference of every key (Markdown).
+    /// Print the page about scene files, a guide and a reference of every key (Markdown).
     Reference,
-    /// Print a JSON schema of scene files, by which editors complete and check them.
+    /// Print a JSON schema with which editors complete and check scene files.
     Schema,
 }
 
@@ -90,7 +90,7 @@ pub struct CheckArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// List instead every channel that `run --channels` can write: name, unit, column, and what it is.
+    /// List the channels that `run --channels` can write, with unit, column and meaning, instead of checking the scene.
     #[arg(long)]
     pub channels: bool,
 }
@@ -99,7 +99,7 @@ pub struct CheckArguments {
 #[derive(Debug, Args)]
 pub struct ViewArguments {
     /// Name of a built-in scene or a benchmark, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved
-    /// [default: the last one; at first spcmm, driven so fast that its joints rattle at every turn].
+    /// [default: the scene opened last; the first time spcmm at 6 Hz, where its joints rattle in every period].
     pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
@@ -112,10 +112,10 @@ pub struct ViewArguments {
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["scene", "changes", "link"])]
     pub lesson: Option<String>,
     /// Address of a page with the laboratory, e.g. `https://example.org/lab/`, to which `Copy link` appends its links
-    /// [default: the environment variable JOINTPLAY_PAGE, of now or else of the build; without any the window asks for it].
+    /// [default: the environment variable JOINTPLAY_PAGE, at run time or else at build time; without it the window asks].
     #[arg(long, value_name = "URL")]
     pub page: Option<String>,
-    /// Start as new: forget window size, theme, type size, last scene and recent files, which are otherwise remembered.
+    /// Start fresh: forget window size, theme, type size, last scene and recent files, which are otherwise remembered.
     #[arg(long)]
     pub fresh: bool,
 }
@@ -133,11 +133,11 @@ pub struct RunArguments {
     /// Interval between rows, e.g. `0.1ms`; the first row is at 0.
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, requires = "out")]
     pub every: Option<String>,
-    /// File to write; its ending chooses the format: .csv, .json or .npz.
+    /// File to write; its extension selects the format: .csv, .json or .npz.
     #[arg(long, value_name = "FILE", requires = "every")]
     pub out: Option<PathBuf>,
-    /// Write the time and these channels alone, e.g. `S1.force,rod1.pose,*.actuator`; `*` stands for any characters, `?` for
-    /// one, and a name without its last parts for all that begin with it; may be repeated. `jointplay check SCENE
+    /// Write only the time and these channels, e.g. `S1.force,rod1.pose,*.actuator`; `*` matches any characters, `?` one
+    /// character, and the first parts of a name all channels that begin with them; may be repeated. `jointplay check SCENE
     /// --channels` lists them.
     #[arg(long, value_name = "PATTERN,…", value_delimiter = ',', requires = "out")]
     pub channels: Vec<String>,
@@ -151,11 +151,11 @@ pub struct RunArguments {
     /// File for the state at the end, from which --from-state resumes, with the same bits as a run without a break.
     #[arg(long, value_name = "FILE")]
     pub save_state: Option<PathBuf>,
-    /// Resume from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.
+    /// Resume from a state that --save-state wrote, with the same scene and the same --set. Rows begin at its time.
     #[arg(long, value_name = "FILE", conflicts_with = "link")]
     pub from_state: Option<PathBuf>,
-    /// Form of the summary on standard output.
-    #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
+    /// Format of the summary on standard output.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
     pub summary: SummaryForm,
     /// Replace existing files.
     #[arg(long)]
@@ -178,7 +178,7 @@ pub struct SweepArguments {
     /// Drive periods per point, including those discarded.
     #[arg(long, value_name = "P", value_parser = periods)]
     pub periods: usize,
-    /// Initial periods of these that are a transient.
+    /// Initial periods to discard as the transient.
     #[arg(long, value_name = "D", value_parser = periods)]
     pub discard: usize,
     /// Where the sections are taken.
@@ -202,8 +202,8 @@ pub struct SweepArguments {
     /// File to write, a NumPy archive (.npz).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Form of the summary on standard output.
-    #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
+    /// Format of the summary on standard output.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
     pub summary: SummaryForm,
     /// Replace an existing file.
     #[arg(long)]
@@ -222,8 +222,8 @@ pub struct MergeArguments {
     /// File to write, a NumPy archive (.npz).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Form of the summary on standard output.
-    #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
+    /// Format of the summary on standard output.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
     pub summary: SummaryForm,
     /// Replace an existing file.
     #[arg(long)]
@@ -240,9 +240,9 @@ pub enum SectionChoice {
 /// Form of the summary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SummaryForm {
-    /// For a person.
+    /// Text for people.
     Text,
-    /// One JSON object, for a script.
+    /// One JSON object, for scripts.
     Json,
 }
 
@@ -273,23 +273,23 @@ pub struct RenderArguments {
     /// Folder to write; it appears when all frames are done.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
-    /// Film to write instead; its ending chooses the format: .mp4 or .gif. It appears when all frames are done, with its
+    /// Film to write instead; its extension selects the format: .mp4 or .gif. It appears when all frames are done, with its
     /// metadata beside it.
     #[arg(long, value_name = "FILE", requires = "duration")]
     pub film: Option<PathBuf>,
     /// Point of view to start from.
     #[arg(long, value_enum, value_name = "VIEW", default_value = "isometric", help_heading = "Picture")]
     pub camera: CameraView,
-    /// Turn about the vertical, e.g. `30deg`; 0 looks from the front.
+    /// Azimuth of the camera, e.g. `30deg`; 0 looks from the front.
     #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, help_heading = "Picture")]
     pub yaw: Option<String>,
-    /// Elevation angle, e.g. `20deg`; positive looks down.
+    /// Elevation of the camera, e.g. `20deg`; positive looks down.
     #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, help_heading = "Picture")]
     pub pitch: Option<String>,
     /// Zoom in by this factor.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, help_heading = "Picture")]
     pub zoom: f32,
-    /// Look at one ball joint from close up.
+    /// Close-up of one ball joint.
     #[arg(long, value_name = "BALL JOINT", help_heading = "Picture", conflicts_with_all = ["camera", "yaw", "pitch"])]
     pub close_up: Option<String>,
     /// Which contact forces to draw.
@@ -307,8 +307,8 @@ pub struct RenderArguments {
     /// Colours.
     #[arg(long, value_enum, value_name = "THEME", default_value = "light", help_heading = "Picture")]
     pub theme: ThemeChoice,
-    /// Things to leave out, e.g. `floor,triad`.
-    #[arg(long, value_enum, value_name = "THING,…", value_delimiter = ',', help_heading = "Picture")]
+    /// Parts of the picture to hide, e.g. `floor,triad`.
+    #[arg(long, value_enum, value_name = "PART,…", value_delimiter = ',', help_heading = "Picture")]
     pub hide: Vec<Hideable>,
     /// Colour the sockets' inner faces by their wear since the start, with a scale; balls become translucent.
     #[arg(long, value_enum, value_name = "WHAT", help_heading = "Picture")]
@@ -336,7 +336,7 @@ pub struct TradeoffArguments {
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change, conflicts_with = "all")]
     pub changes: Vec<(String, String)>,
-    /// A coarse grid of steps and tolerances, within seconds.
+    /// Use a coarse grid of steps and tolerances, which takes seconds.
     #[arg(long)]
     pub quick: bool,
     /// Folder to write: points as CSV and JSON, diagrams as SVG and PNG.
@@ -451,7 +451,7 @@ pub enum ThemeChoice {
     Dark,
 }
 
-/// What may be left out of a picture.
+/// Parts of a picture that can be hidden.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Hideable {
     /// Floor grid.

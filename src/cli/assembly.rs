@@ -83,8 +83,8 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
         });
         let gap: String = open.into_iter().chain(askew).collect();
         warnings.push(format!(
-            "assembling the start took bodies far from where the scene has them: {}.{gap} Look for a wrong axis, point or \
-             start value.",
+            "assembly at the start moved bodies far from their poses in the scene: {}.{gap} Check axes, points and \
+             start values.",
             far.join("; ")
         ));
     }
@@ -139,7 +139,8 @@ impl Start {
             format!(", and of the actuators at {}", self.actuators.join(", "))
         };
         Some(format!(
-            "forces at {}{actuators}: joints hold the same direction more than once; given are the reactions of least squares",
+            "forces at {}{actuators}: joints constrain the same direction more than once; the reactions given are \
+             those of least squares",
             self.reactions.join(", ")
         ))
     }

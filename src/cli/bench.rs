@@ -50,7 +50,7 @@ fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
     let _ = writeln!(out, "Machine           {}", machine::name());
     out.push_str(
         "Speeds            simulated seconds in a second of stepping, one core\n\
-         All joints ideal  no differential equation is solved, so that a stepper has no part in it\n\n",
+         All joints ideal  no differential equation is solved, so the stepper plays no part\n\n",
     );
     let heads = "span | method | speed | asked | rk4 at 10 us | ratio | error | of | reached";
     out.push_str(&Table::new(heads, reach).text());

@@ -106,7 +106,7 @@ fn report(
         );
     }
     if !scene.machine.elements.is_empty() {
-        line("Force elements", &format!("{}, with what they exert at the start", scene.machine.elements.len()));
+        line("Force elements", &format!("{}, with their forces at the start", scene.machine.elements.len()));
     }
     for (element, report) in scene.machine.elements.iter().zip(&start.elements) {
         line(&format!("  {}", element.name), &force_element(element, report));
@@ -158,7 +158,7 @@ fn of_its_shapes(body: &Body) -> String {
     };
     let i = &body.inertia;
     format!(
-        "of its shapes: mass {}, centre {}, inertia {}, products {}",
+        "from its shapes: mass {}, centre {}, inertia {}, products {}",
         format_quantity(body.mass, "kg"),
         each(body.centre.into(), "mm"),
         each([i.m11, i.m22, i.m33], "kg mm^2"),
@@ -272,7 +272,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
     if method.is_adaptive() {
         let alone = if explicit {
             format!(
-                "; explicit steps alone: the implicit ones take at most {} velocity coordinates",
+                "; explicit steps only: the implicit methods allow at most {} velocity coordinates",
                 contents.largest_implicit
             )
         } else {
@@ -298,7 +298,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         contents.solves_differential_equation,
         match contents.degrees_of_freedom as u64 {
             // Purely kinematic, but the number of constraint rows differs from that of the coordinates.
-            0 => "the motion that the drives prescribe, step by step, closed after each".to_owned(),
+            0 => "the motion that the drives prescribe, with the loops closed after each step".to_owned(),
             free => format!("differential equations of {} of freedom", count(free, "degree")),
         },
         "differential equations: nothing is free, the drives prescribe the motion",

@@ -12,10 +12,10 @@ pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
     let seconds =
         parse_quantity(text, Dimension::Time).map_err(|error| Failure::usage(format!("{option} {text}: {error}")))?;
     if seconds < 0.0 {
-        return Err(Failure::usage(format!("{option} {text}: a time here is 0 or greater")));
+        return Err(Failure::usage(format!("{option} {text}: the time must not be negative")));
     }
     if seconds > LONGEST_RUN {
-        return Err(Failure::usage(format!("{option} {text}: the longest time here is {LONGEST_RUN:e} s")));
+        return Err(Failure::usage(format!("{option} {text}: the time must be at most {LONGEST_RUN:e} s")));
     }
     Ok(seconds)
 }

@@ -67,7 +67,7 @@ fn keys(table: &FileTable) -> String {
         let cells = cells.into_iter().zip(columns);
         cells.filter_map(|(cell, shown)| shown.then_some(cell)).collect::<Vec<_>>()
     };
-    let heads = ["key", by, "value", "if left out", "frame", "what it is"].map(str::to_owned);
+    let heads = ["key", by, "value", "default", "frame", "meaning"].map(str::to_owned);
     let heads = shown(heads);
     let row = |key: &FileKey| {
         shown([
@@ -85,7 +85,7 @@ fn keys(table: &FileTable) -> String {
         let any = format!("any key of {}", called(also));
         let there = || "as there".to_owned();
         let own = String::new;
-        rows.push(shown([any, own(), there(), there(), own(), "For this one alone".to_owned()]));
+        rows.push(shown([any, own(), there(), there(), own(), "For this one only".to_owned()]));
     }
     Table::new(&heads.join(" | "), rows).markdown()
 }
@@ -197,8 +197,8 @@ pub fn absent(key: &FileKey) -> String {
             let show = |parameter: &crate::scene::Parameter| parameter.show(&parameter.default);
             find(name).map_or_else(String::new, show)
         }
-        (DefaultRule::Fault, _) => "must be given".to_owned(),
-        (DefaultRule::Or(other), _) => format!("must be given, or `{other}`"),
+        (DefaultRule::Fault, _) => "required".to_owned(),
+        (DefaultRule::Or(other), _) => format!("required, or `{other}`"),
         (DefaultRule::Is(_), ValueType::Table(_)) => "none".to_owned(),
         (DefaultRule::Is(value), _) if value.is_infinite() => "no limit".to_owned(),
         (DefaultRule::Is(0.0), _) => "0".to_owned(),

@@ -85,7 +85,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut way = way(arguments)?;
     let asked = arguments.duration.as_deref().map(|text| quantity::duration("--duration", text)).transpose()?;
     let Some(duration) = asked.or(way.as_ref().and_then(Way::time)) else {
-        return Err(Failure::usage("--link: the link names no instant; say with --duration how long the run is"));
+        return Err(Failure::usage("--link: the link names no instant; give the length of the run with --duration"));
     };
     let times = match &arguments.every {
         Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),

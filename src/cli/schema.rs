@@ -128,7 +128,7 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
     }
     description += &match key.absent {
         DefaultRule::Fault | DefaultRule::Or(_) => format!(".\n{}.", capital(&absent(key))),
-        _ => format!(".\nIf left out: {}.", absent(key)),
+        _ => format!(".\nDefault: {}.", absent(key)),
     };
     if !key.frame.is_empty() {
         description += &format!("\nFrame: {}.", key.frame);

@@ -121,7 +121,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Checkpoint, Failure> {
     let found = checksum(&content);
     if told != Some(json!(found)) {
         return Err(refuse(format!(
-            "damaged: its content has the checksum {found}, and it states {}",
+            "damaged: the checksum of its content is {found}, not {} as it states",
             word(&told.unwrap_or_default())
         )));
     }
@@ -129,7 +129,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Checkpoint, Failure> {
     let time = meta("time_s").as_f64();
     let state = content.get("state").map(State::deserialize);
     let (Some(time), Some(state)) = (time, state) else {
-        return Err(refuse("without a state, or its time".to_owned()));
+        return Err(refuse("incomplete: the state or its time is missing".to_owned()));
     };
     let state = state.map_err(|cause| refuse(format!("not a state: {cause}")))?;
     Ok(Checkpoint { state, time })
@@ -139,8 +139,8 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Checkpoint, Failure> {
 fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
     if meta["scene_text"] != *scene.source.text {
         return Err(format!(
-            "a state of the scene `{}`, whose text is not that of the scene given here, `{}`: a run resumes only in the \
-             scene in which it began",
+            "a state of the scene `{}`, whose text differs from that of the scene given, `{}`: a run resumes only in \
+             the scene in which it began",
             word(&meta["scene"]),
             scene.name
         ));
@@ -150,7 +150,8 @@ fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
     let differs = |name: &&String| beside.get(*name).is_none_or(|now| then[*name] != **now);
     if let Some(name) = names.chain(beside.keys()).find(differs) {
         return Err(format!(
-            "a state of the scene `{}` when its file {} held something else: a run resumes only in the scene in which it began",
+            "a state of the scene `{}`, whose file {} has changed since: a run resumes only in the scene in which it \
+             began",
             scene.name,
             visible_line(name)
         ));
@@ -165,7 +166,7 @@ fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
         if options.is_empty() { "no --set".to_owned() } else { options.join(" ") }
     };
     Err(format!(
-        "saved with {}, and here the scene has {}: a run resumes only with the parameters with which it began",
+        "saved with {}, but the scene has {}: a run resumes only with the parameters with which it began",
         options(changed),
         options(now)
     ))

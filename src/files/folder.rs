@@ -144,7 +144,13 @@ fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
         names += &format!(" and {more} more");
     }
     let why = if own { "something other than earlier results" } else { "no results of this program" };
-    Err(FileError::cannot(path, format!("the folder holds {why} ({names}); it is left alone, choose another folder")))
+    Err(FileError::cannot(
+        path,
+        format!(
+            "the folder contains {why} ({names}) and is not replaced; choose another \
+                                         folder"
+        ),
+    ))
 }
 
 /// Appends the names of all files under `folder`, and of empty folders, to `names`.

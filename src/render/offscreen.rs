@@ -113,7 +113,7 @@ impl Offscreen {
         match arrival.get() {
             Some(Ok(())) => readback.read(),
             Some(Err(reason)) => Err(device_error(reason)),
-            None => Err(device_error("the picture never came back")),
+            None => Err(device_error("the picture could not be read back")),
         }
     }
 }

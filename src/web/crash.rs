@@ -25,7 +25,7 @@ pub fn explain_panics() {
         let what = info.payload_as_str().unwrap_or("unknown cause");
         let place = info.location().map(|place| format!("{}:{}", place.file(), place.line())).unwrap_or_default();
         let (running, link) = RUNNING.with_borrow(Clone::clone);
-        let report = format!("jointplay {} failed inside: {what}\nat {place}\n{running}", crate::VERSION);
+        let report = format!("internal error in jointplay {}: {what}\nat {place}\n{running}", crate::VERSION);
         // Without a page, as in a script, there is nothing to show it on.
         let _ = crashed(&report, &link);
         previous(info);

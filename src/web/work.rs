@@ -41,7 +41,7 @@ fn say(message: &Message) {
 #[wasm_bindgen]
 pub async fn perform(job: String) {
     std::panic::set_hook(Box::new(|info| {
-        say(&Message::Failed(format!("the computation failed inside: {info}")));
+        say(&Message::Failed(format!("internal error in the computation: {info}")));
     }));
     let start = Instant::now();
     let job = match serde_json::from_str::<Job>(&job) {
@@ -84,7 +84,7 @@ impl Running for Worker {
         }
         let text = poll_work(self.number)?;
         let message = serde_json::from_str(&text)
-            .unwrap_or_else(|_| Message::Failed(format!("the computation broke off: {text}")));
+            .unwrap_or_else(|_| Message::Failed(format!("the computation was aborted: {text}")));
         if matches!(message, Message::Done | Message::Failed(_)) {
             self.finished = true;
             end_work(self.number);

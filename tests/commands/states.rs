@@ -250,7 +250,7 @@ fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
 
     write("leg.toml", &load("0.8 kg"));
     let other = run("--duration 6ms --from-state s").expect(2);
-    assert!(other.stderr.contains("its file leg.toml"), "{}", other.stderr);
+    assert!(other.stderr.contains("whose file leg.toml has changed"), "{}", other.stderr);
     // A state without the texts of files is one of another scene, too.
     let state = fs::read_to_string(folder.path().join("s")).unwrap();
     let mut state: Json = serde_json::from_str(&state).unwrap();
@@ -264,7 +264,7 @@ fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
     write("s", &state.to_string());
     write("leg.toml", &load("0.4 kg"));
     let lacking = run("--duration 6ms --from-state s").expect(2);
-    assert!(lacking.stderr.contains("its file leg.toml"), "{}", lacking.stderr);
+    assert!(lacking.stderr.contains("whose file leg.toml has changed"), "{}", lacking.stderr);
 
     // What names no file says nothing about files.
     let line = "run pendulum --duration 3ms --save-state s --every 1ms --out a.json --force --quiet";
@@ -306,5 +306,5 @@ fn a_state_belongs_to_the_mesh_that_its_scene_names() {
     stl[100] ^= 1;
     write("fin.stl", &stl);
     let other = run("--duration 6ms --from-state s").expect(2);
-    assert!(other.stderr.contains("its file fin.stl"), "{}", other.stderr);
+    assert!(other.stderr.contains("whose file fin.stl has changed"), "{}", other.stderr);
 }

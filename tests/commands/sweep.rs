@@ -327,7 +327,7 @@ fn bad_input_is_refused_before_anything_runs() {
         (
             format!("sweep spcmm --vary spcmm.slider_plane=10mm..32mm:5 {plan}"),
             2,
-            "the range leaves what the scene can do at spcmm.slider_plane = 10 mm",
+            "the scene cannot start at spcmm.slider_plane = 10 mm",
         ),
         (format!("sweep spcmm --vary spcmm.frequency=0.5Hz..1Hz:3 --start follow-up {plan}"), 2, "--start cold"),
         (format!("sweep pendulum --vary contact.clearance=0.1mm..1mm:5 {plan}"), 2, "no drive that repeats"),

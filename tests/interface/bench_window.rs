@@ -258,7 +258,7 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     harness.get_by_label_contains(
         "clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, start as in file",
     );
-    harness.get_by_label("This sweep belongs to the scene on show");
+    harness.get_by_label("This sweep belongs to the current scene");
     let click_point = |harness: &mut Harness<'_, App>| {
         let at = harness.state().bench().place(1, 1).expect("drawn");
         harness.hover_at(at);
@@ -272,7 +272,7 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
-    harness.get_by_label("This sweep belongs to the scene on show");
+    harness.get_by_label("This sweep belongs to the current scene");
     let player = harness.state_mut().player_mut();
     player.set("contact.friction", "0.3").expect("in range");
     harness.run_steps(2);

@@ -205,8 +205,8 @@ fn theme_type_size_and_scenes_are_remembered_and_start_as_new_forgets_them() {
     assert!(harness.query_all_by_label_contains("two.toml").next().is_some(), "a message names it");
 
     click(&mut harness, "Open");
-    click(&mut harness, "Start as new…");
-    click(&mut harness, "Start as new");
+    click(&mut harness, "Start fresh…");
+    click(&mut harness, "Start fresh");
     harness.run_steps(3);
     assert_eq!(harness.state().player().running().name, DEFAULT_SCENE);
     assert_eq!(harness.ctx.zoom_factor(), 1.0);

@@ -86,5 +86,5 @@ fn the_line_for_another_page_opens_the_same_state_with_the_sliders_beside_it() {
     // Where there is no page, the window says how to name one.
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
     assert_eq!(embedding(&mut harness), None);
-    assert!(label(&harness, "--page or JOINTPLAY_PAGE gives the address of one"));
+    assert!(label(&harness, "set one with --page or JOINTPLAY_PAGE"));
 }

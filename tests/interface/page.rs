@@ -1068,7 +1068,7 @@ fn a_link_without_an_address_says_so_before_it_is_copied_and_takes_one() {
     let place = harness.get_by_label("Copy").rect();
     for (typed, words, can_be_copied) in [
         ("example.org", "not an address of a page", false),
-        ("http://localhost:8000/", "other devices do not find http://localhost:8000/", true),
+        ("http://localhost:8000/", "other devices cannot reach http://localhost:8000/", true),
         ("https://example.org/lab/", "https://example.org/lab/ in this state and view", true),
     ] {
         type_over(&mut harness, "Address of the page", typed);

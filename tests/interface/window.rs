@@ -959,7 +959,7 @@ fn a_doubt_that_stands_beside_a_slider_is_not_denied_below() {
     player.set("contact.restitution", "0.4").expect("in range");
     harness.run_steps(3);
     harness.get_by_label_contains("restitution 0.4 with lankarani-nikravesh");
-    harness.get_by_label("No warnings but those beside the controls");
+    harness.get_by_label("No warnings other than those beside the controls");
     assert!(harness.query_by_label("No warnings so far").is_none());
 }
 

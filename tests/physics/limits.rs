@@ -50,11 +50,11 @@ fn a_ball_creeps_where_coulomb_would_hold_it() {
     let (creep, mut simulation) = speed(&[]);
     run_until(&mut simulation, 1.0);
     let left = beside(&frame_now(&mut simulation));
-    is_said(&format!("at 2° beside the point to which its load pulls it creeps at {creep:.0} µm/s"));
-    is_said(&format!("after a second it is {left:.1}° beside it"));
+    is_said(&format!("at 2° from that point creeps at {creep:.0} µm/s"));
+    is_said(&format!("is at {left:.1}° after a second"));
     let (slower, _) = speed(&[("contact.slip_speed_high", "0.01 mm/s")]);
-    is_said(&format!("`contact.slip_speed_high` = 0.01 mm/s in place of 0.1 mm/s it is {slower:.1} µm/s"));
-    is_said(&format!("holds it up to {:.1}°", 0.15_f64.atan() / DEGREE));
+    is_said(&format!("`contact.slip_speed_high` = 0.01 mm/s instead of 0.1 mm/s it creeps at {slower:.1} µm/s"));
+    is_said(&format!("holds a ball up to {:.1}°", 0.15_f64.atan() / DEGREE));
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
     let [_, smooth] = drift(&[("contact.friction", "0")]);
     println!("{momentum:e} {angular:e} {smooth:e}");
     assert!(momentum < 1e-12, "{momentum:e}");
-    is_said(&format!("changes by {angular:.0e} of itself within two seconds, without friction by less than 1e-10"));
+    is_said(&format!("changes by {angular:.0e} of its value within two seconds, without friction by less than 1e-10"));
     assert!(smooth < 1e-10, "{smooth:e}");
 }
 
@@ -138,11 +138,11 @@ fn friction_changes_the_angular_momentum_of_a_machine_in_space() {
 fn what_a_law_gives_and_how_large_a_patch_is() {
     let given = |law, asked| undisturbed_restitution(damping_factor(law, asked));
     is_said(&format!(
-        "gives {:.3} where 0.9 is asked for and {:.3} where 0.8 is",
+        "gives {:.3} when asked for 0.9 and {:.3} when asked for 0.8",
         given(NormalLaw::LankaraniNikravesh, 0.9),
         given(NormalLaw::LankaraniNikravesh, 0.8)
     ));
-    is_said(&format!("`flores` gives {:.3} where 0.1 is", given(NormalLaw::Flores, 0.1)));
+    is_said(&format!("`flores` gives {:.3} when asked for 0.1", given(NormalLaw::Flores, 0.1)));
     let mut simulation = simulation("spcmm", &[]);
     let mut impacts = Vec::new();
     while simulation.time() < 0.02 {
@@ -156,7 +156,7 @@ fn what_a_law_gives_and_how_large_a_patch_is() {
     let patch = (depth * (r + c) * r / c).sqrt() / r;
     is_said(&format!("reaches {patch:.2} ball radii in the hardest impact of `spcmm`, of {force:.0} N"));
     let first = &impacts[0];
-    is_said(&format!("its first impact lasts {:.2} ms", 1e3 * (first.end - first.start)));
+    is_said(&format!("the first impact of `spcmm` lasts {:.2} ms", 1e3 * (first.end - first.start)));
     // There and back in a rod of 0.2 m: steel of 206 GPa and 7850 kg/m^3.
     let back = 0.4 / (206e9_f64 / 7850.0).sqrt();
     is_said(&format!("a wave takes {:.2} ms", 1e3 * back));

@@ -606,7 +606,7 @@ fn a_loop_that_does_not_close_is_refused_by_joint_and_direction() {
     assert!(error.contains("remaining gaps: B by 180 deg"), "{error}");
     let against = Bar { driven: [Some(12.0), Some(30.0)], ..PLAIN };
     let error = start_error(&four_bar(&against));
-    assert!(error.contains("joint B: the drives ask for speeds at which it opens at"), "{error}");
+    assert!(error.contains("joint B: at the speeds of the drives it opens at"), "{error}");
 }
 
 #[test]

@@ -378,7 +378,7 @@ fn two_drives_of_a_parallelogram_share_the_load_or_are_refused() {
         let against = Extras { rates: Some([1.0, 0.0, 1.5]), ..both };
         let scene = bar.scene(Quat::identity(), against, &[("formulation", form)]);
         let error = start_error(&scene);
-        assert!(error.contains("ball joint B: the drives ask for speeds at which it opens"), "{error}");
+        assert!(error.contains("ball joint B: at the speeds of the drives it opens"), "{error}");
     }
 }
 

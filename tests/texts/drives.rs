@@ -223,7 +223,7 @@ fn what_is_wrong_with_a_law_is_named() {
             &["my.toml:10:48", "joint.P.drive.formula", "no variable `f`"],
         ),
         ("law = \"formula\", formula = \"sine(t)\"", &["no function `sine` (did you mean `sin`?)"]),
-        ("law = \"formula\", formula = \"(1 + t\"", &["ends where an operator or `)` should follow"]),
+        ("law = \"formula\", formula = \"(1 + t\"", &["ends where an operator or `)` is expected"]),
         ("law = \"formula\", formula = \"0.1 * abs(t)\"", &["my.toml:10:45", "`abs` has no second derivative"]),
         ("law = \"formula\", formula = \"1/t\"", &["has no finite position at t = 0"]),
         ("law = \"formula\", formula = \"t^0.5\"", &["has no finite speed at t = 0"]),
@@ -287,10 +287,10 @@ fn what_is_wrong_with_a_file_beside_the_scene_is_named_in_it() {
     let folder = tempfile::tempdir().unwrap();
     let cases: &[(&[u8], &[&str])] = &[
         (b"", &["joint.P.drive.file = \"bump.csv\"", "has 0 points"]),
-        (b"0,0\n1,1\n", &["bump.csv:1:1", "names the columns with their units, as `time_s`; units s, ms"]),
-        (b"time_s,angle_deg\n0,0\n", &["bump.csv:1:8", "as `position_mm`; units m, cm, mm"]),
+        (b"0,0\n1,1\n", &["bump.csv:1:1", "name the columns with their units, as in `time_s`; units s, ms"]),
+        (b"time_s,angle_deg\n0,0\n", &["bump.csv:1:8", "as in `position_mm`; units m, cm, mm"]),
         (b"time_s,x_m\n0,0,0\n", &["bump.csv:2:1", "needs two columns", "has 3"]),
-        (b"time_s,x_m\n0,zero\n", &["bump.csv:2:3: x_m = zero", "is not a number; its unit stands in the header"]),
+        (b"time_s,x_m\n0,zero\n", &["bump.csv:2:3: x_m = zero", "is not a number; the unit belongs in the header"]),
         (b"time_s,x_m\n0,0 mm\n", &["bump.csv:2:3", "is not a number"]),
         (b"time_s,x_m\n0,nan\n", &["bump.csv:2:3", "finite"]),
         (b"time_s,x_m\n0,1e9\n", &["bump.csv:2:3", "allowed -1000000 m to 1000000 m"]),
@@ -307,10 +307,10 @@ fn what_is_wrong_with_a_file_beside_the_scene_is_named_in_it() {
     }
     for (name, why) in [
         ("bumps.csv", "cannot read this file"),
-        ("../bump.csv", "is no file beside the scene"),
-        ("/etc/hostname", "is no file beside the scene"),
-        ("", "is no file beside the scene"),
-        (".", "is no file beside the scene"),
+        ("../bump.csv", "is not a file beside the scene"),
+        ("/etc/hostname", "is not a file beside the scene"),
+        ("", "is not a file beside the scene"),
+        (".", "is not a file beside the scene"),
     ] {
         let error = in_folder(folder.path(), b"", name).unwrap_err();
         holds(name, &error, &["scene.toml:10:", "joint.P.drive.file", why]);

@@ -178,7 +178,7 @@ fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
     for (shape, keys, wanted) in [
         (mesh("bad.obj", mm), GIVEN, &["bad.obj:8:6: is not a number", "v 10 2O 30"][..]),
         (mesh("cut.stl", mm), GIVEN, &["cut.stl: byte 80: ", "has 134 bytes, this file has 127"]),
-        (mesh("arm.gltf", ""), GIVEN, &["arm.gltf: no glTF file: ", "line 2 column"]),
+        (mesh("arm.gltf", ""), GIVEN, &["arm.gltf: not a glTF file: ", "line 2 column"]),
         (mesh("large.obj", mm), GIVEN, &["shapes[0].file", "at most 8 MiB in all meshes"]),
         (mesh("arm.obj", ""), GIVEN, &["shapes[0].unit: missing", "unit = \"1 mm\""]),
         (mesh("arm.obj", ", unit = \"kg\""), GIVEN, &["shapes[0].unit", "mm"]),
@@ -210,7 +210,7 @@ fn colours_are_read_and_refused() {
     assert_eq!(read.machine.bodies[0].shapes[0].colour, Some([0xc2, 0x25, 0x5c]));
     for bad in ["red", "#12345", "#1234567", "#+12345", "#é2345", "123456", ""] {
         let error = sphere(bad).unwrap_err().to_string();
-        assert!(error.contains("no colour; allowed `#` and six"), "{bad}: {error}");
+        assert!(error.contains("not a colour; allowed: `#` and six"), "{bad}: {error}");
     }
 }
 

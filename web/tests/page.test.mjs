@@ -290,7 +290,7 @@ test('a crash leaves a report that names version, scene and renderer', async () 
     await lab.page.setViewportSize({ width: SIZE.width, height: SIZE.height + 40 });
     await lab.until(() => lab.page.locator('#trouble').isVisible(), 'nothing is said');
     const report = await lab.page.locator('#report').inputValue();
-    for (const part of [/^jointplay \d+\.\d+\.\d+ failed inside: .*renderbuffer/m, /^at \S+\.rs:\d+$/m, /^scene: pendulum$/m, /^changed: contact\.clearance = 0\.5/m, /^renderer: gl /m, /^browser: /m, /^address: http/m]) {
+    for (const part of [/^internal error in jointplay \d+\.\d+\.\d+: .*renderbuffer/m, /^at \S+\.rs:\d+$/m, /^scene: pendulum$/m, /^changed: contact\.clearance = 0\.5/m, /^renderer: gl /m, /^browser: /m, /^address: http/m]) {
         assert.match(report, part);
     }
     assert.ok(await lab.page.locator('#copy').isVisible());

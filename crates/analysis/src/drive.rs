@@ -11,8 +11,8 @@ use jointplay_scene::Scene;
 pub enum NoPeriod {
     /// Nothing periodic drives it.
     #[error(
-        "the scene `{scene}` has no drive that repeats, nor a tyre's ground, a motor's target or a load, so there is no phase to \
-         take sections at"
+        "the scene `{scene}` has no drive that repeats, and no periodic tyre ground, motor target or load, so there is no phase \
+         at which to take sections"
     )]
     None {
         /// Name of the scene.
@@ -20,8 +20,8 @@ pub enum NoPeriod {
     },
     /// Drives with different periods.
     #[error(
-        "what drives the scene `{scene}` has different periods ({first} s and {second} s): there is no one phase to take \
-         sections at"
+        "the drives and loads of the scene `{scene}` have different periods ({first} s and {second} s), so there is \
+         no common phase at which to take sections"
     )]
     Different {
         /// Name of the scene.

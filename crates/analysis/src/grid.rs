@@ -50,7 +50,10 @@ pub enum RangeError {
         key: String,
     },
     /// A whole-number parameter whose equal steps are not whole.
-    #[error("--vary {text}: {key} takes whole numbers, and {count} equal steps from {from} to {to} are none")]
+    #[error(
+        "--vary {text}: {key} takes whole numbers, which {count} equally spaced values from {from} to {to} are \
+             not"
+    )]
     NotWhole {
         /// As written.
         text: String,
@@ -73,8 +76,8 @@ pub enum RangeError {
     },
     /// The last value is below the first.
     #[error(
-        "--vary {text}: the range is reversed: its first end is above its second; write {to}..{from} (--start follow-down goes \
-         through it downwards)"
+        "--vary {text}: the range is reversed: its first end is above its second; write {to}..{from} (--start \
+         follow-down runs through it downwards)"
     )]
     Reversed {
         /// As written.
@@ -261,7 +264,7 @@ impl Grid {
             return wrong(format!("{} --vary: a sweep varies at most {MOST_AXES} parameters", axes.len()));
         }
         if axes.len() == 2 && axes[0].key == axes[1].key {
-            return wrong(format!("--vary {} is there twice", last.key));
+            return wrong(format!("--vary {} is given twice", last.key));
         }
         let points = axes.iter().try_fold(1_usize, |n, axis| n.checked_mul(axis.count));
         if points.is_none_or(|points| points > MOST_POINTS) {

@@ -61,7 +61,8 @@ const PACED: f64 = 1.0;
 /// A scene that requests the preset `real-time` but ran slower than real time when measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "solver.preset real-time does not keep up with {scene}: its first second, with the values it comes with, ran at {pace:.2} times \
+    "solver.preset real-time does not keep up with {scene}: its first second, with its default values, ran at \
+     {pace:.2} times \
      real time on one core of {machine}; preview is faster"
 )]
 pub struct TooSlow {

@@ -62,7 +62,7 @@ pub enum AnalysisError {
     #[error(transparent)]
     Setting(#[from] ChangeError),
     /// The divergence guard stopped the reference run.
-    #[error("the reference run cannot be made: {0}")]
+    #[error("cannot compute the reference run: {0}")]
     Stopped(#[from] Stopped),
     /// The reference run reached the cap on work.
     #[error(

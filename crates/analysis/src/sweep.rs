@@ -41,7 +41,10 @@ pub enum SweepError {
         most: usize,
     },
     /// Longer than the longest allowed run.
-    #[error("--periods {periods}: at {point} the longest run, {LONGEST_RUN:e} s, has {most} periods of {period} s")]
+    #[error(
+        "--periods {periods}: at {point} the longest run allowed, {LONGEST_RUN:e} s, covers {most} periods of \
+             {period} s"
+    )]
     TooLong {
         /// Periods.
         periods: usize,
@@ -56,7 +59,7 @@ pub enum SweepError {
     #[error("{0}; a sweep needs a driven scene such as spcmm or slider-crank-driven")]
     NoPeriod(#[from] NoPeriod),
     /// A point that the scene does not accept, or that cannot start.
-    #[error("the range leaves what the scene can do at {point}: {error}")]
+    #[error("the scene cannot start at {point}: {error}")]
     Infeasible {
         /// Parameters of the point.
         point: String,

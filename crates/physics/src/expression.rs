@@ -337,8 +337,8 @@ impl std::error::Error for ExpressionError {}
 impl fmt::Display for ExpressionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.fault {
-            Fault::Expected { wanted, found: None } => write!(f, "ends where {wanted} should follow"),
-            Fault::Expected { wanted, found: Some(found) } => write!(f, "`{found}` where {wanted} should stand"),
+            Fault::Expected { wanted, found: None } => write!(f, "ends where {wanted} is expected"),
+            Fault::Expected { wanted, found: Some(found) } => write!(f, "`{found}` where {wanted} is expected"),
             Fault::Unknown { name, near, called } => {
                 let what = if *called { "function" } else { "variable" };
                 let near = did_you_mean(near.as_deref());
@@ -696,13 +696,13 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named_with_its_byte() {
         for (text, at, message) in [
-            ("", 0, "ends where a number, a name or `(` should follow"),
-            ("1 +", 3, "ends where a number, a name or `(` should follow"),
-            ("(1 + t", 6, "ends where an operator or `)` should follow"),
-            ("1 2", 2, "`2` where an operator should stand"),
-            ("2t", 1, "`t` where an operator should stand"),
+            ("", 0, "ends where a number, a name or `(` is expected"),
+            ("1 +", 3, "ends where a number, a name or `(` is expected"),
+            ("(1 + t", 6, "ends where an operator or `)` is expected"),
+            ("1 2", 2, "`2` where an operator is expected"),
+            ("2t", 1, "`t` where an operator is expected"),
             ("3 * é", 4, "no variable `é`"),
-            ("3 $ t", 2, "`$` where an operator should stand"),
+            ("3 $ t", 2, "`$` where an operator is expected"),
             ("sin t", 0, "`sin` is a function"),
             ("sqr(t)", 0, "no function `sqr` (did you mean `sqrt`?)"),
             ("2 * arm.lenght", 4, "no variable `arm.lenght` (did you mean `arm.length`?)"),

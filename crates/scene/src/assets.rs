@@ -55,7 +55,10 @@ fn encoded(bytes: &[u8]) -> Arc<str> {
 /// Why a file named by a scene is unavailable.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum AssetFault {
-    #[error("is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`")]
+    #[error(
+        "is not a file beside the scene; allowed: the name of a file in the scene's folder or below it, without \
+             `..`"
+    )]
     NotBeside,
     #[error(
         "this scene has no folder in which to find a file: choose or drop that file and the scene's at once, or load the scene \
@@ -74,7 +77,7 @@ pub(super) enum AssetFault {
     },
     #[error("not a text file: it is not valid UTF-8")]
     NotText,
-    #[error("is no file with a mesh; allowed names that end in {}", Format::ENDINGS)]
+    #[error("is not a mesh file; allowed: names that end in {}", Format::ENDINGS)]
     NotMesh,
 }
 

@@ -50,25 +50,15 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
     DriveLaw {
         word: "spcmm",
         help: "slider of the paper's machine; places the joint itself",
-        keys: &[key(
-            "slider",
-            ValueType::Whole(1, 3),
-            "1",
-            "which slider: 1, 2 or 3",
-        )],
+        keys: &[key("slider", ValueType::Whole(1, 3), "1", "which slider: 1, 2 or 3")],
     },
     DriveLaw {
         word: "constant",
         help: "position + velocity t",
         keys: &[
             place("position", "where it is at t = 0").zero(),
-            key(
-                "velocity",
-                number(Dimension::Speed),
-                "\"10 mm/s\"",
-                "its rate",
-            )
-            .on_hinge(Dimension::AngularSpeed, "\"6 rad/s\""),
+            key("velocity", number(Dimension::Speed), "\"10 mm/s\"", "its rate")
+                .on_hinge(Dimension::AngularSpeed, "\"6 rad/s\""),
         ],
     },
     DriveLaw {
@@ -87,22 +77,14 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
                 "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]",
                 "the harmonics",
             )
-            .on_hinge(
-                Dimension::Angle,
-                "[{ amplitude = \"10 deg\", frequency = \"1 Hz\" }]",
-            ),
+            .on_hinge(Dimension::Angle, "[{ amplitude = \"10 deg\", frequency = \"1 Hz\" }]"),
         ],
     },
     DriveLaw {
         word: "ramp",
         help: "from one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s³ - 15 s⁴ + 6 s⁵), \
                whose rate and acceleration are 0 at both ends",
-        keys: &[
-            place("from", "where it is before").zero(),
-            place("to", "where it is afterwards"),
-            START,
-            DURATION,
-        ],
+        keys: &[place("from", "where it is before").zero(), place("to", "where it is afterwards"), START, DURATION],
     },
     DriveLaw {
         word: "pulse",
@@ -120,17 +102,11 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
         keys: &[
             key(
                 "points",
-                ValueType::Pairs(
-                    [Dimension::Time, Dimension::Length],
-                    many(MOST_POINTS, "points"),
-                ),
+                ValueType::Pairs([Dimension::Time, Dimension::Length], many(MOST_POINTS, "points")),
                 "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
                 "time and position, in the order of time, at least two",
             )
-            .on_hinge(
-                Dimension::Angle,
-                "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]",
-            )
+            .on_hinge(Dimension::Angle, "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]")
             .or("file"),
             key(
                 "file",
@@ -139,31 +115,20 @@ pub static DRIVE_LAWS: [DriveLaw; 8] = [
                 "the points: two columns under a header with units, `time_s,position_mm`",
             )
             .or("points"),
-            key(
-                "repeat",
-                ValueType::Flag,
-                "true",
-                "whether the points are one period of the motion",
-            )
-            .absent("false"),
+            key("repeat", ValueType::Flag, "true", "whether the points are one period of the motion").absent("false"),
         ],
     },
     DriveLaw {
         word: "formula",
         help: "an expression of the time t in s, see below",
         keys: &[
-            key(
-                "formula",
-                ValueType::Text,
-                "\"0.01 * sin(2*pi*t)\"",
-                "an expression of `t`",
-            ),
+            key("formula", ValueType::Text, "\"0.01 * sin(2*pi*t)\"", "an expression of `t`"),
             key("unit", ValueType::Text, "\"mm\"", "unit of its value").absent("`m`, `rad` on a hinge"),
             key(
                 "resolve",
                 ValueType::Number(Dimension::Time, (SHORTEST_PART, 1.0)),
                 "\"1 ms\"",
-                "longest step that an adaptive method takes; a fifth of what the formula does in the shortest time suits it",
+                "longest step of an adaptive method; a fifth of the shortest feature of the formula is suitable",
             )
             .is(1e-3),
         ],

@@ -41,7 +41,7 @@ pub fn is_element(table: &FileTable) -> bool {
 
 pub(super) type ReadKind = fn(&Place<'_, '_>) -> Result<ElementKind, SceneError>;
 
-const NAME: FileKey = key("name", ValueType::Name, "\"s1\"", "its name, that of no joint");
+const NAME: FileKey = key("name", ValueType::Name, "\"s1\"", "its name, different from those of joints");
 
 const COORDINATE: FileKey = key(
     "coordinate",
@@ -56,7 +56,7 @@ const fn joint(help: &'static str) -> FileKey {
 }
 
 const fn point(name: &'static str) -> FileKey {
-    key(name, ValueType::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "where it holds")
+    key(name, ValueType::Table(&ATTACHMENT), "{ body = \"rod\", at = \"0 0 100 mm\" }", "point of attachment")
 }
 
 /// A number of either sign, such as a force, up to `LARGEST_FORCE`.
@@ -147,7 +147,7 @@ static SPRING: FileTable = FileTable::new(
             "side",
             ValueType::Word(SpringSide::WORDS),
             "",
-            "which way it acts: a tyre and a rubber buffer only push, a rope only pulls",
+            "direction in which it acts: a tyre or a rubber buffer only pushes, a rope only pulls",
         )
         .absent(SpringSide::Both.word()),
     ],
@@ -210,21 +210,11 @@ static STOP: FileTable = FileTable::new(
             .is(f64::NEG_INFINITY),
         coordinate("upper", ["\"20 mm\"", "\"30 deg\""], "joint coordinate at which the upper stop begins")
             .is(f64::INFINITY),
-        unsigned(
-            "force",
-            D::Force,
-            "\"500 N\"",
-            "what a stop bears when it is pressed in slowly by `depth`, on a slide",
-        )
-        .or("torque"),
-        unsigned(
-            "torque",
-            D::Torque,
-            "\"20 N m\"",
-            "what a stop bears when it is pressed in slowly by `depth`, on a hinge",
-        )
-        .or("force"),
-        key("depth", ValueType::Number(D::Length, (1e-9, 1e3)), "\"1 mm\"", "depth at which it bears that")
+        unsigned("force", D::Force, "\"500 N\"", "force of a stop pressed in slowly by `depth`, on a slide")
+            .or("torque"),
+        unsigned("torque", D::Torque, "\"20 N m\"", "torque of a stop pressed in slowly by `depth`, on a hinge")
+            .or("force"),
+        key("depth", ValueType::Number(D::Length, (1e-9, 1e3)), "\"1 mm\"", "depth at which it exerts that")
             .on_hinge(D::Angle, "\"1 deg\""),
         key(
             "restitution",
@@ -300,7 +290,7 @@ static TYRE: LazyLock<FileTable> = LazyLock::new(|| {
             unsigned("stiffness", D::Stiffness, "\"200 kN/m\"", "change of its force with the height"),
             unsigned("damping", D::Damping, "\"200 N s/m\"", "change of its force with the rate of the height").zero(),
             key("up", ValueType::Direction, "[0, 0, 1]", "which way is up").absent("against the file's gravity"),
-            law("ground", "height of the ground, along `up` from the world's origin; at rest there if left out"),
+            law("ground", "height of the ground, along `up` from the world's origin; by default at rest at 0"),
         ]
         .leak(),
     )

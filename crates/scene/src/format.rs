@@ -89,7 +89,7 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
             "include",
             ValueType::Files(many(MOST_FILES, "files")),
             "[\"leg.toml\"]",
-            "files beside this one, whose lists belong to the scene, too",
+            "files beside this one, whose lists are added to the scene",
         ),
     ]
     .map(|key| key.absent("none"));
@@ -155,12 +155,12 @@ fn list_of(table: &'static FileTable, many: ListLimit, like: &'static str) -> Fi
 }
 
 static GRAVITY: LazyLock<FileTable> = LazyLock::new(|| {
-    let help = "gravity; where one component is given, the others are 0";
+    let help = "gravity; if one component is given, the others are 0 by default";
     FileTable::new("gravity", "[gravity]", help, parameters("gravity").leak())
 });
 
 static CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
-    let help = "play, material and friction of every ball joint that gives none of its own";
+    let help = "play, material and friction of every ball joint without values of its own";
     FileTable::new("contact", "[contact]", help, parameters("contact").leak())
 });
 
@@ -173,9 +173,9 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
     let own = [
         key("floor", number(D::Length), "\"340 mm\"", "where the floor lies along `down`").absent("chosen by the view"),
         key("yaw", number(D::Angle), "\"-35 deg\"", "azimuth of the isometric view, with `pitch`")
-            .absent("the usual one"),
+            .absent("that of the default view"),
         key("pitch", number(D::Angle), "\"12 deg\"", "elevation of the isometric view, with `yaw`")
-            .absent("the usual one"),
+            .absent("that of the default view"),
         key(
             "time_scale",
             ValueType::Number(D::None, SLOWEST_TO_REAL),
@@ -194,15 +194,15 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
         .fixed(),
     ];
     let keys = joined(&[&parameters("view"), &own]);
-    FileTable::new("view", "[view]", "how the machine is looked at", keys)
+    FileTable::new("view", "[view]", "how the machine is viewed", keys)
 });
 
 static OUTPUT: FileTable = FileTable::new(
     "output",
     "[output]",
-    "what is reported",
+    "output quantities",
     &[
-        key("body", ValueType::Body, "\"rod\"", "whose pose is reported").absent("the last one").fixed(),
+        key("body", ValueType::Body, "\"rod\"", "body whose pose is reported").absent("the last one").fixed(),
         key("probe", vector(D::Length), "\"60 0 0 mm\"", "a point of that body, reported as well")
             .absent("none")
             .frame("the body's"),
@@ -246,7 +246,7 @@ static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
             "link",
             ValueType::Table(&LINK),
             "{ mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" }",
-            "what each of them is",
+            "what each link is",
         ),
         key(
             "joint",
@@ -301,9 +301,7 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
 fn mass() -> [FileKey; 6] {
     [
         key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "its mass").or("density"),
-        key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid")
-            .zero()
-            .frame("the body's"),
+        key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid").zero().frame("the body's"),
         key(
             "inertia",
             vector(D::Inertia),
@@ -331,8 +329,8 @@ fn mass() -> [FileKey; 6] {
             "density",
             positive(D::Density, MAX_DENSITY),
             "\"7.85 g/cm^3\"",
-            "density of its shapes, of which mass, centroid and inertia then follow; volumes in which shapes overlap count twice; \
-             `check` prints what follows",
+            "density of its shapes, which then determine mass, centroid and inertia; overlapping volumes count twice; \
+             `check` prints the result",
         )
         .absent("`mass` and `inertia` are given"),
     ]
@@ -358,9 +356,9 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         key(name, takes, "\"4 mm\"", help).of(of)
     };
     let own = [
-        key("form", ValueType::Word(Form::WORDS), "\"capsule\"", "what form it has"),
-        key("role", ValueType::Word(Role::WORDS), "\"frame\"", "what it is part of, which decides its colour")
-            .absent("that of what its body does"),
+        key("form", ValueType::Word(Form::WORDS), "\"capsule\"", "form"),
+        key("role", ValueType::Word(Role::WORDS), "\"frame\"", "function of the part, which sets its colour")
+            .absent("the role of its body"),
         key("colour", ValueType::Text, "\"#c2255c\"", "red, green and blue in place of the role's colour")
             .absent("the role's"),
         point("from", LONG, "one end of the axis; of a cone, its base"),
@@ -385,7 +383,7 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
             "length of the file's unit, or that unit alone, `\"mm\"`",
         )
         .of(&["mesh"])
-        .absent("1 m for glTF; must be given for STL and OBJ"),
+        .absent("1 m for glTF; required for STL and OBJ"),
         point("position", &["mesh"], "where the file's frame lies").zero(),
         key(
             "rotation",
@@ -410,31 +408,16 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     const TURNS: &[&str] = &["prismatic", "revolute", "cylindrical", "universal"];
     const PLACED: &[&str] = &["fixed", "prismatic", "revolute", "cylindrical", "universal"];
     let keys = [
-        key(
-            "name",
-            ValueType::Name,
-            "\"P1\"",
-            "its name, not that of a force element",
-        ),
+        key("name", ValueType::Name, "\"P1\"", "its name, different from those of force elements"),
         key(
             "kind",
             ValueType::Word(JointKind::WORDS),
             "\"revolute\"",
-            "how it moves: not, along `axis`, about it, both, about two axes, or in every way",
+            "how it moves, in this order: not at all, along `axis`, about `axis`, in every way, along and about \
+             `axis`, about two axes",
         ),
-        key(
-            "parent",
-            ValueType::Body,
-            "\"world\"",
-            "the body that carries it",
-        )
-        .absent("the world"),
-        key(
-            "child",
-            ValueType::Body,
-            "\"rod\"",
-            "the body that hangs on it: each hangs on exactly one joint",
-        ),
+        key("parent", ValueType::Body, "\"world\"", "the body that carries it").absent("the world"),
+        key("child", ValueType::Body, "\"rod\"", "the body that it carries; each body is carried by exactly one joint"),
         key(
             "axis",
             ValueType::Direction,
@@ -442,7 +425,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "along which it slides or about which it turns, by the right-hand rule",
         )
         .of(TURNS)
-        .absent("must be given, except with the law `spcmm`")
+        .absent("required, except with the law `spcmm`")
         .frame(PARENT),
         key(
             "child_axis",
@@ -452,23 +435,13 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         )
         .of(&["universal"])
         .frame("the child's"),
-        key(
-            "parent_point",
-            vector(D::Length),
-            "\"0 0 100 mm\"",
-            "where it is on the parent",
-        )
-        .of(PLACED)
-        .zero()
-        .frame(PARENT),
-        key(
-            "child_point",
-            vector(D::Length),
-            "\"0 0 -100 mm\"",
-            "where it is on the child",
-        )
-        .zero()
-        .frame("the child's"),
+        key("parent_point", vector(D::Length), "\"0 0 100 mm\"", "where it is on the parent")
+            .of(PLACED)
+            .zero()
+            .frame(PARENT),
+        key("child_point", vector(D::Length), "\"0 0 -100 mm\"", "where it is on the child")
+            .zero()
+            .frame("the child's"),
         key(
             "rotation",
             ValueType::Table(&ROTATION),
@@ -482,31 +455,31 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "drive",
             ValueType::Table(&DRIVE),
             "{ law = \"harmonic\", amplitude = \"10 mm\", frequency = \"1 Hz\" }",
-            "the motion that it is forced to make",
+            "prescribed motion",
         )
         .of(MOVES)
-        .absent("it is free to move"),
+        .absent("none: it moves freely"),
         key(
             "drive",
             ValueType::Table(&CYLINDRICAL_DRIVE),
             "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
-            "the motions that it is forced to make",
+            "prescribed motions",
         )
         .of(&["cylindrical"])
-        .absent("it is free to move"),
+        .absent("none: it moves freely"),
         key(
             "drive",
             ValueType::Table(&UNIVERSAL_DRIVE),
             "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
-            "the motions that it is forced to make",
+            "prescribed motions",
         )
         .of(&["universal"])
-        .absent("it is free to move"),
+        .absent("none: it moves freely"),
         key(
             "start",
             ValueType::Table(&START),
             "{ position = \"10 mm\" }",
-            "where it starts, and how fast; not with a drive",
+            "initial coordinate and rate; not with a drive",
         )
         .of(MOVES)
         .absent("0, at rest")
@@ -522,7 +495,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "start",
             ValueType::Table(&CYLINDRICAL_START),
             "{ position = \"10 mm\", angle = \"30 deg\" }",
-            "where it starts, and how fast; not what a drive moves",
+            "initial coordinates and rates, except driven ones",
         )
         .of(&["cylindrical"])
         .absent("0, at rest"),
@@ -530,7 +503,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "start",
             ValueType::Table(&UNIVERSAL_START),
             "{ angle = \"10 deg\", child_angle = \"30 deg\" }",
-            "where it starts, and how fast; not what a drive moves",
+            "initial coordinates and rates, except driven ones",
         )
         .of(&["universal"])
         .absent("0, at rest"),
@@ -546,11 +519,12 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "closes_loop",
             ValueType::Flag,
             "true",
-            "whether its child hangs on another joint, so that this one closes a loop; it then has neither `drive` nor `start`",
+            "whether its child is carried by another joint, so that this joint closes a loop; it then has neither \
+             `drive` nor `start`",
         )
         .absent("false"),
     ];
-    FileTable::new("joint", "[[joint]]", "a joint on which a body hangs", keys.to_vec().leak())
+    FileTable::new("joint", "[[joint]]", "a joint that carries a body", keys.to_vec().leak())
         .by(Variants::Word("kind", "{} joint"))
 });
 
@@ -578,7 +552,7 @@ static CYLINDRICAL_START: FileTable = FileTable::new(
 
 /// Row of the drive of one of two coordinates.
 fn motion(freedom: Freedom, like: &'static str, help: &'static str) -> FileKey {
-    key(freedom.word(), ValueType::Table(&DRIVE), like, help).absent("it is free to move")
+    key(freedom.word(), ValueType::Table(&DRIVE), like, help).absent("none: it moves freely")
 }
 
 const TURNING: &str = "{ law = \"constant\", velocity = \"6 rad/s\" }";
@@ -649,7 +623,7 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         key(name, ValueType::Table(&ATTACHMENT), like, help)
     };
     let own = [
-        key("name", ValueType::Name, "\"S1\"", "its name, that of no other joint"),
+        key("name", ValueType::Name, "\"S1\"", "its name, different from those of other joints"),
         end("socket", "the socket's centre"),
         end("ball", "the ball's centre, on another body"),
         opening().frame("that of the socket's body"),
@@ -672,7 +646,7 @@ static PARAMETER: FileTable = FileTable::new(
         key("value", ValueType::Quantity, "\"20 mm\"", "its value"),
         key("label", ValueType::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
         key("unit", ValueType::Text, "\"mm\"", "unit in which it is shown")
-            .absent("that of `value`; must be given where that is an expression"),
+            .absent("that of `value`; required where that is an expression"),
         key("range", ValueType::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
         key("help", ValueType::Text, "\"How far it goes.\"", "what it is").absent("none"),
     ],

@@ -25,12 +25,12 @@ enum PointsFault {
     #[error("repeats, so the last position must be the first")]
     NotClosed,
     #[error(
-        "the first line names the columns with their units, as `{}`; units {}",
+        "the first line must name the columns with their units, as in `{}`; units {}",
         header(*.0),
         unit_names(*.0).join(", ")
     )]
     Header(Dimension),
-    #[error("is not a number; its unit stands in the header")]
+    #[error("is not a number; the unit belongs in the header")]
     NotANumber,
     #[error("out of range; allowed -{0} to {0}", format_quantity(*.limit, si_unit(*.dimension)))]
     OutOfRange { limit: f64, dimension: Dimension },

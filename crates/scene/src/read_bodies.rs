@@ -50,7 +50,7 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
     let name_node = section.require("name")?;
     let name = name_node.name()?.into_owned();
     if name == "world" {
-        let why = "`world` is the frame that everything stands on; choose another name";
+        let why = "`world` is the fixed frame; choose another name";
         return Err(name_node.error(why));
     }
     Ok((read_rigid_body(&section, name)?, section))
@@ -268,8 +268,10 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
     });
     match parts {
         [Some(red), Some(green), Some(blue)] => Ok([red, green, blue]),
-        _ => Err(node
-            .error("no colour; allowed `#` and six hexadecimal digits, red, green and blue, for example \"#c2255c\"")),
+        _ => Err(node.error(
+            "not a colour; allowed: `#` and six hexadecimal digits, red, green and blue, for example \
+                    \"#c2255c\"",
+        )),
     }
 }
 

@@ -115,7 +115,7 @@ static TABLE: [Parameter; 29] = [
         "Restitution",
         number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
         Value::Number(DEFAULT.restitution),
-        "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The Lankarani–Nikravesh \
+        "Rebound speed over approach speed asked of the normal law; 1 loses no energy. The Lankarani–Nikravesh \
          law is right only near 1: asked for 0.9 it gives 0.913, for 0.8 0.847, for 0 0.66. gonthier gives what is \
          asked for, flores within 0.05; both divide by this number and refuse 0.",
         "Paper eq. (19)",
@@ -136,7 +136,7 @@ static TABLE: [Parameter; 29] = [
         "Poisson's ratio",
         number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
         Value::Number(DEFAULT.poisson_ratio),
-        "Sideways shrinking of the material when stretched, nu. Metals have about 0.3. It changes the contact \
+        "Lateral contraction over axial extension of the material, nu. Metals have about 0.3. It changes the contact \
          stiffness by at most a third.",
         "Paper eq. (19), stiffness K",
     ),
@@ -156,11 +156,11 @@ static TABLE: [Parameter; 29] = [
         "Friction velocity",
         Kind::Choice(FrictionVelocity::WORDS),
         Value::Choice(DEFAULT.friction_velocity.word()),
-        "Which sliding velocity friction reads. centres is the paper's: the relative velocity of the two centres, \
-         which leaves out the turning of the ball. surface is what the contact feels: the relative velocity of the \
-         two touching points. printed takes the points of (13) as printed, which do not turn with their bodies: \
-         (1 - c/e) times centres, next to nothing in a gap that is large against the penetration. It is there to compare \
-         with the paper.",
+        "Sliding velocity of the friction law. centres, the paper's choice, is the relative velocity of the two \
+         centres, which neglects the rotation of the ball. surface is the relative velocity of the two material \
+         points in contact. printed uses the points of (13) as printed, which do not rotate with their bodies: (1 - \
+         c/e) times centres, almost 0 when the clearance is large compared with the penetration. It is meant for \
+         comparison with the paper.",
         "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface; (13) alone for printed",
     ),
     contact(
@@ -189,7 +189,7 @@ static TABLE: [Parameter; 29] = [
         "Impact speed floor",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
         Value::Number(DEFAULT.impact_speed_floor),
-        "Least approach speed that the damping term divides by. Without a floor the last, softest touches would be \
+        "Least approach speed by which the damping term divides. Without a floor the last, softest contacts would be \
          infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
         "Paper eq. (19), the speed at the start of contact",
     ),
@@ -199,10 +199,11 @@ static TABLE: [Parameter; 29] = [
         "Approach speed",
         Kind::Choice(ApproachSpeed::WORDS),
         Value::Choice(DEFAULT.approach_speed.word()),
-        "Which speed the damping term divides by. start is the paper's: the penetration rate at which the contact began. A \
-         joint that touches softly and is then hit by its neighbour is damped many times too strongly by it. largest is \
-         the largest rate of the contact so far, which keeps damping within what the law gives an undisturbed impact; \
-         such an impact is the same with both.",
+        "Speed by which the damping term divides. start, the paper's choice, is the penetration rate at which the \
+         contact began. It damps a joint that touches softly and is then hit by its neighbour many times too \
+         strongly. largest is \
+         the largest rate of the contact so far, which limits damping to that of an undisturbed impact; an \
+         undisturbed impact is the same with both.",
         "Paper eq. (19), the speed at the start of contact",
     ),
     contact(
@@ -282,7 +283,7 @@ static TABLE: [Parameter; 29] = [
         "Drive frequency",
         number(D::Frequency, 0.0, 50.0, "Hz", (0.0, 5.0)),
         Value::Number(0.5),
-        "How many times a second the trajectory repeats: 0.5 Hz is the paper's period of 2 s. Accelerations grow \
+        "Repetitions of the trajectory per second; 0.5 Hz is the paper's period of 2 s. Accelerations grow \
          with its square. With 0 the sliders rest.",
         "Paper eq. (59)",
     ),
@@ -316,7 +317,8 @@ static TABLE: [Parameter; 29] = [
         Kind::Choice(Formulation::WORDS),
         Value::Choice("tree"),
         Scope::Every,
-        "Equations of motion. tree uses as few coordinates as there are freedoms once the ball joints are cut. \
+        "Equations of motion. tree uses one coordinate for each degree of freedom that remains when the ball joints \
+         are cut. \
          lagrange is the paper's: all bodies free, every joint a constraint with a multiplier, stabilised after \
          Baumgarte. Both give the same motion; tree is faster.",
         "Paper eqs. (44) to (58) for lagrange",
@@ -347,7 +349,7 @@ static TABLE: [Parameter; 29] = [
          order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
          rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and takes longer steps where contacts \
          have settled; radau5 (Radau IIA, implicit, order 5) takes the longest there; automatic changes between \
-         dopri5, radau5 and, while friction limits the step, a rosenbrock that knows friction alone.",
+         dopri5, radau5 and, while friction limits the step, a rosenbrock whose Jacobian contains friction only.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(
@@ -370,8 +372,9 @@ static TABLE: [Parameter; 29] = [
         logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
         Value::Number(1e-6),
         Scope::Every,
-        "Relative error that an adaptive method allows itself in one step; where it is above 1e-5, automatic takes its explicit \
-         steps, those through impacts, with 1e-5. The motion between impacts is sensitive: use 1e-9 or less to compare single \
+        "Relative error that an adaptive method allows in one step; above 1e-5, automatic uses 1e-5 for its explicit \
+         steps, which carry it through impacts. The motion between impacts is sensitive: use 1e-9 or less to compare \
+         single \
          impacts.",
         "Solves paper eqs. (55), (58) in time",
     ),
@@ -387,7 +390,8 @@ static TABLE: [Parameter; 29] = [
         Value::Unset,
         Scope::Every,
         "Method, step and tolerance by name: preview (automatic, 1e-4), real-time (automatic, 1e-6), \
-         accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
+         accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step or tolerance that is set as well \
+         overrides the preset.",
         "Solves paper eqs. (55), (58) in time",
     ),
     at_reset(row(
@@ -398,8 +402,8 @@ static TABLE: [Parameter; 29] = [
         Kind::Choice(&SWITCH),
         Value::Choice("on"),
         Scope::Every,
-        "Keeps count of where the energy comes from and where it goes: drives, gravity, contacts, losses, and the \
-         residual, which is the error of the integration. It changes no step; without it a run is a little faster.",
+        "Accounts for the energy transferred by drives, gravity, contacts and losses, and for the residual, which is \
+         the integration error. It changes no step; without it a run is slightly faster.",
         "Integrals of force times velocity; power of friction from (20) at the points of (24)",
     )),
     row(
@@ -420,7 +424,8 @@ pub fn reference_page() -> String {
     let mut page = String::from(
         "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
          A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
-         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
+         | Key | Name | Default | Range | Unit | Where | Takes effect | Meaning | Equation \
+         |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for parameter in table() {
         let effect = if parameter.at_reset { "at reset" } else { "at once" };

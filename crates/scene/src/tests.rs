@@ -722,12 +722,12 @@ fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
         (
             drive("\"constant\", velocity = \"radius**2 * 3 mm**2\""),
             "",
-            "`*` where an operator other than a power should stand",
+            "`*` where an operator other than a power is expected",
         ),
         // After a unit with a slash, the exponent would be ambiguous.
-        (String::new(), "clearance = \"3 m/s^3 * radius\"", "`^` where an operator other than a power should stand"),
-        (String::new(), "clearance = \"radius * 3 mm ^2\"", "`^` where an operator other than a power should stand"),
-        (String::new(), "clearance = \"radius * 3 mm^2.5\"", "`^` where an operator other than a power should stand"),
+        (String::new(), "clearance = \"3 m/s^3 * radius\"", "`^` where an operator other than a power is expected"),
+        (String::new(), "clearance = \"radius * 3 mm ^2\"", "`^` where an operator other than a power is expected"),
+        (String::new(), "clearance = \"radius * 3 mm^2.5\"", "`^` where an operator other than a power is expected"),
         (String::new(), "clearance = \"radius * 3 mm^2\"", "m^3, which is not in m"),
         (String::new(), "clearance = \"radius\"", "clearance 50 mm must be below the ball radius"),
         (String::new(), "friction = \"2 * radius\"", "gives 0.1 m, but must be a pure number; allowed 0 to 10"),

@@ -60,7 +60,7 @@ impl Scene {
             let same: Vec<&FileNumber> = numbers.values().filter(here).collect();
             let (span, text) = match &number.place {
                 Place::Included => {
-                    return Err(refuse("it stands in another file, which this one includes"));
+                    return Err(refuse("it is in another file, which this one includes"));
                 }
                 Place::DefaultRule => {
                     return Err(refuse("the text does not give it; write it there first"));

@@ -123,8 +123,8 @@ impl Diagram {
         title(
             ui,
             &format!("{} over {}", up.title(), across.title()),
-            "What the sweep found at each value. A click on a point runs the swept scene with that value from its start to that \
-             section, and plays on from there; it asks first if that changes anything else.",
+            "Result of the sweep at each value. A click on a point runs the swept scene with that value from its \
+             start to that section and plays on from there. It asks first if that would change the current scene.",
         );
         let dark = ui.visuals().dark_mode;
         let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);
@@ -213,7 +213,7 @@ impl Diagram {
         let kinds = doubtful.clone().fold(0, |kinds, point| kinds | point.doubts);
         let of_kind = Doubt::KINDS.iter().enumerate().filter(|(k, _)| kinds >> k & 1 == 1).map(|(_, kind)| *kind);
         let help = format!(
-            "Values whose runs say why they are not to be trusted, ringed above{}{}",
+            "Values whose results are marked as doubtful, ringed above{}{}",
             if kinds == 0 { "" } else { ": " },
             of_kind.collect::<Vec<_>>().join(", ")
         );

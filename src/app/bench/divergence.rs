@@ -21,18 +21,18 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         let switch = ui
             .add_enabled(moves, Checkbox::new(&mut on, "Twin run"))
             .on_hover_text(
-                "A second run from the present state, displaced by a billionth of the scales of its coordinates and \
-                 velocities, drawn as a violet ghost in the 3D view, and a third one, whose growing distance gives the exponent. The run \
-                 itself does not change by a bit; all three take three times as long.",
+                "Starts a second run from the current state, displaced by a billionth of the scales of its \
+                 coordinates and velocities and drawn as a violet ghost in the 3D view, and a third run, whose \
+                 divergence gives the exponent. The run itself is not affected; three runs take three times as long.",
             )
             .on_disabled_hover_text(
-                "The motion of this scene is a function of time alone: it has no neighbouring motions",
+                "The motion of this scene is a function of time alone and has no neighbouring motions",
             );
         let anew = on
             && moves
             && ui
                 .button("Restart twin")
-                .on_hover_text("A new twin from the present state, say once the transient is over")
+                .on_hover_text("Starts a new twin from the current state, for example after the transient")
                 .clicked();
         if switch.changed() || anew {
             player.set_twin(on);
@@ -50,10 +50,10 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
         Err((more, interval)) => format!("Exponent — 1/s, known in {} s", value::number(more as f64 * interval, 3)),
     };
     ui.label(exponent).on_hover_text(
-        "Largest Lyapunov exponent of the run since the twin began, ± two standard errors: the mean rate at which the distance of \
-         a neighbouring motion grows, which is brought back again and again, as in a sweep. Above 0 the motion is chaotic, below \
-         0 neighbours approach. The first impacts alone tell nothing of it, so it takes 25 periods of what drives the machine, of \
-         0.1 s where nothing does",
+        "Largest Lyapunov exponent since the twin began, ± two standard errors: the mean growth rate of the distance \
+         to a neighbouring motion, with renormalisation as in a sweep. Above 0 the motion is chaotic; below 0 \
+         neighbouring motions converge. It is known after 25 periods of the drives, or of 0.1 s without drives, \
+         because the first impacts say nothing about it",
     );
     reserved(ui, "twin says", 2, |ui| {
         if let Some(why) = twin.ended() {
@@ -77,8 +77,8 @@ pub fn distance(ui: &mut Ui, player: &Player, twin: &Twin, height: f32) {
     title(
         ui,
         "Distance to twin, in scales of the state (logarithmic)",
-        "Euclidean distance of all coordinates and velocities, each over its scale of the tolerance (1 ball radius, 0.1 rad \
-         and so on)",
+        "Euclidean distance of all coordinates and velocities, each divided by its tolerance scale (1 ball radius, \
+         0.1 rad and so on)",
     );
     let points: Vec<PlotPoint> =
         distances.iter().map(|[time, distance]| PlotPoint::new(time / size, distance.log10())).collect();

@@ -67,8 +67,8 @@ impl Portrait {
         title(
             ui,
             &format!("Poincaré section: {} over {}", up.title(), across.title()),
-            "The state once in each period of the drive, at its phase; a periodic motion is a few points, chaos a cloud. \
-             Cleared by a reset and by a changed parameter.",
+            "The state once in each period of the drive, at the section phase. A periodic motion gives a few points, \
+             chaos a cloud. A reset or a parameter change clears it.",
         );
         let shown = plane(ui, "section", across, up, HEIGHT).show(ui, |plot| {
             let series = PlotPoints::Borrowed(&self.sections);
@@ -78,14 +78,12 @@ impl Portrait {
         ui.horizontal_wrapped(|ui| {
             ui.label("Drive phase");
             let mut degrees = 360.0 * player.watch().phase();
-            let slider = Slider::new(&mut degrees, 0.0..=359.0)
-                .suffix("°")
-                .max_decimals(1)
-                .clamping(SliderClamping::Always);
+            let slider =
+                Slider::new(&mut degrees, 0.0..=359.0).suffix("°").max_decimals(1).clamping(SliderClamping::Always);
             let slider = keys::slider(ui, slider)
                 .on_hover_text(
-                    "Where in the period of the drive sections are taken, of the running scene and of the next sweep; 0° is \
-                     the phase at t = 0. Another phase starts the section anew.",
+                    "Phase of the drive at which sections are taken, of the running scene and of the next sweep; 0° \
+                     is the phase at t = 0. A change restarts the section.",
                 )
                 .accessible_name("Drive phase");
             spoken::value(&slider, &format!("{}°", value::number(degrees, 4)));
@@ -94,16 +92,14 @@ impl Portrait {
             }
         });
         ui.label(
-            RichText::new(format!(
-                "Sections: {}, one every {}",
-                self.sections.len(),
-                value::quantity(period, "s", 5)
-            ))
-            .small()
-            .weak(),
+            RichText::new(format!("Sections: {}, one every {}", self.sections.len(), value::quantity(period, "s", 5)))
+                .small()
+                .weak(),
         )
-        .on_hover_text("Sections of the running scene since its start or its latest change, and the period of its drive in simulated time: \
-             a larger time scale brings them sooner");
+        .on_hover_text(
+            "Sections of the running scene since its start or its latest change, and the period of its \
+                        drive in simulated time; a larger time scale yields them sooner",
+        );
     }
 
     fn read(&mut self, player: &Player, coordinate: Coordinate) {

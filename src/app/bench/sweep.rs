@@ -241,7 +241,7 @@ impl SweepPanel {
         };
         let differences = swept.differences(player);
         if differences.is_empty() {
-            ui.label(small("This sweep belongs to the scene on show").weak());
+            ui.label(small("This sweep belongs to the current scene").weak());
         } else {
             let words = format!("This sweep belongs to another scene. {}", differences.join("; "));
             theme::warning(ui, words).on_hover_text("A click on a point asks before it changes this");
@@ -318,11 +318,12 @@ impl SweepPanel {
                 })
                 .response
                 .on_hover_text(
-                    "Every value from the scene's own start, or from where its neighbour ended, so that hysteresis shows",
+                    "Each value starts from the scene's own start, or from the end state of its neighbour, so that \
+                     hysteresis shows",
                 )
                 .accessible_name("Start of each value");
             ui.checkbox(&mut settings.exponent, "Exponent").on_hover_text(
-                "Measures the largest Lyapunov exponent of each value with a twin run: about twice the time",
+                "Computes the largest Lyapunov exponent at each value with a twin run, which about doubles the time",
             );
         });
         let solver = player.pending().machine.solver;
@@ -343,8 +344,8 @@ impl SweepPanel {
         } else {
             (
                 "Start sweep",
-                "Runs the scene with its present values at each value of the varied parameter, in the background, and \
-                 draws the bifurcation diagram as points arrive",
+                "Runs the scene with its current settings at each value of the varied parameter, in the background, \
+                 and draws the bifurcation diagram as points arrive",
             )
         };
         let clicked = ui.horizontal(|ui| {
@@ -360,7 +361,8 @@ impl SweepPanel {
                 let bar = ProgressBar::new(done as f32).text(words);
                 ui.add(bar.desired_width(ui.available_width()))
                     .on_hover_text(
-                        "Fraction of the points that are there. While the picture moves, a sweep leaves it time for 20 frames a second; paused, the sweep is faster",
+                        "Fraction of the points computed so far. While the picture moves, the sweep leaves time for \
+                         20 frames per second; it is faster when the run is paused",
                     )
                     .accessible_name("Swept so far");
             }

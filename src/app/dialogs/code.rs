@@ -107,7 +107,7 @@ impl SharedLink {
         self.code = match page {
             "" => Err("No QR code without an address: a phone could not open it".to_owned()),
             _ if !self.can_be_copied() => Err(format!("{page}: {NO_PAGE}")),
-            _ if !is_found_by_others(page) => Err(format!("No QR code: other devices do not find {page}")),
+            _ if !is_found_by_others(page) => Err(format!("No QR code: other devices cannot reach {page}")),
             _ => encode(&self.link()),
         };
     }

@@ -310,7 +310,7 @@ impl Lesson {
             .and_then(|file| file.take(LARGEST_FILE + 1).read_to_string(&mut text))
             .map_err(|why| wrong(format!("cannot read this lesson: {why}")))?;
         if text.len() as u64 > LARGEST_FILE {
-            return Err(wrong(format!("more than {} MiB: no lesson", LARGEST_FILE >> 20)));
+            return Err(wrong(format!("larger than {} MiB: not a lesson", LARGEST_FILE >> 20)));
         }
         Self::parse(path, &text, Some(path))
     }

@@ -102,7 +102,7 @@ impl Measured {
             pass.gauges.push((index, gauge));
         }
         if let (None, Some(name)) = (&pass, waits) {
-            return Err(format!("measure {name}: its instants are no times"));
+            return Err(format!("measure {name}: its instants must be times"));
         }
         Ok(pass)
     }

@@ -140,7 +140,7 @@ fn buttons(ui: &mut Ui, course: &Course) -> Asked {
             if leave.accessible_name("Leave the lesson").clicked() {
                 asked = Asked::Leave;
             }
-            if course.more && ui.button("More").on_hover_text("The step goes on below: scrolls down").clicked() {
+            if course.more && ui.button("More").on_hover_text("Scroll down to the rest of the step").clicked() {
                 asked = Asked::More;
             }
         });

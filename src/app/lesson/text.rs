@@ -152,10 +152,8 @@ fn split(inside: &str) -> (&str, Option<&str>) {
 /// The unit has another dimension, or the value has no unit.
 pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
     let powers = quantity.powers().ok_or("adds or compares quantities of different dimensions")?;
-    let (_, units) = UNITS
-        .iter()
-        .find(|(own, _)| *own == powers)
-        .ok_or("gives a quantity of a dimension that texts do not write")?;
+    let (_, units) =
+        UNITS.iter().find(|(own, _)| *own == powers).ok_or("has a dimension that lesson texts cannot show")?;
     let value = quantity.value();
     if !value.is_finite() {
         return Err("is not a finite number".to_owned());

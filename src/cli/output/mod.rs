@@ -45,7 +45,7 @@ impl Format {
             "json" => Ok(Self::Json),
             "npz" => Ok(Self::Npz),
             _ => Err(Failure::usage(format!(
-                "{}: the file's ending chooses its format; use .csv, .json or .npz",
+                "{}: the file extension selects the format; use .csv, .json or .npz",
                 path.display()
             ))),
         }

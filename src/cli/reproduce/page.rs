@@ -93,7 +93,7 @@ fn provenance(report: &Report) -> Table {
         ("Command", of_meta("command")),
         ("Version", of_meta("version")),
         ("Scene", of_meta("scene")),
-        ("Formulation but where another is named", of_meta("formulation")),
+        ("Formulation, unless stated otherwise", of_meta("formulation")),
         ("Method", of_meta("method")),
         ("Tolerance", of_meta("tolerance")),
         ("Simulated altogether", format!("{} s", report.simulated())),

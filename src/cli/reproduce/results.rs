@@ -281,6 +281,6 @@ pub(super) fn models(report: &Report) -> Table {
         row.push(yes(offs.iter().all(|off| *off < NEAR)));
         row
     };
-    let heads = "Model | Numbers within 10 % .n | Within a factor of 2 .n | Further off .n | Statements confirmed .n | Sections in β told apart .n | More than as corrected | Ratio of the last separation .n | Ratio of the rate of β .n | Both within a quarter";
+    let heads = "Model | Numbers within 10 % .n | Within a factor of 2 .n | Further off .n | Statements confirmed .n | Clearances with scatter in β .n | More than as corrected | Ratio of the last separation .n | Ratio of the rate of β .n | Both within a quarter";
     Table::new(heads, report.models.iter().enumerate().map(row))
 }

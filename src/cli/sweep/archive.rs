@@ -46,7 +46,10 @@ pub fn check_ending(path: &Path) -> Result<(), Failure> {
     if npz {
         return Ok(());
     }
-    Err(Failure::usage(format!("--out {}: a sweep is written as a NumPy archive; use the ending .npz", path.display())))
+    Err(Failure::usage(format!(
+        "--out {}: a sweep is written as a NumPy archive; use the extension .npz",
+        path.display()
+    )))
 }
 
 impl Archive {

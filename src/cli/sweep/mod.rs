@@ -199,7 +199,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     let loose = solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
     if loose && sweep.plan().exponent {
         all.push(format!(
-            "solver.tolerance {:e}: at this tolerance runs stray from the motion of their scene, so exponents and the \
+            "solver.tolerance {:e}: at this tolerance the integration error is too large, so exponents and the \
              regimes classified from them are unreliable; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
             solver.tolerance
         ));

@@ -21,7 +21,7 @@ const MARKERS: [Marker; 8] = [
 ];
 /// Largest error plotted; larger ones are meaningless.
 const WORST: f64 = 1.0;
-const FRONT: &str = "On the front: nothing is both faster and more accurate";
+const FRONT: &str = "On the front: no other setting is both faster and more accurate";
 
 /// Error against time, both phases side by side. `relative`: times relative to Runge-Kutta 4 at 10 microseconds, which carry
 /// over to other machines.
@@ -75,7 +75,7 @@ fn diagram(found: &WorkPrecision, relative: bool, title: &str, error: &str, view
     let time = Axis::logarithmic("Time for a simulated second", unit);
     Chart {
         labels: labels.collect(),
-        levels: floor.map(|y| Level { y, text: "less cannot be told".to_owned() }).into_iter().collect(),
+        levels: floor.map(|y| Level { y, text: "accuracy of the reference".to_owned() }).into_iter().collect(),
         ..Chart::new(title, time, Axis::logarithmic(error, ""), series.chain([front]).collect())
     }
 }

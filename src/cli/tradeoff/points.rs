@@ -63,7 +63,7 @@ pub(super) fn facts(found: &WorkPrecision) -> Vec<(&'static str, String)> {
     let [peak, position, force] = [floor.peak, floor.position_m, floor.settled].map(|change| error(change, None));
     vec![
         ("Reference", format!("{} at {:e}", setting.method, setting.tolerance)),
-        ("Half of it changes", format!("peaks by {peak}, the position by {position} m, settled forces by {force}")),
+        ("Change at half the tolerance", format!("peaks {peak}, position {position} m, settled forces {force}")),
         match impacts {
             0 => ("Largest reactions", format!("within {}: {names}", ms(*span))),
             _ => ("First impacts", format!("{impacts} within {}: {names}", ms(*span))),
@@ -90,7 +90,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     let terms = [
         ("Speed", "simulated seconds in a second of stepping"),
         ("Ratio", "speed over that of rk4 at 10 us on the same span"),
-        ("*", "nothing else is both faster and more accurate"),
+        ("*", "no other setting is both faster and more accurate"),
     ];
     values.extend(terms.map(|(label, meaning)| (label, meaning.to_owned())));
     let mut out = tables::lines(values);

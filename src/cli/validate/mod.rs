@@ -41,7 +41,7 @@ pub fn page() -> Result<(String, Vec<String>), Failure> {
             rows.push(row(case, check, &comparison));
         }
     }
-    let heads = "Case | Quantity | Right value from | Right | Ours | Difference | Bound";
+    let heads = "Case | Quantity | Source | Expected | Computed | Difference | Bound";
     let sources: String = CASES.iter().map(source).collect();
     let page = fill(include_str!("page.md"), &[("cases", Table::new(heads, rows).markdown()), ("sources", sources)]);
     Ok((page, missed))

@@ -102,20 +102,20 @@ fn table() -> Vec<(Row, Outcomes)> {
     rows.into_iter().map(&mut with).collect()
 }
 
-const HEAD: &str = "# Stable at the extremes
+const HEAD: &str = "# Behaviour at the limits of the parameters
 
-What becomes of a scene at the ends of what may be asked for, with every preset, or with every method where the row is about
-step or tolerance, and both formulations: the first impacts of each row. `cargo test --test physics extremes::` runs and checks a cell of each
-row, with `-- --ignored extremes::full` all; with `-- --ignored write_the_page` it writes this page.
+Outcome of the first impacts of a scene with extreme parameter values, in both formulations, with every preset, or with every method where
+the row varies step or tolerance. `cargo test --test physics extremes::` computes and checks one cell of each row, with
+`-- --ignored extremes::full` all cells; with `-- --ignored write_the_page` it writes this page.
 
-- **runs**: to the end. Every number is finite, orientations are rotations, ideal joints are closed to 1e-9 m (`lagrange`, which
-  only stabilises them: 1 mm), no ball is deeper in its wall than a tenth of its radius, a ball in the wall that moves deeper
-  meets a force, and where nothing drives the scene its energy does not grow.
-- **slow**: the same, slower than asked, and the pacer says so, from which the window shows the speed that it reached. Asked is
-  slow motion of 1:10 on a machine that does 50 000 evaluations of the equations a second, half as many with `lagrange`.
-- **doubtful**: the program marks the result as not to be trusted and says why (`doubts` in the summary of `run`).
-- **stopped**: the divergence guard ended it, says why, and keeps the last good state.
-- **refused**: it does not start, and says why.
+- **runs**: the run reaches its end. Every number is finite, orientations are rotations, ideal joints are closed to 1e-9 m (1 mm in
+  `lagrange`, which only stabilises them), no ball is deeper in its wall than a tenth of its radius, a ball that moves deeper into the
+  wall meets a force, and the energy of a scene without drives does not grow.
+- **slow**: the same, but slower than requested, which the pacer reports; the window then shows the speed that it reached. Requested is
+  slow motion of 1:10 on a computer that evaluates the equations 50 000 times per second, half as often with `lagrange`.
+- **doubtful**: the program marks the result as doubtful and gives the reason (`doubts` in the summary of `run`).
+- **stopped**: the divergence guard stopped the run, with a reason, and kept the last good state.
+- **refused**: the run does not start, with a reason.
 ";
 /// What another test writes below the tables.
 const LONG_RUN: &str = "\n## 1000 simulated seconds\n";
@@ -137,7 +137,7 @@ fn page(table: &[(Row, Outcomes)]) -> String {
             }
         }
     }
-    page.push_str("\n## Why\n\nThe first that says so of each row and outcome.\n\n");
+    page.push_str("\n## Reasons\n\nThe first reason of each outcome in a row.\n\n");
     for (row, outcomes) in table {
         let mut said: Vec<&str> = Vec::new();
         for (f, form) in FORMS.iter().enumerate() {

@@ -167,8 +167,8 @@ pub fn rows() -> Vec<Row> {
     }
     for scene in ["spcmm", "pendulum", "chain"] {
         let row = |what: &str| Row::new(what, scene, &[]);
-        rows.push(row("masses 1e-6 times").edited(|s| scale_masses(s, 1e-6)));
-        rows.push(row("masses 1e3 times").edited(|s| scale_masses(s, 1e3)));
+        rows.push(row("masses times 1e-6").edited(|s| scale_masses(s, 1e-6)));
+        rows.push(row("masses times 1e3").edited(|s| scale_masses(s, 1e3)));
         rows.push(row("rods without inertia about their axis").edited(thin_rods));
     }
     for frequency in ["0 Hz", "5 Hz", "50 Hz"] {
@@ -192,7 +192,7 @@ pub fn rows() -> Vec<Row> {
             let row = Row::new(&what, scene, &changes).with_methods();
             rows.push(row.until_settled());
         }
-        rows.push(Row::new("as it is, until settled", scene, &[]).until_settled());
+        rows.push(Row::new("default, until settled", scene, &[]).until_settled());
     }
     // x_s = a1 + 28 mm; the square roots end between 28 mm and 60 mm, and between 364 mm and 365 mm. The rods of the lower
     // end are longest a quarter of a period after the start, that of the upper end three quarters: within the run at the

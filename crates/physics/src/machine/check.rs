@@ -41,7 +41,8 @@ pub enum MachineFault {
     Empty,
     /// The joints do not match the bodies one to one, in body order.
     #[error(
-        "body {body} needs the joint on which it hangs at the same index of `joints`, with `child` = {body} (counted from 0)"
+        "the joint that carries body {body} must be at the same index of `joints`, with `child` = {body} (counted \
+         from 0)"
     )]
     Joints {
         /// Index.
@@ -54,7 +55,7 @@ pub enum MachineFault {
         body: usize,
     },
     /// A point refers to a body that does not exist.
-    #[error("{what} holds body {body}, of {bodies} (counted from 0)")]
+    #[error("{what} refers to body {body}, but the machine has {bodies} bodies (counted from 0)")]
     NoBody {
         /// The joint or element with that point.
         what: String,
@@ -76,7 +77,7 @@ pub enum MachineFault {
         body: String,
     },
     /// Points of a curve or of a table of positions that do not rise.
-    #[error("{what}: a curve needs at least two finite points, whose first numbers rise")]
+    #[error("{what}: a curve needs at least two finite points with increasing first coordinates")]
     Points {
         /// Name of the joint or element.
         what: String,
@@ -406,7 +407,7 @@ pub enum ContactFault {
         high: f64,
     },
     /// A restitution of 0 under a law that divides by it.
-    #[error("the law {0} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit")]
+    #[error("the law {0} divides by the restitution; allowed above 0 to 1; a pure number, no unit")]
     DividesByRestitution(NormalLaw),
 }
 

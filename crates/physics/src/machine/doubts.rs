@@ -63,12 +63,12 @@ impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::MoreJoints => {
-                f.write_str("More ball joints differ from one another: what speaks against each of them is not listed.")
+                f.write_str("Further ball joints have settings of their own; warnings about them are not listed.")
             }
             Self::Restitution { joints, law, asked, given } => write!(
                 f,
-                "{joints}: restitution {asked} with {} gives {given:.3} in an undisturbed impact; normal_law gonthier gives what \
-                 is asked for{}.",
+                "{joints}: restitution {asked} with {} gives {given:.3} in an undisturbed impact; normal_law = \
+                 gonthier gives the restitution asked for{}.",
                 law.word(),
                 if *asked > 0.0 { "" } else { ", above 0" }
             ),
@@ -81,8 +81,9 @@ impl fmt::Display for Doubt {
             ),
             Self::PrintedFriction { joints } => write!(
                 f,
-                "{joints}: friction_velocity printed is there to compare with the paper: it reads (1 - c/e) of the centres' \
-                 velocity, so that friction vanishes where sliding is slow. surface is what the contact feels."
+                "{joints}: friction_velocity = printed is meant for comparison with the paper. It uses (1 - c/e) \
+                 times the velocity of the centres, so friction vanishes at low sliding speeds; surface uses the \
+                 sliding velocity of the contact."
             ),
             Self::Step { joint, step, duration, sliding, stable, recommended } => {
                 let why = if *sliding {

@@ -12,7 +12,7 @@ pub enum OutlineFault {
     #[error("a plate needs at least 3 corners, has {0}")]
     TooFew(usize),
     /// All corners are collinear.
-    #[error("the corners of a plate lie on one line: they enclose nothing")]
+    #[error("the corners of a plate lie on one line and enclose no area")]
     Line,
     /// Two adjacent corners coincide.
     #[error("corners {0} and {1} of a plate are the same point")]

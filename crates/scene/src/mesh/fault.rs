@@ -35,7 +35,7 @@ pub enum MeshFault {
     #[error("expected {0}")]
     Expected(&'static str),
     /// Invalid UTF-8.
-    #[error("this byte is no text in UTF-8")]
+    #[error("this byte is not valid UTF-8")]
     NotText,
     /// A coordinate that is not a number.
     #[error("is not a number")]
@@ -62,7 +62,8 @@ pub enum MeshFault {
     },
     /// OBJ: a face with an invalid vertex index.
     #[error(
-        "is none of the {known} vertices before this line; allowed 1 to {known}, or -{known} to -1 counted from the latest"
+        "is not one of the {known} vertices before this line; allowed 1 to {known}, or -{known} to -1 counted from \
+         the latest"
     )]
     NoVertex {
         /// Number of vertices so far.
@@ -91,7 +92,7 @@ pub enum MeshFault {
         bytes: usize,
     },
     /// glTF: invalid JSON.
-    #[error("no glTF file: {0}")]
+    #[error("not a glTF file: {0}")]
     NotJson(serde_json::Error),
     /// glTF: an unsupported version of the binary container.
     #[error("version {0} of glTF; allowed 2")]
@@ -120,7 +121,7 @@ pub enum MeshFault {
         why: Box<dyn Error + Send + Sync>,
     },
     /// glTF: an index beyond the end of a list.
-    #[error("{list}[{at}]: there is none")]
+    #[error("{list}[{at}] does not exist")]
     NoItem {
         /// Name of the list.
         list: &'static str,
@@ -158,7 +159,7 @@ pub enum MeshFault {
         whole: &'static str,
     },
     /// glTF: this node has two parents or is its own ancestor.
-    #[error("nodes[{0}] is there twice in the scene")]
+    #[error("nodes[{0}] appears twice in the scene")]
     Twice(usize),
     /// glTF: a node transform with the wrong number of values.
     #[error("nodes[{node}].{key} must be {count} numbers")]
@@ -174,7 +175,7 @@ pub enum MeshFault {
     #[error("meshes[{0}]: strips and fans of triangles are not read; export single triangles")]
     Strips(usize),
     /// glTF: a triangle with an invalid vertex index.
-    #[error("meshes[{mesh}]: vertex {vertex} is none of its {known}")]
+    #[error("meshes[{mesh}]: vertex {vertex} does not exist; it has {known}")]
     NoCorner {
         /// Index of the mesh.
         mesh: usize,
