@@ -1,12 +1,14 @@
 //! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
 
 mod approach;
+mod discrete;
 mod force;
 mod law;
 mod memory;
 mod slip;
 
 pub use approach::ApproachPiece;
+pub use discrete::{ContactStep, StepForce};
 pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, settled_half_period, settled_penetration,

@@ -75,6 +75,9 @@ pub(super) trait Equations: Send {
     /// T^+: velocities from position rates at `y`.
     fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]);
 
+    /// Moves the positions in `y` by the velocity-space displacement `step` (rotations by their rotation vectors).
+    fn displace(&self, model: &Model, y: &mut [f64], step: &[f64]);
+
     /// Projects the state after a step: quaternions to unit length, loops closed. Returns the remaining closure error, m or rad.
     fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64;
 

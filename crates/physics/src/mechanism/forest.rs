@@ -136,6 +136,10 @@ impl Equations for Forest {
         self.tree.velocities_of(model, y, rate, out);
     }
 
+    fn displace(&self, model: &Model, y: &mut [f64], step: &[f64]) {
+        Tree::displace(model, y, step);
+    }
+
     fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64 {
         Tree::normalise(model, y);
         match &mut self.constraints {

@@ -435,6 +435,16 @@ impl Equations for Lagrange {
         }
     }
 
+    fn displace(&self, model: &Model, out: &mut [f64], step: &[f64]) {
+        for b in 0..model.massive {
+            let [x, y, z, turn @ ..]: &[f64; 6] = part(step, 6 * b);
+            for (q, step) in out[7 * b..].iter_mut().zip([x, y, z]) {
+                *q += step;
+            }
+            kinematics::turn_quaternion(&mut out[7 * b + 3..7 * b + 7], &Vec3::from(*turn));
+        }
+    }
+
     fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64 {
         for b in 0..model.massive {
             kinematics::normalise_quaternion(&mut y[7 * b + 3..7 * b + 7]);

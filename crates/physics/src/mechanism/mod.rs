@@ -10,6 +10,7 @@ mod closed_form;
 mod columns;
 mod constraints;
 mod contacts;
+mod discrete_gradient;
 mod drives;
 mod elements;
 mod equations;
@@ -39,6 +40,7 @@ pub use crate::jet::Jet;
 pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
+pub use discrete_gradient::StepStart;
 pub use drives::periods_of;
 pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, Touch};
 use flight::ActiveRanges;
@@ -93,7 +95,7 @@ pub enum MechanismError {
     },
     /// Loops that close but that the drives open again immediately.
     #[error(
-        "{}: at the speeds of the drives it {}; no motion of the mechanism satisfies both",
+        "{}: the drives ask for speeds at which it {}; no motion that the mechanism has follows both",
         .rate.title(), .rate.opens()
     )]
     InconsistentDrives {
@@ -103,7 +105,7 @@ pub enum MechanismError {
     /// A ball that starts implausibly deep in its socket wall.
     #[error(
         "ball joint {joint}: ball and socket centres are {} apart as given, \
-         deeper in the wall than the clearance {} plus a hundredth of the ball radius",
+         deeper in the wall than the clearance {} and a hundredth of the ball radius allow",
         length(*.distance), length(*.clearance)
     )]
     OutsideSocket {
@@ -115,7 +117,7 @@ pub enum MechanismError {
         clearance: f64,
     },
     /// Loops that close on a different branch from the drives' closed form.
-    #[error("the loops close in an assembly mode other than that of the drives: the start poses are too far off")]
+    #[error("the loops close on another branch than the drives ask for: start poses are too far off")]
     OtherBranch,
     /// A start pose in which the ideal joints do not determine the velocities.
     #[error(
@@ -150,8 +152,8 @@ pub enum MechanismError {
     },
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
-        "the mechanism starts in a singular pose: at {} constraints are dependent here that are independent in \
-         neighbouring poses, and the motion could continue in more than one way; start it away from that pose",
+        "the mechanism starts in a singular pose: at {} directions that the ideal joints hold elsewhere coincide here, \
+         and the motion could continue in more than one way; start it away from that pose",
         .joints.join(", ")
     )]
     Branching {
@@ -276,6 +278,8 @@ pub struct Mechanism {
     evaluated: Option<f64>,
     /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
+    /// Workspace of the discrete-gradient step.
+    discrete: Option<Box<discrete_gradient::DiscreteGradient>>,
     /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
     evaluation_time: f64,
     free_flight_bodies: Vec<FreeFlightBody>,
@@ -324,6 +328,7 @@ impl Mechanism {
             stiff: None,
             friction: None,
             implicit: None,
+            discrete: None,
             free_flight_bodies: Vec::new(),
             moving: ActiveRanges::default(),
         };

@@ -10,8 +10,8 @@ use std::ops::Range;
 
 /// The equations of motion, with the contacts that may carry a force during a step.
 pub struct Evaluator<'a> {
-    mechanism: &'a mut Mechanism,
-    touching: ActiveSet<'a>,
+    pub(super) mechanism: &'a mut Mechanism,
+    pub(super) touching: ActiveSet<'a>,
     /// Evaluations made through it.
     pub counts: Counts,
     left: &'a mut [bool],

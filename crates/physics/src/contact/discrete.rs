@@ -1,0 +1,206 @@
+//! The contact force over a whole step: the discrete gradient of the elastic potential, the law's damping, and friction at the
+//! velocity with which the step ends.
+//!
+//! With F_el = (U(d1) - U(d0)) / (d1 - d0), U = 2/5 K delta^2.5, the elastic work over the step is the change of U exactly, whatever
+//! the step, and a contact that begins or ends within the step is in U (Gonzalez 1996; McLachlan, Quispel & Robidoux 1999).
+
+use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Vec3};
+
+/// h omega beyond which the ringing of a ball at rest on its wall is damped instead of followed.
+const RESOLVED: f64 = 1.5;
+/// Change of penetration, relative to the larger one, below which Simpson's rule replaces the quotient.
+const NEARLY_EQUAL: f64 = 1e-3;
+
+/// A contact over one step: what does not change while its force is sought.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ContactStep {
+    /// Step size, s.
+    pub h: f64,
+    /// Eccentricity at the start, m.
+    pub start: Vec3,
+    /// Clearance at the start and at the end, m.
+    pub clearances: [f64; 2],
+    /// Sliding velocity by friction's rule at the start, m/s, not yet tangential.
+    pub slip: Vec3,
+    /// Approach speed in the damping term so far, m/s.
+    pub approach: f64,
+    /// Whether the contact has lasted beyond its first rebound: ringing that the step does not resolve is then damped.
+    pub lasting: bool,
+    /// n . W M^-1 W^T n, 1/kg.
+    pub mobility: f64,
+}
+
+/// The force of a contact over one step, its derivatives, and what it does.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepForce {
+    /// Force on the ball, N.
+    pub force: Vec3,
+    /// Mean normal n = (e0 + e1) / (|e0| + |e1|): |e1| - |e0| = n . (e1 - e0).
+    pub normal: Vec3,
+    /// dF/du for the mean velocity u of the centres, N s/m.
+    pub by_velocity: Mat3,
+    /// dF/ds for the mean velocity s used by friction, N s/m.
+    pub by_slip: Mat3,
+}
+
+impl ContactStep {
+    /// Mean normal for the mean velocity `velocity` of the centres, m/s; zero for a ball that stays centred.
+    pub fn mean_normal(&self, velocity: &Vec3) -> Vec3 {
+        let end = self.start + velocity * self.h;
+        let sum = self.start.norm() + end.norm();
+        if sum > 0.0 { (self.start + end) / sum } else { Vec3::zeros() }
+    }
+}
+
+impl StepForce {
+    /// No contact.
+    fn none(normal: Vec3) -> Self {
+        Self { force: Vec3::zeros(), normal, by_velocity: Mat3::zeros(), by_slip: Mat3::zeros() }
+    }
+}
+
+impl Coefficients {
+    /// Force over `step` for the mean velocity `velocity` of the centres (m/s), so that e1 = e0 + h u, and the mean velocity `slip`
+    /// used by friction (m/s).
+    pub fn step_force(&self, step: &ContactStep, velocity: &Vec3, slip: &Vec3) -> StepForce {
+        let ContactStep { h, start, clearances, .. } = *step;
+        let end = start + velocity * h;
+        let (before, after) = (start.norm(), end.norm());
+        let sum = before + after;
+        if sum == 0.0 {
+            return StepForce::none(Vec3::zeros());
+        }
+        let normal = (start + end) / sum;
+        let (d0, d1) = (before - clearances[0], after - clearances[1]);
+        if d0 <= 0.0 && d1 <= 0.0 {
+            return StepForce::none(normal);
+        }
+        let (elastic, stiffness) = self.elastic_force(step, d0, d1);
+        let rate = (d1 - d0) / h;
+        let rising = self.largest && rate > step.approach;
+        let approach = if rising { rate } else { step.approach };
+        let damping = 1.0 + self.damping * rate / approach;
+        if elastic <= 0.0 || damping <= 0.0 {
+            return StepForce::none(normal);
+        }
+        let force = elastic * damping;
+        let by_rate = h * stiffness * damping + if rising { 0.0 } else { elastic * self.damping / approach };
+        let tangent = Mat3::identity() - normal * normal.transpose();
+        let mut direction = -normal;
+        let mut by_slip = Mat3::zeros();
+        if self.friction > 0.0 {
+            let share = match self.friction_velocity {
+                FrictionVelocity::Centres | FrictionVelocity::Surface => 1.0,
+                FrictionVelocity::Printed => (d0 + d1) / sum,
+            };
+            // At the end: a mean that follows a parabola from the start.
+            let sliding = tangent * (slip * 2.0 - step.slip) * share;
+            let speed = sliding.norm();
+            let per_speed = self.friction_per_speed(FrictionPiece::Unsplit, speed);
+            direction -= sliding * per_speed;
+            // Secants where friction is full, so that a correction stops the sliding but cannot reverse it; below the dead band
+            // the slope of the ramp.
+            let full = per_speed.max(0.0);
+            let mut resistance = tangent * full;
+            if speed < self.slip_low {
+                resistance = tangent * (self.friction / (self.slip_high - self.slip_low));
+            } else if speed < self.slip_high {
+                let along = sliding / speed;
+                resistance += along * along.transpose() * (self.friction_slope(speed) - full);
+            }
+            by_slip = resistance * (-2.0 * share * force);
+        }
+        let by_velocity = direction * (end / after).transpose() * by_rate - tangent * (force * h / sum);
+        StepForce { force: direction * force, normal, by_velocity, by_slip }
+    }
+
+    /// Elastic force over the step between the penetrations `d0` and `d1` (m), N, and its derivative with respect to `d1`, N/m.
+    fn elastic_force(&self, step: &ContactStep, d0: f64, d1: f64) -> (f64, f64) {
+        let force = |d: f64| if d > 0.0 { self.stiffness * d * d.sqrt() } else { 0.0 };
+        let slope = |d: f64| if d > 0.0 { 1.5 * self.stiffness * d.sqrt() } else { 0.0 };
+        let change = d1 - d0;
+        let (mean, by_end) = if change.abs() < NEARLY_EQUAL * d0.abs().max(d1.abs()) {
+            let middle = 0.5 * (d0 + d1);
+            let mean = (force(d0) + 4.0 * force(middle) + force(d1)) / 6.0;
+            (mean, (2.0 * slope(middle) + slope(d1)) / 6.0)
+        } else {
+            let mean = (self.elastic_energy(d1) - self.elastic_energy(d0)) / change;
+            (mean, (force(d1) - mean) / change)
+        };
+        if !step.lasting {
+            return (mean, by_end);
+        }
+        let turns = step.h * (slope(d0.max(d1)) * step.mobility).sqrt();
+        if turns <= RESOLVED {
+            return (mean, by_end);
+        }
+        let damped = 1.0 - RESOLVED / turns;
+        ((1.0 - damped) * mean + damped * force(d1), (1.0 - damped) * by_end + damped * slope(d1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{ApproachSpeed, Parameters};
+
+    fn law(parameters: Parameters) -> Coefficients {
+        Coefficients::new(&parameters, 3e-4)
+    }
+
+    fn step(h: f64, depth: f64) -> ContactStep {
+        let normal = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+        ContactStep {
+            h,
+            start: normal * (3e-4 + depth),
+            clearances: [3e-4; 2],
+            slip: Vec3::new(0.01, 0.03, 0.0),
+            approach: 0.05,
+            lasting: false,
+            mobility: 10.0,
+        }
+    }
+
+    #[test]
+    fn the_elastic_work_of_a_step_is_the_change_of_the_energy() {
+        let elastic = law(Parameters { restitution: 1.0, friction: 0.0, ..Parameters::default() });
+        for (depth, speed) in [(-1e-6, 0.1), (2e-6, -0.2), (2e-6, -0.05), (3e-6, 0.02), (3e-6, 1e-6)] {
+            let step = step(2e-5, depth);
+            let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
+            let found = elastic.step_force(&step, &velocity, &Vec3::zeros());
+            let end = (step.start + velocity * step.h).norm() - 3e-4;
+            let gain = elastic.elastic_energy(end) - elastic.elastic_energy(depth);
+            let work = found.force.dot(&velocity) * step.h;
+            assert!((work + gain).abs() < 1e-9 * elastic.elastic_energy(3e-6), "{depth} {speed}: {work:e} {gain:e}");
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_central_differences() {
+        for friction_velocity in FrictionVelocity::ALL {
+            for approach_speed in ApproachSpeed::ALL {
+                // On the ramp of friction.
+                let parameters =
+                    Parameters { friction_velocity, approach_speed, slip_speed_high: 10.0, ..Parameters::default() };
+                let law = law(parameters);
+                for (depth, speed) in [(-1e-6, 0.12), (2e-6, 0.03), (2e-6, -0.02), (3e-6, 1e-6)] {
+                    let step = step(2e-5, depth);
+                    let velocity = step.start.normalize() * speed + Vec3::new(0.01, 0.02, 0.0);
+                    let slip = Vec3::new(0.05, -0.1, 0.2);
+                    let found = law.step_force(&step, &velocity, &slip);
+                    assert!(found.force.norm() > 0.1);
+                    for k in 0..3 {
+                        let d = Vec3::ith(k, 1e-7);
+                        let force = |u: Vec3, s: Vec3| law.step_force(&step, &u, &s).force;
+                        let by_velocity = (force(velocity + d, slip) - force(velocity - d, slip)) / 2e-7;
+                        let by_slip = (force(velocity, slip + d) - force(velocity, slip - d)) / 2e-7;
+                        let off = (by_velocity - found.by_velocity.column(k)).norm() / found.by_velocity.norm();
+                        assert!(off < 2e-3, "{friction_velocity} {approach_speed} {depth} {speed} u{k}: {off:e}");
+                        let off = (by_slip - found.by_slip.column(k)).norm() / found.by_slip.norm();
+                        assert!(off < 1e-4, "{friction_velocity} {approach_speed} {depth} {speed} s{k}: {off:e}");
+                    }
+                }
+            }
+        }
+    }
+}

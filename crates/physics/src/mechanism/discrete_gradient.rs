@@ -1,0 +1,848 @@
+//! A step that solves the contacts: the discrete-gradient rule in velocities, reduced to the contact forces.
+//!
+//! The unknown is the mean velocity V of the step: v1 = 2 V - v0, and the positions move by h V. Forces other than contact forces are
+//! those of the midpoint, at a guess of V, with the mass matrix there: V = v0 + h/2 (a + M^-1 sum S^T F). A contact force depends on
+//! its joint's mean relative velocities u of the centres and s of the points in contact alone ([`Coefficients::step_force`]), so that
+//! Newton's method needs three rows per contact in place of one per coordinate:
+//! F = f(u + h/2 W M^-1 sum S^T F, s + h/2 S M^-1 sum S^T F).
+//!
+//! No event is located. The eccentricity at the end is that of the guessed motion, plus h W times the change of V.
+
+use super::band::Band;
+use super::bounds::{Advice, Cost, CostOf};
+use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
+use super::contacts::Contacts;
+use super::elements::{ActiveSet, At, Counts, Powers, SceneElement};
+use super::equations::Equations;
+use super::kinematics::Kinematics;
+use super::model::{Anchor, Model};
+use super::systems::Evaluator;
+use super::{Mechanism, MechanismError};
+use crate::contact::{Coefficients, ContactStep, Memory, StepForce};
+use crate::integrate::{Method, System as _};
+use crate::machine::{Mat3, Vec3};
+
+/// Maximum number of iterations, and of successive cuts of one of them.
+const ITERATIONS: u32 = 15;
+const CUTS: u32 = 4;
+/// Factor of a cut.
+const CUT: f64 = 0.4;
+/// Change of a velocity at which the iteration ends where no friction asks for less, m/s or rad/s.
+const STILL: f64 = 1e-4;
+/// An element whose force changes by less than this fraction of what moves it, over half a step, is as good as constant.
+const SOFT: f64 = 0.05;
+/// Distance of the end from the guessed one, over the scales, beyond which the step is repeated from there.
+const FAR_OFF: f64 = 1e-5;
+/// Speed at which other contacts may push a ball towards its wall within a step, m/s.
+const PUSH: f64 = 0.05;
+
+/// How the force of a row of three depends on its mean velocities.
+enum Law {
+    /// A ball in its socket.
+    Contact(Coefficients),
+    /// Change of a force element's force, or torque, with its mean relative velocity, N s/m or N m s/rad.
+    Element(Mat3),
+}
+
+/// A ball joint that touches in the step, or may, or an element that is stepped implicitly.
+struct Touch {
+    /// Ball joints by index, then two rows per element, for its force and its torque.
+    row: usize,
+    law: Law,
+    step: ContactStep,
+    /// Mean normal of the guessed motion, for the lever arms.
+    normal: Vec3,
+    /// Mean velocities with the guessed motion: of the centres, used by friction, and of the surfaces, m/s.
+    guessed: [Vec3; 3],
+    /// The first two without contact forces.
+    free: [Vec3; 2],
+    /// What contact forces add to them: now, before the latest iteration, and after it without a cut.
+    added: [Vec3; 2],
+    before: [Vec3; 2],
+    full: [Vec3; 2],
+    found: StepForce,
+    /// The same of the force on the ball, N.
+    force: Vec3,
+    force_before: Vec3,
+    full_force: Vec3,
+}
+
+impl Touch {
+    fn new(row: usize, law: Law) -> Self {
+        let zero = [Vec3::zeros(); 2];
+        Self {
+            row,
+            law,
+            step: ContactStep::default(),
+            normal: Vec3::zeros(),
+            guessed: [Vec3::zeros(); 3],
+            free: zero,
+            added: zero,
+            before: zero,
+            full: zero,
+            found: StepForce::default(),
+            force: Vec3::zeros(),
+            force_before: Vec3::zeros(),
+            full_force: Vec3::zeros(),
+        }
+    }
+
+    /// The law of a ball joint, with its row's number.
+    fn contact(&self) -> Option<(usize, &Coefficients)> {
+        match &self.law {
+            Law::Contact(law) => Some((self.row, law)),
+            Law::Element(_) => None,
+        }
+    }
+
+    /// Whether friction acts on the surfaces.
+    fn follows_surfaces(&self) -> bool {
+        matches!(&self.law, Law::Contact(law) if law.friction > 0.0 && law.uses_surface_velocity())
+    }
+}
+
+/// Workspace, allocated once.
+pub struct DiscreteGradient {
+    joints: usize,
+    /// Upper bounds on the effect of a force and a torque of each element on its relative motion, 1/kg and 1/(kg m^2).
+    ease: Vec<[f64; 2]>,
+    /// Velocity coordinates that a force at each row may accelerate.
+    ranges: Vec<(usize, usize)>,
+    /// Bandwidth: rows further apart are not coupled.
+    reach: usize,
+    band: Band,
+    touches: Vec<Touch>,
+    columns: Vec<Vec<Column>>,
+    /// M^-1 S^T: three interleaved columns per joint over its range.
+    weighted: Vec<Vec<f64>>,
+    blocks: Vec<Mat3>,
+    right: Vec<Vec3>,
+    /// W M^-1 S^T and S M^-1 S^T in the same band, the latter for the velocity used by friction.
+    mobility: Vec<[Mat3; 2]>,
+    /// State at the middle and at the end, with the guessed velocities; derivative at the middle.
+    middle: Vec<f64>,
+    end: Vec<f64>,
+    rate: Vec<f64>,
+    /// Guessed mean velocity, and the one without contact forces.
+    guess: Vec<f64>,
+    mean: Vec<f64>,
+    displacement: Vec<f64>,
+    scratch: Vec<f64>,
+    starts: Vec<JointStart>,
+    /// Powers over the step.
+    powers: Powers,
+}
+
+/// A ball joint at the start of the step.
+#[derive(Clone, Copy, Default)]
+struct JointStart {
+    /// e, m.
+    eccentricity: Vec3,
+    /// Penetration rate and slip velocity, m/s.
+    rate: f64,
+    slip: Vec3,
+    /// Clearances at both ends of the step, m.
+    clearances: [f64; 2],
+}
+
+/// The start of a step.
+#[derive(Clone, Copy)]
+pub struct StepStart<'a> {
+    /// Time, s.
+    pub t: f64,
+    /// Step size, s.
+    pub h: f64,
+    /// State.
+    pub y: &'a [f64],
+    /// Mean rates of the step before.
+    pub k: &'a [f64],
+    /// Contact states.
+    pub memory: &'a [Memory],
+    /// Whether each contact has lasted beyond its first rebound: ringing that the step does not resolve is then damped.
+    pub lasting: &'a [bool],
+}
+
+impl DiscreteGradient {
+    /// For a state of `dimension` components, of which `positions` are positions, and elements between these bodies; `within` if
+    /// a force accelerates only the trees it acts on.
+    ///
+    /// # Errors
+    /// The contacts are coupled too widely.
+    fn new(
+        model: &Model,
+        dimension: usize,
+        positions: usize,
+        within: bool,
+        elements: &[[Anchor; 2]],
+    ) -> Result<Self, MechanismError> {
+        let n = dimension - positions;
+        let joints = model.joints.len();
+        let block_of =
+            |body: usize| (body < model.bodies.len() && !model.bodies[body].driven_only).then(|| model.block_of[body]);
+        let of_joints = model.joints.iter().map(|joint| [joint.ball.body, joint.socket.body]);
+        let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
+        // Blocks of the mass matrix that a force at each row may accelerate.
+        let blocks: Vec<[Option<usize>; 2]> = of_joints.chain(of_elements).map(|of| of.map(block_of)).collect();
+        let rows = blocks.len();
+        let range = |row: usize| {
+            if !within {
+                return (0, n);
+            }
+            let of = |b: usize| (model.blocks[b].v, model.blocks[b].v + model.blocks[b].n);
+            let mut range = (n, 0);
+            for (first, end) in blocks[row].into_iter().flatten().map(of) {
+                range = (range.0.min(first), range.1.max(end));
+            }
+            (range.0.min(range.1), range.1)
+        };
+        // Rows that act on the same block are coupled.
+        let mut first_on = vec![usize::MAX; model.blocks.len()];
+        let mut reach = if within { 0 } else { rows.saturating_sub(1) };
+        for (row, blocks) in blocks.iter().enumerate() {
+            for &block in blocks.iter().flatten() {
+                first_on[block] = first_on[block].min(row);
+                reach = reach.max(row - first_on[block]);
+            }
+        }
+        let ranges: Vec<_> = (0..rows).map(range).collect();
+        let width = |&(first, end): &(usize, usize)| end - first;
+        let cost = Cost::of_implicit_contacts(rows, reach, ranges.iter().map(width).sum());
+        cost.check(CostOf::ImplicitContacts, Advice::Method(Method::Automatic))?;
+        Ok(Self {
+            joints,
+            ease: elements.iter().map(|ends| ease(model, ends)).collect(),
+            reach,
+            band: Band::with_room(rows, reach),
+            touches: Vec::with_capacity(rows),
+            columns: ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
+            weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
+            blocks: vec![Mat3::zeros(); Band::places(rows, reach)],
+            right: Vec::with_capacity(rows),
+            mobility: vec![[Mat3::zeros(); 2]; Band::places(rows, reach)],
+            middle: vec![0.0; dimension],
+            end: vec![0.0; dimension],
+            rate: vec![0.0; dimension],
+            guess: vec![0.0; n],
+            mean: vec![0.0; n],
+            displacement: vec![0.0; n],
+            scratch: vec![0.0; n],
+            starts: vec![JointStart::default(); joints],
+            powers: Powers::default(),
+            ranges,
+        })
+    }
+
+    /// Records the start, from the motion just measured.
+    fn record_start(&mut self, contacts: &Contacts, motion: &[Kinematics]) {
+        for (j, start) in self.starts.iter_mut().enumerate() {
+            let gap = contacts.gap(j);
+            *start = JointStart {
+                eccentricity: gap.eccentricity,
+                rate: gap.separation.rate,
+                slip: contacts.slip_velocity(j, &gap.separation.normal, motion),
+                clearances: [contacts.clearance(j); 2],
+            };
+        }
+    }
+
+    /// Collects the joints that touch or may, from the gaps just measured at the guessed end; all loose ones if `all`.
+    fn gather(&mut self, model: &Model, contacts: &Contacts, from: &StepStart<'_>, all: bool) {
+        self.touches.clear();
+        for (j, joint) in model.joints.iter().enumerate() {
+            if joint.ideal.is_some() {
+                continue;
+            }
+            let start = &mut self.starts[j];
+            start.clearances[1] = contacts.clearance(j);
+            let end = contacts.gap(j).eccentricity;
+            let deepest = (start.eccentricity.norm() - start.clearances[0]).max(end.norm() - start.clearances[1]);
+            if !all && deepest + PUSH * from.h <= 0.0 {
+                continue;
+            }
+            let law = *contacts.coefficients(j);
+            let memory = &from.memory[j];
+            let step = ContactStep {
+                h: from.h,
+                start: start.eccentricity,
+                clearances: start.clearances,
+                slip: start.slip,
+                approach: if memory.active { memory.approach_speed } else { law.speed_floor.max(start.rate) },
+                lasting: memory.active && from.lasting[j],
+                mobility: 0.0,
+            };
+            let mean = (end - start.eccentricity) / from.h;
+            let normal = step.mean_normal(&mean);
+            self.touches.push(Touch { step, normal, guessed: [mean; 3], ..Touch::new(j, Law::Contact(law)) });
+        }
+    }
+
+    /// Adds the elements that are stepped implicitly, by their linearisation at the middle.
+    fn gather_elements(
+        &mut self,
+        model: &Model,
+        elements: &[Box<dyn SceneElement>],
+        equations: &dyn Equations,
+        at: &At<'_>,
+        h: f64,
+    ) {
+        for (i, element) in elements.iter().enumerate() {
+            let Some(coupling) = element.coupling(at) else {
+                continue;
+            };
+            let [ease, turning_ease] = self.ease[i];
+            let gain = coupling.stiffness.by_displacement * (0.5 * h) + coupling.stiffness.by_rate;
+            let turning = coupling.turning.map(|turning| turning.by_turn * (0.5 * h) + turning.by_spin);
+            let change = gain.norm() * ease + turning.map_or(0.0, |gain| gain.norm() * turning_ease);
+            if 0.5 * h * change < SOFT {
+                continue;
+            }
+            let row = self.joints + 2 * i;
+            let columns = &mut self.columns[row];
+            match turning {
+                Some(gain) => {
+                    collect_relative_columns(columns, model, equations, &coupling.sides);
+                    let Ok([forces, torques]) = self.columns.get_disjoint_mut([row, row + 1]) else {
+                        unreachable!("two rows");
+                    };
+                    torques.clear();
+                    let turns = |column: &Column| Column { centre: column.turn, surface: column.turn, ..*column };
+                    torques.extend(forces.iter().map(turns));
+                    self.touches.push(Touch::new(row + 1, Law::Element(gain)));
+                }
+                None => collect_columns(columns, model, equations, &coupling.sides, &coupling.normal),
+            }
+            self.touches.push(Touch::new(row, Law::Element(gain)));
+        }
+        self.touches.sort_unstable_by_key(|touch| touch.row);
+    }
+
+    /// Jacobian columns of the contacts, and the mean velocities, from the motion at the middle with the guessed velocities.
+    fn arrange(&mut self, model: &Model, equations: &dyn Equations) {
+        for touch in &mut self.touches {
+            let columns = &mut self.columns[touch.row];
+            if let Law::Contact(law) = &touch.law {
+                let (joint, n) = (&model.joints[touch.row], touch.normal);
+                let motion = equations.motion();
+                let spin = |body: usize| &motion[body].angular_velocity;
+                let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
+                let mean = touch.guessed[0];
+                touch.guessed[1] = law.slip_velocity(&n, &mean, ball, socket);
+                touch.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
+                collect_columns(columns, model, equations, &contact_sides(joint, law), &n);
+            }
+            let [centres, surfaces] = moved_by(columns, &self.mean, &self.guess);
+            let slip = if touch.follows_surfaces() { surfaces } else { centres };
+            touch.free = [touch.guessed[0] + centres, touch.guessed[1] + slip];
+            touch.added = [-centres, -slip];
+        }
+    }
+
+    /// M^-1 S^T of every touch, and the mobility that couples the touches.
+    fn couple(&mut self, model: &Model, equations: &mut dyn Equations) {
+        let within = equations.is_block_diagonal();
+        for touch in &self.touches {
+            let j = touch.row;
+            let (first, end) = self.ranges[j];
+            for i in 0..3 {
+                self.scratch[first..end].fill(0.0);
+                for column in &self.columns[j] {
+                    self.scratch[column.coordinate] = column.surface[i];
+                }
+                if within {
+                    equations.apply_inverse_mass_within(model, (first, end), &mut self.scratch);
+                } else {
+                    equations.apply_inverse_mass(model, &mut self.scratch);
+                }
+                for k in first..end {
+                    self.weighted[j][3 * (k - first) + i] = self.scratch[k];
+                }
+            }
+        }
+        let Self { band, touches, ranges, .. } = self;
+        let range = |i: usize| ranges[touches[i].row];
+        band.arrange(touches.len(), self.reach, |i, j| {
+            let [(first, end), (from, to)] = [i, j].map(range);
+            first < to && from < end
+        });
+        let band = &self.band;
+        for i in 0..band.size() {
+            let touch = &self.touches[i];
+            let joints = |j: usize| self.touches[j].row;
+            let columns = &self.columns[touch.row];
+            let surface = touch.follows_surfaces();
+            for j in band.row(i) {
+                let other = joints(j);
+                let (first, end) = self.ranges[other];
+                let mut mobility = [Mat3::zeros(); 2];
+                for c in columns {
+                    if (first..end).contains(&c.coordinate) {
+                        let x = &self.weighted[other][3 * (c.coordinate - first)..][..3];
+                        let x = Vec3::new(x[0], x[1], x[2]).transpose();
+                        mobility[0] += c.centre * x;
+                        if surface {
+                            mobility[1] += c.surface * x;
+                        }
+                    }
+                }
+                if !surface {
+                    mobility[1] = mobility[0];
+                }
+                self.mobility[band.at(i, j)] = mobility;
+            }
+            let touch = &mut self.touches[i];
+            touch.step.mobility = touch.normal.dot(&(self.mobility[band.at(i, i)][0] * touch.normal));
+        }
+    }
+
+    /// Contact forces over the step. Returns whether the iteration converged.
+    fn solve(&mut self, h: f64, counts: &mut Counts) -> bool {
+        let half = 0.5 * h;
+        let laws = self.touches.iter().filter_map(Touch::contact);
+        let still = laws.map(|(_, law)| law.slip_high).fold(STILL, f64::min);
+        let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
+        for iteration in 0..ITERATIONS {
+            counts.contacts += 1;
+            for touch in &mut self.touches {
+                let [u, s] = [touch.free[0] + touch.added[0], touch.free[1] + touch.added[1]];
+                touch.found = match &touch.law {
+                    Law::Contact(law) => {
+                        let found = law.step_force(&touch.step, &u, &s);
+                        counts.friction += u64::from(found.force != Vec3::zeros() && law.friction > 0.0);
+                        found
+                    }
+                    Law::Element(gain) => {
+                        StepForce { force: gain * (u - touch.guessed[0]), by_velocity: *gain, ..StepForce::default() }
+                    }
+                };
+            }
+            if iteration > 0 {
+                // Work of the missing forces on the velocities that they would cause.
+                self.right.clear();
+                self.right.extend(self.touches.iter().map(|touch| touch.found.force - touch.force));
+                let missing = |i: usize| self.right[i].dot(&self.velocities(i)[1]);
+                let now: f64 = (0..self.touches.len()).map(missing).sum();
+                if !(now <= merit) && cuts < CUTS {
+                    cuts += 1;
+                    part *= CUT;
+                    for touch in &mut self.touches {
+                        touch.force = touch.force_before + (touch.full_force - touch.force_before) * part;
+                        touch.added = [0, 1].map(|q| touch.before[q] + (touch.full[q] - touch.before[q]) * part);
+                    }
+                    continue;
+                }
+                (merit, cuts, part) = (now, 0, 1.0);
+            }
+            self.eliminate(half);
+            let mut change = 0.0_f64;
+            for i in 0..self.touches.len() {
+                let added = self.velocities(i).map(|velocity| velocity * half);
+                let touch = &mut self.touches[i];
+                (touch.before, touch.force_before) = (touch.added, touch.force);
+                (touch.added, touch.force) = (added, self.right[i]);
+                (touch.full, touch.full_force) = (added, self.right[i]);
+                let moved = [0, 1].map(|q| (added[q] - touch.before[q]).norm());
+                change = change.max(moved[0]).max(moved[1]);
+            }
+            if !change.is_finite() {
+                return false;
+            }
+            if change < still {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// W and S M^-1 S^T times the forces in `right`, for touch `i`.
+    fn velocities(&self, i: usize) -> [Vec3; 2] {
+        let band = &self.band;
+        let mut sum = [Vec3::zeros(); 2];
+        for j in band.row(i) {
+            let mobility = &self.mobility[band.at(i, j)];
+            sum[0] += mobility[0] * self.right[j];
+            sum[1] += mobility[1] * self.right[j];
+        }
+        sum
+    }
+
+    /// Forces of the next Newton iteration into `right`; `half` a step, s.
+    fn eliminate(&mut self, half: f64) {
+        let band = &self.band;
+        self.right.clear();
+        for (i, touch) in self.touches.iter().enumerate() {
+            let StepForce { by_velocity, by_slip, force, .. } = &touch.found;
+            for j in band.row(i) {
+                let unit = if i == j { Mat3::identity() } else { Mat3::zeros() };
+                let [centre, slip] = &self.mobility[band.at(i, j)];
+                self.blocks[band.at(i, j)] = unit - (by_velocity * centre + by_slip * slip) * half;
+            }
+            self.right.push(force - by_velocity * touch.added[0] - by_slip * touch.added[1]);
+        }
+        band.factor(&mut self.blocks);
+        band.solve(&self.blocks, &mut self.right);
+    }
+
+    /// Adds to the mean velocity what the contact forces add, over half a step `half`, s.
+    fn push(&mut self, half: f64) {
+        for touch in &self.touches {
+            let (first, end) = self.ranges[touch.row];
+            let weighted = self.weighted[touch.row].chunks_exact(3);
+            for (v, w) in self.mean[first..end].iter_mut().zip(weighted) {
+                *v += half * (w[0] * touch.force[0] + w[1] * touch.force[1] + w[2] * touch.force[2]);
+            }
+        }
+    }
+}
+
+/// Upper bounds on the effect of a force, 1/kg, and of a torque, 1/(kg m^2), between two points on their relative motion: joints can
+/// only lessen those of free bodies.
+fn ease(model: &Model, ends: &[Anchor; 2]) -> [f64; 2] {
+    let mut ease = [0.0; 2];
+    for end in ends {
+        let Some(body) = model.bodies.get(end.body).filter(|body| !body.driven_only) else {
+            continue;
+        };
+        let turns = body.inertia_inverse.norm();
+        ease[0] += 1.0 / body.mass + end.offset.norm_squared() * turns;
+        ease[1] += turns;
+    }
+    ease
+}
+
+/// Relative velocities of centres and of surfaces for the change of the mean velocity from `guess` to `mean`.
+fn moved_by(columns: &[Column], mean: &[f64], guess: &[f64]) -> [Vec3; 2] {
+    let mut moved = [Vec3::zeros(); 2];
+    for column in columns {
+        let change = mean[column.coordinate] - guess[column.coordinate];
+        moved[0] += column.centre * change;
+        moved[1] += column.surface * change;
+    }
+    moved
+}
+
+impl Mechanism {
+    /// Allocates the workspace of [`Evaluator::discrete_step`], so that steps do not allocate.
+    ///
+    /// # Errors
+    /// The contacts are coupled too widely.
+    pub fn prepare_discrete_gradient(&mut self) -> Result<(), MechanismError> {
+        if self.discrete.is_none() {
+            let (dimension, positions) = (self.dimension(), self.positions());
+            let within = self.equations.is_block_diagonal();
+            let motion = self.equations.motion();
+            let world = self.model.bodies.len();
+            let fixed = Anchor { body: world, offset: Vec3::zeros() };
+            let ends = |element: &Box<dyn SceneElement>| element.ends(motion).unwrap_or([fixed; 2]);
+            let elements: Vec<[Anchor; 2]> = self.elements.iter().map(ends).collect();
+            let discrete = DiscreteGradient::new(&self.model, dimension, positions, within, &elements)?;
+            self.discrete = Some(Box::new(discrete));
+        }
+        Ok(())
+    }
+
+    /// Upper bound on the effect of a force at ball joint `j` on its opening, 1/kg.
+    pub fn most_contact_mobility(&self, j: usize) -> f64 {
+        let joint = &self.model.joints[j];
+        ease(&self.model, &[joint.ball, joint.socket])[0]
+    }
+
+    /// n . W M^-1 W^T n of ball joint `j` in the latest step, 1/kg; `None` if it did not touch.
+    pub fn contact_mobility(&self, j: usize) -> Option<f64> {
+        let touches = &self.discrete.as_ref()?.touches;
+        let touch = touches.binary_search_by_key(&j, |touch| touch.row).ok()?;
+        Some(touches[touch].step.mobility)
+    }
+
+    /// Powers over the latest such step.
+    pub fn discrete_powers(&self) -> Powers {
+        self.discrete.as_ref().map_or_else(Powers::default, |discrete| discrete.powers)
+    }
+}
+
+impl Evaluator<'_> {
+    /// Takes the step `from`, with the state at its end in `y_end`, ideal joints not yet closed. Considers all loose joints if
+    /// `all`, otherwise those that the guessed motion brings near their walls. Returns whether the iteration converged.
+    pub fn discrete_step(&mut self, from: &StepStart<'_>, all: bool, y_end: &mut [f64]) -> bool {
+        let Some(mut discrete) = self.mechanism.discrete.take() else {
+            return false;
+        };
+        let converged = self.discrete_step_in(&mut discrete, from, all, y_end);
+        self.mechanism.discrete = Some(discrete);
+        converged
+    }
+
+    fn discrete_step_in(
+        &mut self,
+        discrete: &mut DiscreteGradient,
+        from: &StepStart<'_>,
+        all: bool,
+        y_end: &mut [f64],
+    ) -> bool {
+        let StepStart { t, h, y, k, .. } = *from;
+        let positions = self.positions();
+        self.mechanism.measure(t, y);
+        discrete.record_start(&self.mechanism.contacts, self.mechanism.motion());
+        for (i, guess) in discrete.guess.iter_mut().enumerate() {
+            *guess = y[positions + i] + 0.5 * h * k[positions + i];
+        }
+        for pass in 0..2 {
+            if pass > 0 {
+                let scale = &self.mechanism.scale()[positions..];
+                let moved = discrete.mean.iter().zip(&discrete.guess).zip(scale);
+                let moved = moved.map(|((mean, guess), scale)| (mean - guess).abs() / scale).fold(0.0, f64::max) * h;
+                if moved < FAR_OFF {
+                    break;
+                }
+                discrete.guess.copy_from_slice(&discrete.mean);
+            }
+            for (part, at) in [(1.0, &mut discrete.end), (0.5, &mut discrete.middle)] {
+                at.copy_from_slice(y);
+                at[positions..].copy_from_slice(&discrete.guess);
+                for (step, guess) in discrete.displacement.iter_mut().zip(&discrete.guess) {
+                    *step = part * h * guess;
+                }
+                self.mechanism.equations.displace(&self.mechanism.model, at, &discrete.displacement);
+            }
+            self.mechanism.measure(t + h, &discrete.end);
+            discrete.gather(&self.mechanism.model, &self.mechanism.contacts, from, all);
+            // Everything but the contacts, at the middle.
+            let touching = std::mem::replace(&mut self.touching, ActiveSet::Nothing);
+            self.derivative(t + 0.5 * h, &discrete.middle, &mut discrete.rate);
+            self.touching = touching;
+            for (i, mean) in discrete.mean.iter_mut().enumerate() {
+                *mean = y[positions + i] + 0.5 * h * discrete.rate[positions + i];
+            }
+            let Mechanism { model, equations, elements, .. } = &mut *self.mechanism;
+            let at = At { t: t + 0.5 * h, motion: equations.motion(), touching: ActiveSet::Nothing };
+            discrete.gather_elements(model, elements, &**equations, &at, h);
+            if !discrete.touches.is_empty() {
+                discrete.arrange(model, &**equations);
+                discrete.couple(model, &mut **equations);
+                if !discrete.solve(h, &mut self.counts) {
+                    return false;
+                }
+                discrete.push(0.5 * h);
+            }
+        }
+        y_end.copy_from_slice(y);
+        for (step, mean) in discrete.displacement.iter_mut().zip(&discrete.mean) {
+            *step = h * mean;
+        }
+        let Mechanism { model, equations, .. } = &*self.mechanism;
+        equations.displace(model, y_end, &discrete.displacement);
+        for (i, mean) in discrete.mean.iter().enumerate() {
+            y_end[positions + i] = 2.0 * mean - y[positions + i];
+        }
+        self.find_discrete_powers(discrete, from);
+        true
+    }
+
+    /// Powers over the step: of the contacts from the work of their forces, of everything else at the middle.
+    fn find_discrete_powers(&mut self, discrete: &mut DiscreteGradient, from: &StepStart<'_>) {
+        let mut powers = Powers::default();
+        if self.mechanism.sources.none {
+            discrete.powers = powers;
+            return;
+        }
+        let (t, h) = (from.t + 0.5 * from.h, from.h);
+        let Mechanism { model, equations, elements, sources, gravity, contacts, .. } = &mut *self.mechanism;
+        let positions = equations.positions(model);
+        for element in elements.iter() {
+            element.add_powers(t, equations.motion(), &mut powers);
+        }
+        for touch in &discrete.touches {
+            let Some((joint, _)) = touch.contact() else {
+                continue;
+            };
+            let [centres, surfaces] = moved_by(&discrete.columns[touch.row], &discrete.mean, &discrete.guess);
+            let (u, s) = (touch.guessed[0] + centres, touch.guessed[2] + surfaces);
+            let n = touch.found.normal;
+            let normal = -touch.force.dot(&n);
+            let end = (touch.step.start + u * h).norm() - touch.step.clearances[1];
+            let start = touch.step.start.norm() - touch.step.clearances[0];
+            let law = contacts.coefficients(joint);
+            let stored = law.elastic_energy(end) - law.elastic_energy(start);
+            powers.restitution += (normal * (end - start) - stored) / h;
+            powers.friction -= (touch.force + n * normal).dot(&s);
+            powers.clearance -= normal * (touch.step.clearances[1] - touch.step.clearances[0]) / h;
+        }
+        if !model.drives.is_empty() {
+            let (motion, wrench) = equations.loads();
+            for touch in &discrete.touches {
+                let Some((joint, law)) = touch.contact() else {
+                    continue;
+                };
+                let (joint, n) = (&model.joints[joint], touch.normal);
+                let [arm_ball, arm_socket] = joint.arms(motion);
+                let ball = &mut wrench[joint.ball.body];
+                ball.force += touch.force;
+                ball.torque += (arm_ball + n * law.ball_radius).cross(&touch.force);
+                let socket = &mut wrench[joint.socket.body];
+                socket.force -= touch.force;
+                socket.torque -= (arm_socket + n * (law.ball_radius + law.clearance)).cross(&touch.force);
+            }
+            let rates = &mut discrete.rate[positions..];
+            if equations.rows() > 0 {
+                // The reactions of the ideal joints to the contact forces, too.
+                equations.accelerate(model, gravity, t, &discrete.middle, rates);
+            } else {
+                for (i, rate) in rates.iter_mut().enumerate() {
+                    *rate = 2.0 / h * (discrete.mean[i] - from.y[positions + i]);
+                }
+            }
+            let all = !sources.forces_suffice;
+            powers.drive += equations.drive_power(model, gravity, &discrete.middle, rates, all);
+        }
+        self.mechanism.forget_evaluation();
+        discrete.powers = powers;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{NormalLaw, Parameters};
+    use crate::machine::{Attachment, BallJoint, Body, Formulation, Joint, JointStart, Machine, Quat};
+
+    /// A free joint that starts in this motion.
+    fn starting(position: Vec3, velocity: Vec3, angular_velocity: Vec3) -> Joint {
+        let start = JointStart::Pose { position, rotation: Quat::identity(), velocity, angular_velocity };
+        Joint { start, ..Joint::free(0) }
+    }
+
+    /// A ball of 0.1 kg in the middle of a socket fixed to the world, which moves along x at 0.08 m/s, without gravity.
+    fn ball(contact: Parameters) -> Machine {
+        let mut machine = Machine::default();
+        let body = Body::new("ball", 0.1, Mat3::identity() * 1e-4);
+        let body = machine.add_body(body, starting(Vec3::zeros(), Vec3::x() * 0.08, Vec3::zeros()));
+        let origin = Vec3::zeros();
+        let mut joint = BallJoint::new("S", Attachment::world(origin), Attachment::on(body, origin));
+        joint.contact = contact;
+        machine.ball_joints.push(joint);
+        machine
+    }
+
+    /// A mechanism at its start, stepped by hand.
+    struct Run {
+        mechanism: Mechanism,
+        t: f64,
+        y: Vec<f64>,
+        k: Vec<f64>,
+        memory: Vec<Memory>,
+        powers: Powers,
+    }
+
+    impl Run {
+        fn new(machine: &Machine) -> Self {
+            let mut mechanism = Mechanism::new(machine).expect("a machine");
+            let y = mechanism.start().expect("a start");
+            mechanism.prepare_discrete_gradient().expect("few contacts");
+            let memory = vec![Memory::default(); machine.ball_joints.len()];
+            Self { mechanism, t: 0.0, k: vec![0.0; y.len()], y, memory, powers: Powers::default() }
+        }
+
+        /// Takes a step of size `h`, s; contact states follow the penetrations.
+        fn step(&mut self, h: f64) {
+            let lasting = vec![false; self.memory.len()];
+            let from = StepStart { t: self.t, h, y: &self.y, k: &self.k, memory: &self.memory, lasting: &lasting };
+            let mut end = self.y.clone();
+            let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.memory));
+            assert!(evaluator.discrete_step(&from, false, &mut end), "converges");
+            let open = self.mechanism.project(self.t + h, &mut end);
+            assert!(open < 1e-9);
+            let positions = self.mechanism.positions();
+            for (k, (end, start)) in self.k.iter_mut().zip(end.iter().zip(&self.y)).skip(positions) {
+                *k = (end - start) / h;
+            }
+            self.powers.add(h, &self.mechanism.discrete_powers());
+            self.mechanism.measure(self.t, &self.y);
+            let before: Vec<f64> = self.mechanism.contacts.gaps().map(|gap| gap.separation.rate).collect();
+            (self.t, self.y) = (self.t + h, end);
+            self.mechanism.measure(self.t, &self.y);
+            for (j, memory) in self.memory.iter_mut().enumerate() {
+                let gap = &self.mechanism.contacts.gap(j).separation;
+                if gap.penetration <= 0.0 {
+                    *memory = Memory::default();
+                } else if !memory.active {
+                    *memory = Memory::begun(self.mechanism.contacts.coefficients(j), before[j].max(gap.rate));
+                }
+            }
+        }
+
+        fn energy(&mut self) -> f64 {
+            let mut rate = vec![0.0; self.y.len()];
+            self.mechanism.evaluator(ActiveSet::Immediate(&self.memory)).evaluate_fully(self.t, &self.y, &mut rate);
+            let (kinetic, potential) = self.mechanism.energies();
+            kinetic + potential + self.mechanism.elastic_energy(self.t)
+        }
+    }
+
+    /// Restitution of that ball's impact with `n` steps per Hertz time, averaged over the instant within a step at which it begins.
+    fn impact(contact: Parameters, n: f64) -> f64 {
+        const STARTS: u32 = 8;
+        let law = Coefficients::new(&contact, contact.clearance);
+        let speed = 0.08;
+        let depth = libm::pow(1.25 * 0.1 * speed * speed / law.stiffness, 0.4);
+        let h = 2.9432 * depth / speed / n;
+        let mut sum = 0.0;
+        for start in 0..STARTS {
+            let mut run = Run::new(&ball(contact));
+            run.step((contact.clearance - h * f64::from(start) / f64::from(STARTS)) / speed);
+            while run.y[7] > 0.0 || run.mechanism.contacts.gap(0).separation.penetration > 0.0 {
+                run.step(h);
+            }
+            sum -= run.y[7] / speed;
+        }
+        sum / f64::from(STARTS)
+    }
+
+    #[test]
+    fn an_undamped_ball_rebounds_with_its_speed_however_long_the_step() {
+        let elastic = Parameters { normal_law: NormalLaw::Hertz, ..Parameters::DEFAULT };
+        for n in [1.0, 2.0, 4.0, 8.0] {
+            let restitution = impact(elastic, n);
+            assert!((restitution - 1.0).abs() < 1e-4, "{n}: {restitution}");
+        }
+    }
+
+    #[test]
+    fn the_restitution_of_a_damped_ball_converges_to_that_of_its_law() {
+        let law = Coefficients::new(&Parameters::DEFAULT, Parameters::DEFAULT.clearance);
+        let exact = crate::contact::undisturbed_restitution(law.damping);
+        let error = |n: f64| (impact(Parameters::DEFAULT, n) - exact).abs();
+        let [four, eight, sixteen] = [4.0, 8.0, 16.0].map(error);
+        assert!(four < 1e-2 && eight < 3e-3 && sixteen < 1e-3, "{four} {eight} {sixteen} of {exact}");
+    }
+
+    /// Two free bodies without gravity that turn and knock at each other through a loose ball.
+    fn pair(formulation: Formulation) -> Machine {
+        let mut machine = Machine { formulation, ..Machine::default() };
+        let inertia = Mat3::from_diagonal(&Vec3::new(2e-4, 4e-4, 3e-4));
+        for (name, spin) in [("a", Vec3::new(3.0, -2.0, 4.0)), ("b", Vec3::new(-1.0, 5.0, 2.0))] {
+            let position = if name == "a" { Vec3::zeros() } else { Vec3::x() * 0.1 };
+            machine.add_body(Body::new(name, 0.2, inertia), starting(position, spin * 0.01, spin));
+        }
+        let at = Vec3::x() * 0.05;
+        let joint = BallJoint::new("S", Attachment::on(0, at), Attachment::on(1, -at));
+        machine.ball_joints.push(joint.with_clearance(0.1e-3));
+        machine
+    }
+
+    #[test]
+    fn contacts_keep_the_momentum_and_account_for_the_energy() {
+        for formulation in Formulation::ALL {
+            let mut run = Run::new(&pair(formulation));
+            let momentum = |run: &Run| run.mechanism.motion()[..2].iter().map(|m| m.velocity * 0.2).sum::<Vec3>();
+            let start = (run.energy(), momentum(&run));
+            for _ in 0..4000 {
+                run.step(1e-5);
+            }
+            let end = (run.energy(), momentum(&run));
+            assert!((end.1 - start.1).norm() < 1e-13, "{formulation}: {:e}", (end.1 - start.1).norm());
+            let lost = run.powers.restitution + run.powers.friction;
+            assert!(lost > 1e-4, "{formulation}: {lost:e}");
+            let residual = end.0 - start.0 + lost;
+            assert!(residual.abs() < 1e-3 * lost, "{formulation}: {residual:e} of {lost:e}");
+        }
+    }
+}
