@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench physics`; figures are only comparable within one run or on one machine, never absolute promises.
 
-use jointplay::contact::Memory;
+use jointplay::contact::ContactState;
 use jointplay::integrate::System;
 use jointplay::mechanism::{ActiveSet, Mechanism};
 use jointplay::scene::Scene;
@@ -33,7 +33,7 @@ fn evaluation(watch: &Stopwatch, label: &str, scene: &Scene, time: f64) {
     let y = simulation.state_vector().to_vec();
     let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
     let joints = 0..mechanism.contacts.len();
-    let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
+    let memory: Vec<_> = joints.map(|j| simulation.contact_state(j)).collect();
     let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
     let mut dy = vec![0.0; y.len()];
     let mut n = 0.0;
@@ -59,7 +59,7 @@ fn real_time(watch: &Stopwatch) {
         let scene = load("spcmm", &changes);
         let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(7e-3).expect("a built-in scene runs");
-        let start = simulation.snapshot();
+        let start = simulation.state().clone();
         watch.time(&format!("10 ms simulated (spcmm, over the first impacts)/{label}"), || {
             simulation.restore(&start);
             simulation.advance_to(17e-3).expect("a built-in scene runs");
@@ -73,8 +73,8 @@ fn snapshots(watch: &Stopwatch) {
         let scene = load(name, &[]);
         let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
         simulation.advance_to(0.02).expect("a built-in scene runs");
-        let snapshot = simulation.snapshot();
-        watch.time(&format!("snapshot/{name}: take"), || simulation.snapshot());
+        let snapshot = simulation.state().clone();
+        watch.time(&format!("snapshot/{name}: take"), || simulation.state().clone());
         watch.time(&format!("snapshot/{name}: restore"), || simulation.restore(black_box(&snapshot)));
     }
 }
@@ -91,7 +91,7 @@ fn spans(watch: &Stopwatch) {
             let scene = load("spcmm", &all);
             let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
             simulation.advance_to(from).expect("a built-in scene runs");
-            let start = simulation.snapshot();
+            let start = simulation.state().clone();
             watch.time_part(&format!("{name}/{label}"), || {
                 let mut simulation = Simulation::new(&scene.machine).expect("a built-in scene starts");
                 simulation.restore(&start);
@@ -114,7 +114,7 @@ fn chain(watch: &Stopwatch) {
         let y = simulation.state_vector().to_vec();
         let t = simulation.time();
         let mut mechanism = Mechanism::new(&scene.machine).expect("a built-in scene starts");
-        let memory = vec![Memory::default(); mechanism.contacts.len()];
+        let memory = vec![ContactState::default(); mechanism.contacts.len()];
         let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
         let mut dy = vec![0.0; y.len()];
         let name = format!("chain, one evaluation/{links}");

@@ -2,7 +2,7 @@
 
 use super::player::Player;
 use super::value;
-use crate::simulate::ContactState;
+use crate::simulate::ContactMode;
 use crate::units::format_quantity_digits;
 
 /// Least time between two reports without an event, s.
@@ -106,7 +106,7 @@ fn joints(player: &Player) -> Option<String> {
         return None;
     }
     if reports.len() > MOST_JOINTS {
-        let free = reports.iter().filter(|joint| joint.state == ContactState::Free);
+        let free = reports.iter().filter(|joint| joint.state == ContactMode::Free);
         let free = free.count();
         return Some(format!(
             "Of {} ball joints {free} are free and {} in contact.",
@@ -123,11 +123,11 @@ fn joints(player: &Player) -> Option<String> {
             let force = newtons(report.normal_force.norm());
             let name = &joint.name;
             match report.state {
-                ContactState::Free => format!("{name} free"),
-                ContactState::Ideal => format!("{name} ideal, {force}"),
+                ContactMode::Free => format!("{name} free"),
+                ContactMode::Ideal => format!("{name} ideal, {force}"),
                 _ if settled => format!("{name} settled, {force}"),
-                ContactState::Creep => format!("{name} in contact, creeping, {force}"),
-                ContactState::Slip => format!("{name} in contact, sliding, {force}"),
+                ContactMode::Creep => format!("{name} in contact, creeping, {force}"),
+                ContactMode::Slip => format!("{name} in contact, sliding, {force}"),
             }
         })
         .collect();

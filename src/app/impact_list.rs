@@ -9,7 +9,7 @@ use super::host::SaveFile;
 use super::player::Player;
 use super::{App, value};
 use crate::analysis::impact_row;
-use crate::simulate::{ContactState, Impact};
+use crate::simulate::{ContactMode, Impact};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;
@@ -217,7 +217,7 @@ impl App {
         let record = player.impact_record();
         // The impact of the followed ball joint, while that is in contact.
         let touches =
-            |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactState::Free);
+            |joint: &usize| player.frame().joints.get(*joint).is_some_and(|own| own.state != ContactMode::Free);
         let (number, own) = record.under_way(self.viewport.focus().filter(touches), shown)?;
         let report = player.frame().joints.get(own.joint)?;
         let begins = format!("Impact {number}, {}: {}", joint(player, own.joint), value::time(own.start));
@@ -230,7 +230,7 @@ impl App {
                 millimetres(impact.separation_speed)
             ),
             // A change may have removed the wall.
-            None if report.state == ContactState::Free => return None,
+            None if report.state == ContactMode::Free => return None,
             None => format!("{begins}, peak {peak}, stays in contact"),
         })
     }

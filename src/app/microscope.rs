@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::player::Player;
 use super::{App, layout, spoken, theme, value};
-use crate::simulate::ContactState;
+use crate::simulate::ContactMode;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
 use sight::Sight;
@@ -175,7 +175,7 @@ impl Microscope {
             draw::length(report.clearance, 3)
         );
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
-        if report.state == ContactState::Ideal || report.clearance <= 0.0 {
+        if report.state == ContactMode::Ideal || report.clearance <= 0.0 {
             draw::empty(ui, rect, "An ideal joint has no clearance and shows no play");
             return;
         }

@@ -7,7 +7,7 @@ use super::labels::{self, Places};
 pub(super) use super::labels::{SMALL, colour, has_room, text};
 use super::value;
 use crate::scene::Scene;
-use crate::simulate::{ContactState, Frame};
+use crate::simulate::{ContactMode, Frame};
 use crate::units::format_quantity_digits;
 use crate::view::{ARROW_LENGTH, DrawList, Legend, Palette, Scaling, Theme, ViewOptions, WearMap, WearScale};
 
@@ -145,11 +145,11 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
         .iter()
         .zip(&frame.joints)
         .map(|(joint, report)| match report.state {
-            ContactState::Free => format!("{}  free", joint.name),
-            ContactState::Ideal => {
+            ContactMode::Free => format!("{}  free", joint.name),
+            ContactMode::Ideal => {
                 format!("{}  reaction {}", joint.name, newtons(&report.normal_force))
             }
-            ContactState::Creep | ContactState::Slip => format!(
+            ContactMode::Creep | ContactMode::Slip => format!(
                 "{}  normal {}, friction {}",
                 joint.name,
                 newtons(&report.normal_force),

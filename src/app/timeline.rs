@@ -12,7 +12,7 @@ use super::player::contact_history::ContactHistory;
 use super::player::{Flag, Player};
 use super::zoom::{self, Zoom};
 use super::{spoken, theme, value};
-use crate::simulate::{ContactState, RECORDED_JOINTS};
+use crate::simulate::{ContactMode, RECORDED_JOINTS};
 
 /// Height of the row of flags, and total height of the lanes, points.
 const FLAGS: f32 = 9.0;
@@ -261,9 +261,9 @@ fn contact_lanes(ui: &Ui, contacts: &ContactHistory, scale: &Scale, between: (f6
         shares.fill(0.0);
         for (begins, ends, state) in contacts.states(joint, from, to) {
             let weight = match state {
-                ContactState::Free => continue,
-                ContactState::Slip => 0.5,
-                ContactState::Creep | ContactState::Ideal => 1.0,
+                ContactMode::Free => continue,
+                ContactMode::Slip => 0.5,
+                ContactMode::Creep | ContactMode::Ideal => 1.0,
             };
             let a = (begins.max(from) - scale.range.0) * per_second;
             let b = (ends.min(to) - scale.range.0) * per_second;
@@ -331,10 +331,10 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         let state = contacts.states(joint, time, time + SHORTEST).next();
         let words = match state {
             None => "not recorded",
-            Some((.., ContactState::Free)) => "free",
-            Some((.., ContactState::Slip)) => "sliding",
-            Some((.., ContactState::Creep)) => "creeping",
-            Some((.., ContactState::Ideal)) => "ideal",
+            Some((.., ContactMode::Free)) => "free",
+            Some((.., ContactMode::Slip)) => "sliding",
+            Some((.., ContactMode::Creep)) => "creeping",
+            Some((.., ContactMode::Ideal)) => "ideal",
         };
         ui.label(format!("{name}: {words}"));
     }

@@ -18,7 +18,7 @@ use super::{ghosts, keys, spoken, value, zoom};
 use crate::machine::Vec3 as Exact;
 use crate::render;
 use crate::session::link::CameraPose;
-use crate::simulate::{ContactState, Pull};
+use crate::simulate::{ContactMode, Pull};
 use crate::view::{
     Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions, WearMap,
     to_f32,
@@ -908,7 +908,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
                 ui.label(value::contact(joint.state));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
                 row(ui, "Friction force", joint.friction_force.norm(), "N");
-                if joint.state != ContactState::Ideal {
+                if joint.state != ContactMode::Ideal {
                     row(ui, "Eccentricity", joint.eccentricity.norm(), "mm");
                     row(ui, "Clearance", joint.clearance, "mm");
                     row(ui, "Indentation", joint.penetration.max(0.0), "um");

@@ -39,7 +39,7 @@ impl StateFile {
     /// truncates, because a longer run would not truncate it.
     pub fn watch(&mut self, simulation: &LiveScene, end: f64) {
         if self.saved.is_none() && simulation.is_cut_by(end) {
-            self.saved = Some(simulation.state_vector().clone());
+            self.saved = Some(simulation.state().clone());
         }
     }
 
@@ -50,7 +50,7 @@ impl StateFile {
     pub fn text(&self, simulation: &LiveScene) -> Result<String, Failure> {
         let saved = match &self.saved {
             Some(saved) => saved,
-            None => simulation.state_vector(),
+            None => simulation.state(),
         };
         let scene = simulation.pending();
         let mut meta = provenance::meta(scene);

@@ -6,7 +6,7 @@ use super::wgpu::naga;
 use super::{Image, Offscreen, RenderError, shaders};
 use crate::machine::Vec3 as Vec3d;
 use crate::scene::Scene;
-use crate::simulate::{ContactState, Frame, Simulation};
+use crate::simulate::{ContactMode, Frame, Simulation};
 use crate::view::{
     Camera, Colour, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, WearMap,
     WearScale, fixture, to_f32,
@@ -838,14 +838,14 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
         }
     }
     let mut device = offscreen();
-    let mut draw = |state: ContactState| {
+    let mut draw = |state: ContactMode| {
         let mut frame = touching.clone();
         frame.joints[0].state = state;
         let list = picture(&scene, &frame, &options, &best, false);
         device.render(&list).expect("a picture")
     };
-    let free = draw(ContactState::Free);
-    for state in [ContactState::Creep, ContactState::Slip] {
+    let free = draw(ContactMode::Free);
+    for state in [ContactMode::Creep, ContactMode::Slip] {
         let seen = differing(&draw(state), &free, 12);
         assert!(seen.len() > 60, "{state:?}: {} pixels", seen.len());
         // A ring: nothing at the point itself, and nothing far from it.
@@ -856,7 +856,7 @@ fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
             assert!((0.25 * radius..0.65 * radius).contains(&off), "{off} {radius}");
         }
     }
-    assert_eq!(draw(ContactState::Ideal), free);
+    assert_eq!(draw(ContactMode::Ideal), free);
 }
 
 #[test]

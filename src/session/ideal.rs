@@ -83,7 +83,7 @@ impl Ideal {
             let mut frame = Frame::default();
             simulation.sample(simulation.time(), &mut frame);
             Motion {
-                kept: vec![(simulation.time(), simulation.state_vector().clone())],
+                kept: vec![(simulation.time(), simulation.state().clone())],
                 simulation,
                 frame,
                 apart: APART,
@@ -191,7 +191,7 @@ impl Motion {
             });
             self.apart *= 2.0;
         }
-        self.kept.push((now, self.simulation.state_vector().clone()));
+        self.kept.push((now, self.simulation.state().clone()));
     }
 
     /// Restores the latest snapshot at or before `time`, s.

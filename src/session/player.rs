@@ -19,7 +19,7 @@ use crate::analysis::section::Schedule;
 use crate::machine::Warning;
 use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
 use crate::simulate::{
-    Channels, ContactState, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
+    Channels, ContactMode, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
     StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
@@ -1015,7 +1015,7 @@ impl Player {
         let time = self.simulation.time();
         self.simulation.sample(time, &mut next);
         let pairs = frame.joints.iter_mut().zip(&next.joints);
-        for (own, next) in pairs.filter(|(own, _)| own.state == ContactState::Free) {
+        for (own, next) in pairs.filter(|(own, _)| own.state == ContactMode::Free) {
             own.penetration += own.clearance - next.clearance;
             own.clearance = next.clearance;
         }

@@ -13,7 +13,7 @@
 use crate::analysis::drive::{NoPeriod, drive_period};
 use crate::machine::Vec3;
 use crate::scene::Scene;
-use crate::simulate::{ContactState, Frame, JointReport};
+use crate::simulate::{ContactMode, Frame, JointReport};
 
 /// Fraction of the period over which a driven scene is watched.
 const PART: f64 = 1.0 / 8.0;
@@ -90,7 +90,7 @@ impl Settling {
         if !least.is_finite() || frame.joints.len() != self.joints.len() {
             return;
         }
-        let free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactState::Free;
+        let free = |(play, now): (&Option<_>, &JointReport)| play.is_some() && now.state == ContactMode::Free;
         let driven = self.period.is_some();
         if driven && self.joints.iter().zip(&frame.joints).any(free) {
             self.past.clear();

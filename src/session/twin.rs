@@ -100,7 +100,7 @@ impl Twin {
         simulation.displace(&away);
         let mut twin = Self {
             begins: run.time(),
-            origin: simulation.state_vector().clone(),
+            origin: simulation.state().clone(),
             simulation,
             frame: Frame::default(),
             distances: Vec::with_capacity(KEPT),
@@ -131,7 +131,7 @@ impl Twin {
 
     /// Saves the present state.
     pub fn mark(&self) -> TwinMark {
-        TwinMark { begins: self.begins, state: self.simulation.state_vector().clone(), steps: self.steps }
+        TwinMark { begins: self.begins, state: self.simulation.state().clone(), steps: self.steps }
     }
 
     /// Goes back with `run`, which was just restored to the instant of `mark`. Without a mark of this twin it waits for its

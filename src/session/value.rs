@@ -1,16 +1,16 @@
 //! Values as text on the screen: words as in files and on the command line, typeset units.
 
 use crate::scene::{Kind, Scene, Value};
-use crate::simulate::ContactState;
+use crate::simulate::ContactMode;
 use crate::units::{format_quantity, format_quantity_digits};
 
 /// Description of a contact state.
-pub fn contact(state: ContactState) -> &'static str {
+pub fn contact(state: ContactMode) -> &'static str {
     match state {
-        ContactState::Free => "The ball touches nothing",
-        ContactState::Creep => "In contact, creeping",
-        ContactState::Slip => "In contact, sliding",
-        ContactState::Ideal => "Ideal joint: no clearance",
+        ContactMode::Free => "The ball touches nothing",
+        ContactMode::Creep => "In contact, creeping",
+        ContactMode::Slip => "In contact, sliding",
+        ContactMode::Ideal => "Ideal joint: no clearance",
     }
 }
 

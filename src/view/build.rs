@@ -23,7 +23,7 @@ use super::{
 };
 use crate::machine::{Element, ElementKind, Role};
 use crate::scene::{Scene, SignedAxis};
-use crate::simulate::{ContactState, ElementReport, Frame, JointReport};
+use crate::simulate::{ContactMode, ElementReport, Frame, JointReport};
 
 /// Precomputed view data of a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
@@ -519,7 +519,7 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
 
 /// Unit vector from a joint's ball to the contact point, and 1 while in contact.
 fn touch(report: &JointReport) -> [f32; 4] {
-    let touches = matches!(report.state, ContactState::Creep | ContactState::Slip);
+    let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
     let outwards = to_f32(&report.eccentricity).normalize_or_zero();
     outwards.extend(f32::from(u8::from(touches))).to_array()
 }

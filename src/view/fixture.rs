@@ -3,7 +3,7 @@
 use crate::contact;
 use crate::machine::{Attachment, BallJoint, Body, Geometry, Machine, Mat3, Output, Quat, Role, Shape, Vec3};
 use crate::scene::{MOST_PLOTS, Scene, SignedAxis, ViewSettings};
-use crate::simulate::{BodyMotion, ContactState, Frame, JointReport, Peak};
+use crate::simulate::{BodyMotion, ContactMode, Frame, JointReport, Peak};
 
 const BALL: f64 = 0.010;
 const CLEARANCE: f64 = 0.3e-3;
@@ -66,7 +66,7 @@ fn touching(socket_centre: Vec3, n: Vec3, normal: f64, friction: Vec3) -> JointR
         normal_force: -n * normal,
         friction_force: friction,
         contact_point: ball_centre + n * BALL,
-        state: ContactState::Slip,
+        state: ContactMode::Slip,
         ..Default::default()
     }
 }

@@ -4,7 +4,7 @@
 use eframe::egui::{Key, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, BUILT_IN_LESSONS};
-use jointplay::simulate::{ContactState, Simulation};
+use jointplay::simulate::{ContactMode, Simulation};
 
 use crate::impacts::peaks_of_run;
 use crate::lessons::{PHONE, play, present, press, says, taught};
@@ -56,12 +56,12 @@ impl Shown {
 
     fn is_free(&self, joint: usize) -> bool {
         let report = self.joint(joint);
-        report.state == ContactState::Free && report.normal_force.norm() == 0.0
+        report.state == ContactMode::Free && report.normal_force.norm() == 0.0
     }
 
     fn touches(&self, joint: usize) -> bool {
         let report = self.joint(joint);
-        report.state != ContactState::Free && report.penetration > 0.0 && report.normal_force.norm() > 0.0
+        report.state != ContactMode::Free && report.penetration > 0.0 && report.normal_force.norm() > 0.0
     }
 
     fn all_free(&self) -> bool {
@@ -212,7 +212,7 @@ const CLAIMS: &[Claim] = &[
         s.app().player().ideal().is_some() && error > 0.3e-3 && s.plots(&["Tip error by axis, mm"])
     }),
     ("clearance", 6, Begins, "A clearance of 0 makes the joints ideal", |s| {
-        s.joints().all(|joint| s.joint(joint).state == ContactState::Ideal)
+        s.joints().all(|joint| s.joint(joint).state == ContactMode::Ideal)
     }),
     ("clearance", 6, Ends, "each ball stays in the middle of its socket", |s| {
         s.joints().all(|joint| s.joint(joint).eccentricity.norm() < 1e-9)
@@ -309,7 +309,7 @@ const CLAIMS: &[Claim] = &[
     }),
     ("forces", 3, Begins, "The hump has a top at 871 N", |s| s.is_free(1) && s.strikes(1, 0.2e-3)),
     ("forces", 5, Ends, "The line that the needles hid is here alone", |s| {
-        s.joints().all(|joint| s.joint(joint).state == ContactState::Ideal)
+        s.joints().all(|joint| s.joint(joint).state == ContactMode::Ideal)
     }),
     ("twin", 1, Begins, "The violet ghost is a twin", |s| s.app().player().twin().is_some()),
     ("twin", 2, Begins, "The bench plots the distance of the twin against time", |s| bench(s)),
@@ -318,7 +318,7 @@ const CLAIMS: &[Claim] = &[
     ("twin", 5, Ends, "The drives lead both to the same place", |s| s.all_rest()),
     ("chaos", 1, Begins, "The joint at the slider has a clearance of 0.3 mm", |s| s.joint(1).clearance == 0.3e-3),
     ("chaos", 1, Begins, "The violet twin", |s| s.app().player().twin().is_some() && bench(s)),
-    ("chaos", 2, Begins, "Here the clearance is 0", |s| s.joint(0).state == ContactState::Ideal),
+    ("chaos", 2, Begins, "Here the clearance is 0", |s| s.joint(0).state == ContactMode::Ideal),
     ("chaos", 3, Ends, "The ball lies on its wall", |s| s.touches(1)),
     ("to-the-class", 1, Begins, "The machine stands at 9 ms, after the first impacts", |s| {
         let first = s.app().player().impact_record().until(s.time()).count();

@@ -8,7 +8,7 @@ use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::analysis::task::{Job, Message};
 use jointplay::app::{App, Event, Host, Link, Log, OpenedFile, Player, Replay, Running, SceneText, Verdict};
-use jointplay::simulate::{ContactState, Quantity};
+use jointplay::simulate::{ContactMode, Quantity};
 
 use crate::hands::{compare_window, fingers, fingers_down, give_graphics, lift, plain};
 use crate::page::Calls;
@@ -80,7 +80,7 @@ fn the_lanes_have_the_colours_of_the_states_that_were() {
     run_to(&mut harness, 20e-3);
     let player = harness.state().player();
     let touch = player.contact_history().touches(0, 0.0, 1.0).next().expect("strikes");
-    let until = player.contact_history().states(0, touch, 1.0).find(|state| state.2 == ContactState::Free);
+    let until = player.contact_history().states(0, touch, 1.0).find(|state| state.2 == ContactMode::Free);
     let until = until.expect("leaves again").0;
     let rect = strip(&harness);
     let lane = rect.height() / 3.0;

@@ -1,7 +1,7 @@
 //! Corners of the friction law are events: a step ends at each, and what slides is on the piece that it holds.
 
 use crate::common::{frame_now, simulation};
-use jointplay::contact::FrictionPiece;
+use jointplay::contact::FrictionBranch;
 
 #[test]
 fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
@@ -14,10 +14,10 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
             simulation.step().unwrap();
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
-                let memory = simulation.contact_memory(j);
-                assert!(memory.active && memory.friction_piece != FrictionPiece::Unsplit, "{method}");
+                let memory = simulation.contact_state(j);
+                assert!(memory.active && memory.friction_branch != FrictionBranch::Unfrozen, "{method}");
                 let c = simulation.mechanism().contacts.coefficients(j);
-                let beyond = c.beyond(memory.friction_piece, joint.slip_speed);
+                let beyond = c.beyond(memory.friction_branch, joint.slip_speed);
                 assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
             }
         }
@@ -43,7 +43,7 @@ fn a_largest_rate_is_found_wherever_in_a_step_it_lies() {
         let (mut largest, mut found) = (0.0_f64, Vec::new());
         while simulation.time() < 0.015 {
             simulation.step().unwrap();
-            let memory = simulation.contact_memory(0);
+            let memory = simulation.contact_state(0);
             if memory.active {
                 largest = memory.approach_speed;
             } else if largest > 0.0 {
@@ -78,10 +78,10 @@ fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
             simulation.step_until(end).unwrap();
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
-                let memory = simulation.contact_memory(j);
+                let memory = simulation.contact_state(j);
                 let c = simulation.mechanism().contacts.coefficients(j);
-                if memory.active && memory.friction_piece != FrictionPiece::Unsplit && joint.slip_speed > 0.0 {
-                    let beyond = c.beyond(memory.friction_piece, joint.slip_speed);
+                if memory.active && memory.friction_branch != FrictionBranch::Unfrozen && joint.slip_speed > 0.0 {
+                    let beyond = c.beyond(memory.friction_branch, joint.slip_speed);
                     assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::common::{frame_now, simulation};
 use jointplay::machine::Vec3;
-use jointplay::simulate::{ContactState, Frame, Simulation};
+use jointplay::simulate::{ContactMode, Frame, Simulation};
 
 const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e-5")];
 
@@ -10,7 +10,7 @@ const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e
 fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
     let joints = &simulation.machine().ball_joints;
     joints.iter().zip(&frame.joints).any(|(joint, report)| {
-        (joint.ball.body == Some(b) || joint.socket.body == Some(b)) && report.state != ContactState::Free
+        (joint.ball.body == Some(b) || joint.socket.body == Some(b)) && report.state != ContactMode::Free
     })
 }
 

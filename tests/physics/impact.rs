@@ -3,7 +3,7 @@
 use crate::common::{frame_now, parse};
 use jointplay::contact::{NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution};
 use jointplay::machine::Vec3;
-use jointplay::simulate::{ContactState, Frame, Simulation};
+use jointplay::simulate::{ContactMode, Frame, Simulation};
 
 const MASS: f64 = 0.5;
 const INERTIA: f64 = 2e-5;
@@ -89,7 +89,7 @@ fn rebound(speed: f64, changes: &[(&str, &str)]) -> (f64, Simulation) {
         assert!(simulation.time() < 1.0);
     }
     let frame = frame_now(&mut simulation);
-    assert_eq!(frame.joints[0].state, ContactState::Free);
+    assert_eq!(frame.joints[0].state, ContactMode::Free);
     (-frame.bodies[0].velocity.x / speed, simulation)
 }
 
@@ -146,7 +146,7 @@ fn slow_impacts_take_the_floor_and_rebound_higher() {
     while simulation.statistics().impacts[0] == 0 {
         simulation.step().unwrap();
     }
-    let memory = simulation.contact_memory(0);
+    let memory = simulation.contact_state(0);
     assert!(memory.active && memory.floored);
     assert_eq!(memory.approach_speed, 1e-3);
     let (slow, _) = rebound(4e-4, &[]);
@@ -156,7 +156,7 @@ fn slow_impacts_take_the_floor_and_rebound_higher() {
     while above.statistics().impacts[0] == 0 {
         above.step().unwrap();
     }
-    let memory = above.contact_memory(0);
+    let memory = above.contact_state(0);
     assert!(!memory.floored);
     assert!((memory.approach_speed - 0.1).abs() < 1e-12, "{memory:?}");
 }
@@ -178,11 +178,11 @@ fn pressed(velocity: Vec3, spin: Vec3, changes: &[(&str, &str)]) -> (Simulation,
 #[test]
 fn contacts_that_exist_at_the_start_take_the_floor() {
     let (simulation, frame) = pressed(Vec3::zeros(), Vec3::zeros(), &[]);
-    let memory = simulation.contact_memory(0);
+    let memory = simulation.contact_state(0);
     assert!(memory.active && memory.floored);
     assert_eq!(memory.approach_speed, 1e-3);
     assert_eq!(simulation.statistics().impacts[0], 1);
-    assert_eq!(frame.joints[0].state, ContactState::Creep);
+    assert_eq!(frame.joints[0].state, ContactMode::Creep);
     assert_eq!(frame.joints[0].friction_force, Vec3::zeros());
     assert!(frame.bodies[0].acceleration.norm() < 1e-6);
 }
@@ -201,7 +201,7 @@ fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
             let off = (joint.friction_force - expected).norm();
             assert!(off < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
             assert!((joint.slip_speed - speed).abs() < 1e-12);
-            let state = if speed < 1e-4 { ContactState::Creep } else { ContactState::Slip };
+            let state = if speed < 1e-4 { ContactMode::Creep } else { ContactMode::Slip };
             assert_eq!(joint.state, state);
             // Newton and Euler about the centroid, the force at r n.
             let body = &frame.bodies[0];

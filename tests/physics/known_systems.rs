@@ -282,7 +282,7 @@ impl<F: Fn(f64) -> f64 + Clone> Orbit for Circle<F> {
         self.0.step_until(end)
     }
     fn state(&self) -> &[f64] {
-        self.0.state_vector()
+        self.0.state()
     }
     fn scales(&self) -> &[f64] {
         self.0.scales()
@@ -417,7 +417,7 @@ fn the_same_section_comes_from_another_stepper() {
         stepper.attempt(&mut system, t, h, &y, &k, &mut end, &mut k_end);
         y = end;
     }
-    for (a, b) in adaptive.state_vector().iter().zip(&y) {
+    for (a, b) in adaptive.state().iter().zip(&y) {
         assert!((a - b).abs() < 1e-7, "{a} {b}");
     }
 }

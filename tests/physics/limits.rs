@@ -5,7 +5,7 @@ use jointplay::contact::{
     NormalLaw, Parameters, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
 };
 use jointplay::machine::Vec3;
-use jointplay::simulate::{ContactState, Frame, Simulation};
+use jointplay::simulate::{ContactMode, Frame, Simulation};
 
 /// Whether the page has this sentence, however its lines are broken.
 fn is_said(sentence: &str) {
@@ -44,7 +44,7 @@ fn a_ball_creeps_where_coulomb_would_hold_it() {
             on_the_wall(2.0 * DEGREE, "", &[&[("contact.friction_velocity", "centres")], changes].concat());
         run_until(&mut simulation, 1e-3);
         let frame = frame_now(&mut simulation);
-        assert_eq!(frame.joints[0].state, ContactState::Creep);
+        assert_eq!(frame.joints[0].state, ContactMode::Creep);
         (1e6 * frame.joints[0].slip_speed, simulation)
     };
     let (creep, mut simulation) = speed(&[]);

@@ -226,7 +226,7 @@ fn clearance_to_and_from_zero_waits_for_the_reset() {
     simulation.reset().unwrap();
     assert_eq!(simulation.mechanism().summary().ideal_joints, 1);
     let frame = frame_now(&mut simulation);
-    assert_eq!(frame.joints[0].state, jointplay::simulate::ContactState::Ideal);
+    assert_eq!(frame.joints[0].state, jointplay::simulate::ContactMode::Ideal);
     assert_eq!(simulation.conditions().joints[1].friction, 0.4);
     // And back.
     assert_eq!(simulation.set("joint.S1.clearance", "0.2 mm"), Ok(Effect::AtReset));

@@ -5,7 +5,7 @@ use super::independent::moves_the_same;
 use crate::common::{Changes, MACHINES, SCENES, frame_now, parse, run_until, scene, simulation};
 use jointplay::machine::{Machine, Mat3, Vec3};
 use jointplay::scene::{BUILT_IN, Value};
-use jointplay::simulate::{ContactState, Frame, Simulation};
+use jointplay::simulate::{ContactMode, Frame, Simulation};
 use std::f64::consts::{PI, TAU};
 
 const IDEAL: (&str, &str) = ("contact.clearance", "0");
@@ -35,7 +35,7 @@ fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Machine, &Frame
         simulation.advance_to(time).unwrap();
         simulation.sample(time, &mut frame);
         for joint in &frame.joints {
-            assert_eq!(joint.state, ContactState::Ideal, "{name}");
+            assert_eq!(joint.state, ContactMode::Ideal, "{name}");
             assert!(joint.eccentricity.norm() < 1e-9, "{name} at {time} s");
         }
         check(&machine, &frame);

@@ -2,7 +2,7 @@
 
 use crate::common::{frame_now, scene, simulation};
 use jointplay::mechanism::{Mechanism, Summary};
-use jointplay::simulate::ContactState;
+use jointplay::simulate::ContactMode;
 
 fn summary(name: &str, changes: &[(&str, &str)]) -> Summary {
     Mechanism::new(&scene(name, changes).machine).unwrap().summary()
@@ -22,7 +22,7 @@ fn rigid_scenes_evaluate_no_contact() {
             let frame = frame_now(&mut simulation);
             let evaluations = simulation.statistics().contact_evaluations;
             assert_eq!(evaluations, 0, "{name}, {form}");
-            assert!(frame.joints.iter().all(|j| j.state == ContactState::Ideal));
+            assert!(frame.joints.iter().all(|j| j.state == ContactMode::Ideal));
             let summary = simulation.mechanism().summary();
             assert_eq!((summary.contacts, summary.frictional_contacts), (0, 0));
             assert_eq!(summary.ideal_joints, simulation.machine().ball_joints.len());

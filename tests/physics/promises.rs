@@ -34,7 +34,7 @@ fn into_contact(simulation: &mut Simulation) -> u32 {
     }
     simulation.step().unwrap();
     let joints = 0..simulation.machine().ball_joints.len();
-    assert!(joints.into_iter().any(|j| simulation.contact_memory(j).active), "nothing touches");
+    assert!(joints.into_iter().any(|j| simulation.contact_state(j).active), "nothing touches");
     steps + 1
 }
 
@@ -87,7 +87,7 @@ fn keeps_its_promises(scene: &Scene, way: Way) -> u64 {
     let start = plain.state_hash();
     let steps = into_contact(&mut plain);
     let here = look(&mut plain);
-    let saved = serde_json::to_string(&plain.state_vector()).unwrap();
+    let saved = serde_json::to_string(&plain.state()).unwrap();
     change(&mut plain);
     let (mut peaks, mut again) = (Vec::new(), Vec::new());
     let snapshot = plain.snapshot();

@@ -108,7 +108,7 @@ fn first_impacts_have_the_anchors_speeds_and_peaks() {
             if let Some(at) = open[j] {
                 found[at].3 = found[at].3.max(peaks[j].normal);
             }
-            if !simulation.contact_memory(j).active {
+            if !simulation.contact_state(j).active {
                 open[j] = None;
             }
         }

@@ -149,7 +149,7 @@ fn methods_agree_about_the_first_impacts() {
 fn a_live_change_disturbs_an_impact_or_ends_it() {
     let until_touching = || {
         let mut simulation = live("pendulum", &[]);
-        while !simulation.contact_memory(0).active {
+        while !simulation.contact_state(0).active {
             simulation.step().unwrap();
         }
         for _ in 0..3 {
@@ -177,7 +177,7 @@ fn the_latest_are_kept_all_can_be_taken_and_snapshots_hold_them() {
     }
     let begun: u64 = simulation.statistics().impacts.iter().sum();
     let joints = simulation.machine().ball_joints.len();
-    let touching = (0..joints).filter(|&j| simulation.contact_memory(j).active);
+    let touching = (0..joints).filter(|&j| simulation.contact_state(j).active);
     assert_eq!(begun as usize, taken.len() + touching.count());
     let latest: Vec<Impact> = simulation.impacts().copied().collect();
     assert_eq!(latest.len(), 64);
@@ -219,7 +219,7 @@ fn struck(method: &str, approach_speed: &str) -> LiveScene {
         ("solver.tolerance", "1e-9"),
     ];
     let mut simulation = LiveScene::new(&parse(&text.replace(start, touching), &changes)).unwrap();
-    while !simulation.contact_memory(0).active {
+    while !simulation.contact_state(0).active {
         simulation.step().unwrap();
     }
     simulation.set("gravity.z", "-981 m/s^2").unwrap();

@@ -37,7 +37,7 @@ fn a_displaced_state_goes_on_from_where_it_was_put() {
 fn contacts_follow_the_displacement_and_keep_their_memory() {
     let mut simulation = simulation("spcmm", &[]);
     run_until(&mut simulation, 1.0);
-    let memory = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_memory(j));
+    let memory = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_state(j));
     let (settled, hash) = (memory(&simulation), simulation.state_hash());
     assert!(settled.iter().all(|m| m.active));
     let impacts = simulation.statistics().impacts.clone();

@@ -108,8 +108,8 @@ fn evaluation(setting: &Setting, scene: &Scene, loaded: f64, context: &mut RunCo
     // Starting it determines its rank.
     mechanism.start().map_err(jointplay_physics::simulate::StartError)?;
     let joints = 0..mechanism.contacts.len();
-    let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
-    let mut mechanism = mechanism.evaluator(ActiveSet::Located(&memory));
+    let contact_states: Vec<_> = joints.map(|j| simulation.contact_state(j)).collect();
+    let mut mechanism = mechanism.evaluator(ActiveSet::Located(&contact_states));
     let mut dy = vec![0.0; y.len()];
     let mut shortest = f64::INFINITY;
     let mut instant = 0.0;

@@ -171,7 +171,7 @@ impl Orbit for Simulation {
 
     /// True only while the same balls touch: otherwise one run is in an impact that the other has not reached or has left.
     fn comparable(&self, twin: &Self) -> bool {
-        (0..self.machine().ball_joints.len()).all(|j| self.contact_memory(j).active == twin.contact_memory(j).active)
+        (0..self.machine().ball_joints.len()).all(|j| self.contact_state(j).active == twin.contact_state(j).active)
     }
 
     fn observables(&self) -> usize {

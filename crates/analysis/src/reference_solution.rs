@@ -429,7 +429,7 @@ fn first_contacts(
     if scene.machine.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
         return Ok((Vec::new(), 0));
     }
-    let begun_before = |j: &usize| simulation.contact_memory(*j).active;
+    let begun_before = |j: &usize| simulation.contact_state(*j).active;
     let mut contacts: Vec<Contact> =
         (0..joints).filter(begun_before).map(|joint| Contact { joint, begin: 0.0, end: None }).collect();
     let mut peaks: Vec<Peak> = Vec::new();
@@ -440,7 +440,7 @@ fn first_contacts(
         simulation.take_peaks(&mut peaks);
         for (joint, peak) in peaks.iter().enumerate() {
             let open = contacts.iter_mut().rfind(|c| c.joint == joint && c.end.is_none());
-            let active = simulation.contact_memory(joint).active;
+            let active = simulation.contact_state(joint).active;
             if let Some(contact) = open
                 && (!active || peak.impacts > 0)
             {
@@ -478,7 +478,7 @@ fn settled_state(scene: &Scene, context: &mut RunContext) -> Result<Option<Simul
     let budget = WorkBudget { seconds: f64::INFINITY, ..WorkBudget::FULL };
     advance_capped(&mut simulation, SETTLED_WITHIN, &budget, context, |simulation| {
         simulation.take_peaks(&mut peaks);
-        let open = |&j: &usize| !simulation.contact_memory(j).active || peaks[j].impacts > 0;
+        let open = |&j: &usize| !simulation.contact_state(j).active || peaks[j].impacts > 0;
         if clearance.iter().any(open) {
             since = simulation.time();
         }

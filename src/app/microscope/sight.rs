@@ -4,7 +4,7 @@ use crate::app::paths::axes_of;
 use crate::app::player::Player;
 use crate::contact::Coefficients;
 use crate::machine::{Attachment, Mat3, Vec3};
-use crate::simulate::{ContactState, Frame, Impact, JointReport};
+use crate::simulate::{ContactMode, Frame, Impact, JointReport};
 
 /// Number of impacts covered by the path.
 pub const IMPACTS: usize = 6;
@@ -64,12 +64,12 @@ impl Sight {
         let spec = player.running().machine.ball_joints.get(joint)?;
         let report = *frame.joints.get(joint)?;
         let distance = report.eccentricity.norm();
-        let ideal = report.state == ContactState::Ideal;
+        let ideal = report.state == ContactMode::Ideal;
         let normal = (distance > 0.0 && !ideal).then(|| report.eccentricity / distance);
         let (ball, ball_spin) = velocity_of(frame, &spec.ball);
         let (socket, socket_spin) = velocity_of(frame, &spec.socket);
         let velocity = ball - socket;
-        let touches = matches!(report.state, ContactState::Creep | ContactState::Slip);
+        let touches = matches!(report.state, ContactMode::Creep | ContactMode::Slip);
         let sliding = normal.filter(|_| touches).map(|normal| {
             let law = Coefficients::new(&spec.contact, report.clearance);
             let gap = law.separation(&report.eccentricity, &velocity);

@@ -1,6 +1,6 @@
 //! Contact state of each ball joint over time: free, slip or creep.
 
-use crate::simulate::{ContactState, Frame};
+use crate::simulate::{ContactMode, Frame};
 
 /// Most state changes stored for all joints together; beyond that the older half is dropped.
 const KEPT: usize = 200_000;
@@ -9,7 +9,7 @@ const KEPT: usize = 200_000;
 #[derive(Clone, Debug, Default)]
 pub struct ContactHistory {
     /// By ball joint: start time, s, and state.
-    joints: Vec<Vec<(f64, ContactState)>>,
+    joints: Vec<Vec<(f64, ContactMode)>>,
     changes: usize,
     from: f64,
     to: f64,
@@ -74,7 +74,7 @@ impl ContactHistory {
     }
 
     /// The states of ball joint `joint` between two times, s: start, end, state.
-    pub fn states(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, ContactState)> {
+    pub fn states(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = (f64, f64, ContactMode)> {
         let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
         let first = states.partition_point(|(time, _)| *time <= from);
         let all = states[first.saturating_sub(1)..].iter().enumerate();
@@ -90,8 +90,8 @@ impl ContactHistory {
         let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
         let first = states.partition_point(|(time, _)| *time < from);
         let pairs = states[first.saturating_sub(1)..].windows(2);
-        let touches = |pair: &&[(f64, ContactState)]| {
-            pair[0].1 == ContactState::Free && matches!(pair[1].1, ContactState::Slip | ContactState::Creep)
+        let touches = |pair: &&[(f64, ContactMode)]| {
+            pair[0].1 == ContactMode::Free && matches!(pair[1].1, ContactMode::Slip | ContactMode::Creep)
         };
         pairs
             .filter(touches)
@@ -106,12 +106,12 @@ mod tests {
     use super::*;
     use crate::simulate::JointReport;
 
-    fn frame(time: f64, state: ContactState) -> Frame {
+    fn frame(time: f64, state: ContactMode) -> Frame {
         Frame { time, joints: vec![JointReport { state, ..JointReport::default() }], ..Frame::default() }
     }
 
     fn history() -> ContactHistory {
-        use ContactState::{Creep, Free, Slip};
+        use ContactMode::{Creep, Free, Slip};
         let mut history = ContactHistory::default();
         history.begin(0.0);
         let states = [Free, Free, Slip, Creep, Free, Slip, Slip];
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn states_follow_one_another_without_gaps() {
-        use ContactState::{Creep, Free, Slip};
+        use ContactMode::{Creep, Free, Slip};
         let history = history();
         let all: Vec<_> = history.states(0, 0.0, 9.0).collect();
         let expected = [(0.0, 2.0, Free), (2.0, 3.0, Slip), (3.0, 4.0, Creep), (4.0, 5.0, Free), (5.0, 6.0, Slip)];
@@ -139,12 +139,12 @@ mod tests {
         for _ in 0..2 {
             let touches: Vec<f64> = history.touches(0, 0.0, 9.0).collect();
             assert_eq!(touches, [2.0, 5.0]);
-            history.record(&frame(1.0, ContactState::Creep));
+            history.record(&frame(1.0, ContactMode::Creep));
         }
         history.cut(2.5);
         assert_eq!(history.touches(0, 2.1, 9.0).next(), None);
-        history.record(&frame(3.0, ContactState::Free));
-        history.record(&frame(4.0, ContactState::Creep));
+        history.record(&frame(3.0, ContactMode::Free));
+        history.record(&frame(4.0, ContactMode::Creep));
         assert_eq!(history.touches(0, 2.1, 9.0).next(), Some(4.0));
     }
 
@@ -153,7 +153,7 @@ mod tests {
         let mut history = ContactHistory::default();
         history.begin(0.0);
         for index in 0..=KEPT + 10 {
-            let state = if index % 2 == 0 { ContactState::Free } else { ContactState::Slip };
+            let state = if index % 2 == 0 { ContactMode::Free } else { ContactMode::Slip };
             history.record(&frame(index as f64, state));
         }
         let from = history.known_from();

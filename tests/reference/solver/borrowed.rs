@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use jointplay::contact::Memory;
+use jointplay::contact::ContactState;
 use jointplay::integrate::System;
 use jointplay::mechanism::{Mechanism, ActiveSet};
 use jointplay::scene::Scene;
@@ -12,7 +12,7 @@ use crate::integrate::Equations;
 /// The program's equations under another's solver.
 pub struct Borrowed {
     mechanism: RefCell<Mechanism>,
-    memory: RefCell<Vec<Memory>>,
+    memory: RefCell<Vec<ContactState>>,
     speed_floor: f64,
 }
 
@@ -20,7 +20,7 @@ impl Borrowed {
     pub fn new(scene: &Scene) -> Self {
         Self {
             mechanism: RefCell::new(Mechanism::new(&scene.machine).unwrap()),
-            memory: RefCell::new(vec![Memory::default(); scene.machine.ball_joints.len()]),
+            memory: RefCell::new(vec![ContactState::default(); scene.machine.ball_joints.len()]),
             speed_floor: scene.machine.contact.impact_speed_floor,
         }
     }
@@ -58,11 +58,11 @@ impl Equations for Borrowed {
 
     fn remember(&self, contacts: &[Option<f64>]) {
         for (memory, speed) in self.memory.borrow_mut().iter_mut().zip(contacts) {
-            *memory = Memory {
+            *memory = ContactState {
                 active: speed.is_some(),
                 approach_speed: speed.unwrap_or(0.0),
                 floored: false,
-                ..Memory::default()
+                ..ContactState::default()
             };
         }
     }

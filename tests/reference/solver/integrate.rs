@@ -6,7 +6,7 @@ use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverSto
 type M = NalgebraMat<f64>;
 type Lu = NalgebraLU<f64>;
 
-/// A scene as an independent solver needs it: derivative and penetrations for a contact memory that it is told.
+/// A scene as an independent solver needs it: derivative and penetrations for contact states that it is told.
 pub trait Equations {
     fn start(&self) -> Vec<f64>;
     fn derivative(&self, t: f64, y: &[f64], dy: &mut [f64]);

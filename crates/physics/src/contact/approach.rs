@@ -10,10 +10,10 @@ use super::Coefficients;
 
 /// Active branch of the approach-speed rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ApproachPiece {
+pub enum ApproachBranch {
     /// The full rule: for `approach_speed = "start"`, and for steppers that do not locate corners.
     #[default]
-    Unsplit,
+    Unfrozen,
     /// The rate is below its maximum so far, which is the approach speed.
     Held,
     /// The rate is the largest so far: the term is chi.
@@ -29,31 +29,31 @@ impl Coefficients {
 
     /// Approach speed, m/s, for a stored value `remembered` (m/s) and the penetration rate `rate` (m/s).
     #[inline]
-    pub(super) fn approach(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> f64 {
+    pub(super) fn approach(&self, pace: ApproachBranch, remembered: f64, rate: f64) -> f64 {
         match pace {
-            ApproachPiece::Unsplit if self.largest => remembered.max(rate),
-            ApproachPiece::Unsplit | ApproachPiece::Held => remembered,
-            ApproachPiece::Rising => self.floored(rate),
+            ApproachBranch::Unfrozen if self.largest => remembered.max(rate),
+            ApproachBranch::Unfrozen | ApproachBranch::Held => remembered,
+            ApproachBranch::Rising => self.floored(rate),
         }
     }
 
     /// Whether that speed is the rate itself, so that the damping term does not depend on it.
-    pub(super) fn approach_follows(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> bool {
+    pub(super) fn approach_follows(&self, pace: ApproachBranch, remembered: f64, rate: f64) -> bool {
         match pace {
-            ApproachPiece::Unsplit => self.largest && rate > remembered,
-            ApproachPiece::Held => false,
-            ApproachPiece::Rising => rate > self.speed_floor,
+            ApproachBranch::Unfrozen => self.largest && rate > remembered,
+            ApproachBranch::Held => false,
+            ApproachBranch::Rising => rate > self.speed_floor,
         }
     }
 
     /// Active branch for a stored approach speed `remembered` and the penetration rate `rate`, m/s.
-    pub(super) fn approach_piece_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
+    pub(super) fn approach_branch_at(&self, remembered: f64, rate: f64) -> ApproachBranch {
         if !self.largest {
-            ApproachPiece::Unsplit
+            ApproachBranch::Unfrozen
         } else if rate >= remembered {
-            ApproachPiece::Rising
+            ApproachBranch::Rising
         } else {
-            ApproachPiece::Held
+            ApproachBranch::Held
         }
     }
 }
@@ -64,21 +64,21 @@ mod tests {
     use crate::contact::{ApproachSpeed, Parameters};
 
     #[test]
-    fn pieces_are_the_rule_and_damping_stays_below_chi() {
+    fn branches_are_the_rule_and_damping_stays_below_chi() {
         let parameters = Parameters { approach_speed: ApproachSpeed::Largest, ..Parameters::default() };
         let c = Coefficients::new(&parameters, 3e-4);
         let remembered = 0.05;
         for rate in [-0.2, 0.0, 0.01, 0.05, 0.0501, 0.4] {
-            let whole = c.approach(ApproachPiece::Unsplit, remembered, rate);
-            let piece = c.approach_piece_at(remembered, rate);
-            assert_eq!(c.approach(piece, remembered, rate), whole, "{rate}");
+            let whole = c.approach(ApproachBranch::Unfrozen, remembered, rate);
+            let branch = c.approach_branch_at(remembered, rate);
+            assert_eq!(c.approach(branch, remembered, rate), whole, "{rate}");
             assert!(c.damping * rate / whole <= c.damping * (1.0 + 1e-15));
             let elastic = c.stiffness * libm::pow(1e-6, 1.5);
             let force = c.normal_force(1e-6, rate, whole);
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }
         let start = Coefficients::new(&Parameters::default(), 3e-4);
-        assert_eq!(start.approach_piece_at(remembered, 0.4), ApproachPiece::Unsplit);
-        assert_eq!(start.approach(ApproachPiece::Unsplit, remembered, 0.4), remembered);
+        assert_eq!(start.approach_branch_at(remembered, 0.4), ApproachBranch::Unfrozen);
+        assert_eq!(start.approach(ApproachBranch::Unfrozen, remembered, 0.4), remembered);
     }
 }

@@ -4,7 +4,7 @@
 //! With F_el = (U(d1) - U(d0)) / (d1 - d0), U = 2/5 K delta^2.5, the elastic work over the step is the change of U exactly, whatever
 //! the step, and a contact that begins or ends within the step is in U (Gonzalez 1996; McLachlan, Quispel & Robidoux 1999).
 
-use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Vec3};
+use super::{Coefficients, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// h omega beyond which the ringing of a ball at rest on its wall is damped instead of followed.
 const RESOLVED: f64 = 1.5;
@@ -96,7 +96,7 @@ impl Coefficients {
             // At the end: a mean that follows a parabola from the start.
             let sliding = tangent * (slip * 2.0 - step.slip) * share;
             let speed = sliding.norm();
-            let per_speed = self.friction_per_speed(FrictionPiece::Unsplit, speed);
+            let per_speed = self.friction_per_speed(FrictionBranch::Unfrozen, speed);
             direction -= sliding * per_speed;
             // Secants where friction is full, so that a correction stops the sliding but cannot reverse it; below the dead band
             // the slope of the ramp.

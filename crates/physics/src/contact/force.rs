@@ -1,7 +1,7 @@
 //! The force between a ball and its socket wall, and its derivatives with respect to displacement and velocity. Every contact
 //! force and derivative is computed here.
 
-use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Memory, Vec3};
+use super::{Coefficients, ContactState, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
 /// Position and motion of a ball in its socket.
 #[derive(Clone, Copy, Debug, Default)]
@@ -133,8 +133,8 @@ impl Coefficients {
 
     /// Force on a ball in contact; `read` returns the velocity used by friction and is called only if there is friction.
     #[inline]
-    pub fn force(&self, memory: &Memory, gap: &Separation, read: impl FnOnce() -> Vec3) -> Force {
-        let approach = memory.approach(self, gap.rate);
+    pub fn force(&self, contact_state: &ContactState, gap: &Separation, read: impl FnOnce() -> Vec3) -> Force {
+        let approach = contact_state.approach(self, gap.rate);
         let mut force = Force {
             normal: self.normal_force(gap.penetration, gap.rate, approach),
             friction: Vec3::zeros(),
@@ -143,7 +143,7 @@ impl Coefficients {
         if force.normal > 0.0 && self.friction > 0.0 {
             let sliding = self.sliding(gap, &read());
             force.slip_speed = sliding.norm();
-            let per_speed = self.friction_per_speed(memory.friction_piece, force.slip_speed);
+            let per_speed = self.friction_per_speed(contact_state.friction_branch, force.slip_speed);
             if per_speed != 0.0 {
                 force.friction = sliding * (-per_speed * force.normal);
             }
@@ -154,7 +154,7 @@ impl Coefficients {
     /// Derivatives of `force` (the result of [`Self::force`], > 0) at the fixed friction velocity `read`.
     pub fn linearise(
         &self,
-        memory: &Memory,
+        contact_state: &ContactState,
         gap: &Separation,
         velocity: &Vec3,
         read: &Vec3,
@@ -162,12 +162,12 @@ impl Coefficients {
         slope: Slope,
     ) -> Stiffness {
         let Separation { distance, normal: n, penetration, rate } = *gap;
-        let approach = memory.approach(self, rate);
+        let approach = contact_state.approach(self, rate);
         let tangent = Mat3::identity() - n * n.transpose();
         let turning = tangent / distance;
         let root = penetration.sqrt();
         let by_penetration = 1.5 * self.stiffness * root * (1.0 + self.damping * rate / approach);
-        let by_rate = if memory.follows(self, rate) {
+        let by_rate = if contact_state.follows(self, rate) {
             0.0
         } else {
             self.stiffness * penetration * root * self.damping / approach
@@ -179,13 +179,13 @@ impl Coefficients {
         let mut by_clearance = Vec3::zeros();
         if self.friction > 0.0 {
             let speed = force.slip_speed;
-            let per_speed = self.friction_per_speed(memory.friction_piece, speed);
+            let per_speed = self.friction_per_speed(contact_state.friction_branch, speed);
             let sliding = self.sliding(gap, read);
             along -= sliding * per_speed;
             // dF/dv_t
             let mut resistance = Mat3::identity() * (-per_speed * force.normal);
             if speed > 0.0 && !(slope == Slope::Secant && speed >= self.slip_high) {
-                let slope = self.friction_per_speed_slope(memory.friction_piece, speed) / speed;
+                let slope = self.friction_per_speed_slope(contact_state.friction_branch, speed) / speed;
                 resistance -= sliding * sliding.transpose() * (slope * force.normal);
             }
             // v_t = s (1 - n n') w, and the tangent plane turns with n: dv_t = -s ((n . w) dn + n (w . dn)).
@@ -214,12 +214,12 @@ impl Coefficients {
 
     /// Whether a contact may have left its frozen branches of the laws: the step is then searched for corners.
     #[inline]
-    pub fn leaves_piece(&self, memory: &Memory, gap: &Separation, force: &Force) -> bool {
-        memory.may_turn(gap.rate)
+    pub fn leaves_branch(&self, contact_state: &ContactState, gap: &Separation, force: &Force) -> bool {
+        contact_state.may_turn(gap.rate)
             || (force.normal > 0.0
                 && self.friction > 0.0
-                && memory.friction_piece != FrictionPiece::Unsplit
-                && self.beyond(memory.friction_piece, force.slip_speed) > 0.0)
+                && contact_state.friction_branch != FrictionBranch::Unfrozen
+                && self.beyond(contact_state.friction_branch, force.slip_speed) > 0.0)
     }
 
     /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
@@ -254,7 +254,7 @@ impl Coefficients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{ApproachPiece, Parameters};
+    use crate::contact::{ApproachBranch, Parameters};
 
     const VELOCITIES: [FrictionVelocity; 3] =
         [FrictionVelocity::Centres, FrictionVelocity::Surface, FrictionVelocity::Printed];
@@ -269,18 +269,24 @@ mod tests {
         (c, n * (3e-4 + 2e-6), n * 5e-3 + t * speed)
     }
 
-    fn memory(slip: FrictionPiece, pace: ApproachPiece) -> Memory {
-        Memory { active: true, approach_speed: 4e-3, friction_piece: slip, approach_piece: pace, ..Memory::default() }
+    fn contact_state(slip: FrictionBranch, pace: ApproachBranch) -> ContactState {
+        ContactState {
+            active: true,
+            approach_speed: 4e-3,
+            friction_branch: slip,
+            approach_branch: pace,
+            ..ContactState::default()
+        }
     }
 
     const BALL: Vec3 = Vec3::new(0.3, -0.2, 0.5);
     const SOCKET: Vec3 = Vec3::new(-0.1, 0.4, 0.2);
 
     /// Force on the ball.
-    fn on_ball(c: &Coefficients, memory: &Memory, e: &Vec3, v: &Vec3) -> Vec3 {
+    fn on_ball(c: &Coefficients, contact_state: &ContactState, e: &Vec3, v: &Vec3) -> Vec3 {
         let at = c.separation(e, v);
         let read = || c.slip_velocity(&at.normal, v, &BALL, &SOCKET);
-        let force = c.force(memory, &at, read);
+        let force = c.force(contact_state, &at, read);
         at.normal * -force.normal + force.friction
     }
 
@@ -288,35 +294,35 @@ mod tests {
     fn derivatives_are_those_of_central_differences() {
         for friction_velocity in VELOCITIES {
             for (slip, speed) in
-                [(FrictionPiece::Ramp, 3e-5), (FrictionPiece::Full, 0.04), (FrictionPiece::Unsplit, 0.04)]
+                [(FrictionBranch::Ramp, 3e-5), (FrictionBranch::Full, 0.04), (FrictionBranch::Unfrozen, 0.04)]
             {
-                for pace in [ApproachPiece::Held, ApproachPiece::Rising] {
+                for pace in [ApproachBranch::Held, ApproachBranch::Rising] {
                     // The printed velocity is so much smaller that this branch takes a higher speed.
                     let speed = match friction_velocity {
                         FrictionVelocity::Printed => speed * 150.0,
                         _ => speed,
                     };
                     let (c, e, v) = pressed(friction_velocity, speed);
-                    let memory = memory(slip, pace);
+                    let contact_state = contact_state(slip, pace);
                     let at = c.separation(&e, &v);
                     let read = c.slip_velocity(&at.normal, &v, &BALL, &SOCKET);
-                    let force = c.force(&memory, &at, || read);
+                    let force = c.force(&contact_state, &at, || read);
                     assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
-                    let mut s = c.linearise(&memory, &at, &v, &read, &force, Slope::Tangent);
+                    let mut s = c.linearise(&contact_state, &at, &v, &read, &force, Slope::Tangent);
                     s.add_normal_rotation(&c.slip_velocity_by_normal(&BALL, &SOCKET));
                     let by_velocity = s.by_rate + s.by_slip;
                     for k in 0..3 {
                         let unit = Vec3::ith(k, 1.0);
                         let d = 1e-11;
-                        let difference = (on_ball(&c, &memory, &(e + unit * d), &v)
-                            - on_ball(&c, &memory, &(e - unit * d), &v))
+                        let difference = (on_ball(&c, &contact_state, &(e + unit * d), &v)
+                            - on_ball(&c, &contact_state, &(e - unit * d), &v))
                             / (2.0 * d);
                         let got: Vec3 = s.by_displacement.column(k).into();
                         let off = (got - difference).norm() / s.by_displacement.norm();
                         assert!(off < 1e-5, "{friction_velocity:?} {slip:?} {pace:?} e{k}: {off:e}");
                         let d = 1e-8 * speed;
-                        let difference = (on_ball(&c, &memory, &e, &(v + unit * d))
-                            - on_ball(&c, &memory, &e, &(v - unit * d)))
+                        let difference = (on_ball(&c, &contact_state, &e, &(v + unit * d))
+                            - on_ball(&c, &contact_state, &e, &(v - unit * d)))
                             / (2.0 * d);
                         let got: Vec3 = by_velocity.column(k).into();
                         let off = (got - difference).norm() / by_velocity.norm();
@@ -342,7 +348,7 @@ mod tests {
         let ends = c.slip_low * at.distance / at.penetration;
         for (part, vanishes) in [(0.999, true), (1.001, false)] {
             let slow = tangential.normalize() * (part * ends);
-            let force = c.force(&memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit), &at, || slow);
+            let force = c.force(&contact_state(FrictionBranch::Unfrozen, ApproachBranch::Unfrozen), &at, || slow);
             assert_eq!(force.friction == Vec3::zeros(), vanishes, "{part}");
         }
     }
@@ -350,10 +356,10 @@ mod tests {
     #[test]
     fn the_secant_of_full_friction_cannot_reverse_sliding() {
         let (c, e, v) = pressed(FrictionVelocity::Centres, 0.04);
-        let memory = memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit);
+        let contact_state = contact_state(FrictionBranch::Unfrozen, ApproachBranch::Unfrozen);
         let at = c.separation(&e, &v);
-        let force = c.force(&memory, &at, || v);
-        let s = c.linearise(&memory, &at, &v, &v, &force, Slope::Secant);
+        let force = c.force(&contact_state, &at, || v);
+        let s = c.linearise(&contact_state, &at, &v, &v, &force, Slope::Secant);
         let sliding = c.sliding(&at, &v);
         assert!((s.by_slip * sliding - force.friction).norm() < 1e-12 * force.friction.norm());
     }

@@ -4,18 +4,18 @@ mod approach;
 mod discrete;
 mod force;
 mod law;
-mod memory;
 mod slip;
+mod state;
 
-pub use approach::ApproachPiece;
+pub use approach::ApproachBranch;
 pub use discrete::{ContactStep, StepForce};
 pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, settled_half_period, settled_penetration,
     undisturbed_restitution,
 };
-pub use memory::Memory;
-pub use slip::FrictionPiece;
+pub use slip::FrictionBranch;
+pub use state::ContactState;
 
 use serde::{Deserialize, Serialize};
 

@@ -9,10 +9,10 @@ use super::Coefficients;
 
 /// Active branch of the friction law (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum FrictionPiece {
+pub enum FrictionBranch {
     /// The full law, corners included: for steppers that do not locate them.
     #[default]
-    Unsplit,
+    Unfrozen,
     /// Below v_a: no friction.
     DeadBand,
     /// Between v_a and v_theta: friction rises with the speed.
@@ -23,60 +23,60 @@ pub enum FrictionPiece {
 
 impl Coefficients {
     /// Branch at a sliding speed (m/s).
-    pub fn friction_piece_at(&self, speed: f64) -> FrictionPiece {
+    pub fn friction_branch_at(&self, speed: f64) -> FrictionBranch {
         if speed >= self.slip_high {
-            FrictionPiece::Full
+            FrictionBranch::Full
         } else if speed > self.slip_low || self.slip_low == 0.0 {
-            FrictionPiece::Ramp
+            FrictionBranch::Ramp
         } else {
-            FrictionPiece::DeadBand
+            FrictionBranch::DeadBand
         }
     }
 
     /// Distance of a sliding speed beyond the corners of the branch `slip`, m/s; negative inside.
-    pub fn beyond(&self, slip: FrictionPiece, speed: f64) -> f64 {
+    pub fn beyond(&self, slip: FrictionBranch, speed: f64) -> f64 {
         match slip {
-            FrictionPiece::Unsplit => f64::NEG_INFINITY,
-            FrictionPiece::DeadBand => speed - self.slip_low,
+            FrictionBranch::Unfrozen => f64::NEG_INFINITY,
+            FrictionBranch::DeadBand => speed - self.slip_low,
             // Without a dead band the ramp is smooth through zero speed.
-            FrictionPiece::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
-            FrictionPiece::Ramp => (speed - self.slip_high).max(self.slip_low - speed),
-            FrictionPiece::Full => self.slip_high - speed,
+            FrictionBranch::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
+            FrictionBranch::Ramp => (speed - self.slip_high).max(self.slip_low - speed),
+            FrictionBranch::Full => self.slip_high - speed,
         }
     }
 
     /// Friction force divided by normal force and sliding velocity, s/m, for a branch continued beyond its corners: twice
     /// continuously differentiable, even through zero velocity.
-    pub fn friction_per_speed(&self, slip: FrictionPiece, speed: f64) -> f64 {
+    pub fn friction_per_speed(&self, slip: FrictionBranch, speed: f64) -> f64 {
         match slip {
-            FrictionPiece::Unsplit => {
+            FrictionBranch::Unfrozen => {
                 let ratio = self.friction_ratio(speed);
                 if ratio > 0.0 { ratio / speed } else { 0.0 }
             }
-            FrictionPiece::DeadBand => 0.0,
-            FrictionPiece::Ramp => {
+            FrictionBranch::DeadBand => 0.0,
+            FrictionBranch::Ramp => {
                 let low = self.slip_low;
                 let start = if low > 0.0 { low * inverse(speed, low).0 } else { 0.0 };
                 self.friction / (self.slip_high - low) * (1.0 - start)
             }
-            FrictionPiece::Full => self.friction * inverse(speed, self.slip_high).0,
+            FrictionBranch::Full => self.friction * inverse(speed, self.slip_high).0,
         }
     }
 
     /// Derivative of [`Self::friction_per_speed`] with respect to the sliding speed, s^2/m^2.
-    pub fn friction_per_speed_slope(&self, slip: FrictionPiece, speed: f64) -> f64 {
+    pub fn friction_per_speed_slope(&self, slip: FrictionBranch, speed: f64) -> f64 {
         match slip {
-            FrictionPiece::Unsplit => {
+            FrictionBranch::Unfrozen => {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
                 if speed > 0.0 { (slope - ratio / speed) / speed } else { 0.0 }
             }
-            FrictionPiece::DeadBand => 0.0,
-            FrictionPiece::Ramp => {
+            FrictionBranch::DeadBand => 0.0,
+            FrictionBranch::Ramp => {
                 let low = self.slip_low;
                 let start = if low > 0.0 { low * inverse(speed, low).1 } else { 0.0 };
                 -self.friction / (self.slip_high - low) * start
             }
-            FrictionPiece::Full => self.friction * inverse(speed, self.slip_high).1,
+            FrictionBranch::Full => self.friction * inverse(speed, self.slip_high).1,
         }
     }
 }
@@ -103,18 +103,18 @@ mod tests {
     }
 
     #[test]
-    fn pieces_are_the_law_between_their_corners_and_meet_there() {
+    fn branches_are_the_law_between_their_corners_and_meet_there() {
         let c = coefficients();
         for speed in [1e-7, 1e-6, 2e-6, 5e-5, 9.99e-5, 1e-4, 3e-4, 1.0] {
-            let slip = c.friction_piece_at(speed);
+            let slip = c.friction_branch_at(speed);
             let got = c.friction_per_speed(slip, speed) * speed;
             let want = c.friction_ratio(speed);
             assert!((got - want).abs() < 1e-15, "{speed}: {got} {want}");
             assert!(c.beyond(slip, speed) <= 0.0, "{speed}");
         }
         for (below, above, corner) in [
-            (FrictionPiece::DeadBand, FrictionPiece::Ramp, c.slip_low),
-            (FrictionPiece::Ramp, FrictionPiece::Full, c.slip_high),
+            (FrictionBranch::DeadBand, FrictionBranch::Ramp, c.slip_low),
+            (FrictionBranch::Ramp, FrictionBranch::Full, c.slip_high),
         ] {
             let force = |slip| c.friction_per_speed(slip, corner) * corner;
             assert!((force(below) - force(above)).abs() < 1e-15);
@@ -123,9 +123,9 @@ mod tests {
     }
 
     #[test]
-    fn continued_pieces_are_smooth_and_their_slopes_are_right() {
+    fn continued_branches_are_smooth_and_their_slopes_are_right() {
         let c = coefficients();
-        for slip in [FrictionPiece::Ramp, FrictionPiece::Full] {
+        for slip in [FrictionBranch::Ramp, FrictionBranch::Full] {
             for n in 1..400 {
                 let speed = f64::from(n) * 0.5e-6;
                 let d = 1e-4 * speed;
@@ -143,8 +143,8 @@ mod tests {
     #[test]
     fn no_dead_band_leaves_a_ramp_that_is_smooth_through_rest() {
         let c = Coefficients { slip_low: 0.0, ..coefficients() };
-        assert_eq!(c.friction_piece_at(0.0), FrictionPiece::Ramp);
-        assert!(c.beyond(FrictionPiece::Ramp, 0.0) < 0.0);
-        assert!(c.friction_per_speed(FrictionPiece::Ramp, 0.0).is_finite());
+        assert_eq!(c.friction_branch_at(0.0), FrictionBranch::Ramp);
+        assert!(c.beyond(FrictionBranch::Ramp, 0.0) < 0.0);
+        assert!(c.friction_per_speed(FrictionBranch::Ramp, 0.0).is_finite());
     }
 }

@@ -18,7 +18,7 @@ use super::kinematics::Kinematics;
 use super::model::{Anchor, Model};
 use super::systems::Evaluator;
 use super::{Mechanism, MechanismError};
-use crate::contact::{Coefficients, ContactStep, Memory, StepForce};
+use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
 use crate::integrate::{Method, System as _};
 use crate::machine::{Mat3, Vec3};
 
@@ -157,7 +157,7 @@ pub struct StepStart<'a> {
     /// Mean rates of the step before.
     pub k: &'a [f64],
     /// Contact states.
-    pub memory: &'a [Memory],
+    pub contact_states: &'a [ContactState],
     /// Whether each contact has lasted beyond its first rebound: ringing that the step does not resolve is then damped.
     pub lasting: &'a [bool],
 }
@@ -260,14 +260,18 @@ impl DiscreteGradient {
                 continue;
             }
             let law = *contacts.coefficients(j);
-            let memory = &from.memory[j];
+            let contact_state = &from.contact_states[j];
             let step = ContactStep {
                 h: from.h,
                 start: start.eccentricity,
                 clearances: start.clearances,
                 slip: start.slip,
-                approach: if memory.active { memory.approach_speed } else { law.speed_floor.max(start.rate) },
-                lasting: memory.active && from.lasting[j],
+                approach: if contact_state.active {
+                    contact_state.approach_speed
+                } else {
+                    law.speed_floor.max(start.rate)
+                },
+                lasting: contact_state.active && from.lasting[j],
                 mobility: 0.0,
             };
             let mean = (end - start.eccentricity) / from.h;
@@ -728,7 +732,7 @@ mod tests {
         t: f64,
         y: Vec<f64>,
         k: Vec<f64>,
-        memory: Vec<Memory>,
+        contact_states: Vec<ContactState>,
         powers: Powers,
     }
 
@@ -737,16 +741,23 @@ mod tests {
             let mut mechanism = Mechanism::new(machine).expect("a machine");
             let y = mechanism.start().expect("a start");
             mechanism.prepare_discrete_gradient().expect("few contacts");
-            let memory = vec![Memory::default(); machine.ball_joints.len()];
-            Self { mechanism, t: 0.0, k: vec![0.0; y.len()], y, memory, powers: Powers::default() }
+            let contact_states = vec![ContactState::default(); machine.ball_joints.len()];
+            Self { mechanism, t: 0.0, k: vec![0.0; y.len()], y, contact_states, powers: Powers::default() }
         }
 
         /// Takes a step of size `h`, s; contact states follow the penetrations.
         fn step(&mut self, h: f64) {
-            let lasting = vec![false; self.memory.len()];
-            let from = StepStart { t: self.t, h, y: &self.y, k: &self.k, memory: &self.memory, lasting: &lasting };
+            let lasting = vec![false; self.contact_states.len()];
+            let from = StepStart {
+                t: self.t,
+                h,
+                y: &self.y,
+                k: &self.k,
+                contact_states: &self.contact_states,
+                lasting: &lasting,
+            };
             let mut end = self.y.clone();
-            let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.memory));
+            let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.contact_states));
             assert!(evaluator.discrete_step(&from, false, &mut end), "converges");
             let open = self.mechanism.project(self.t + h, &mut end);
             assert!(open < 1e-9);
@@ -759,19 +770,22 @@ mod tests {
             let before: Vec<f64> = self.mechanism.contacts.gaps().map(|gap| gap.separation.rate).collect();
             (self.t, self.y) = (self.t + h, end);
             self.mechanism.measure(self.t, &self.y);
-            for (j, memory) in self.memory.iter_mut().enumerate() {
+            for (j, contact_state) in self.contact_states.iter_mut().enumerate() {
                 let gap = &self.mechanism.contacts.gap(j).separation;
                 if gap.penetration <= 0.0 {
-                    *memory = Memory::default();
-                } else if !memory.active {
-                    *memory = Memory::begun(self.mechanism.contacts.coefficients(j), before[j].max(gap.rate));
+                    *contact_state = ContactState::default();
+                } else if !contact_state.active {
+                    *contact_state =
+                        ContactState::at_onset(self.mechanism.contacts.coefficients(j), before[j].max(gap.rate));
                 }
             }
         }
 
         fn energy(&mut self) -> f64 {
             let mut rate = vec![0.0; self.y.len()];
-            self.mechanism.evaluator(ActiveSet::Immediate(&self.memory)).evaluate_fully(self.t, &self.y, &mut rate);
+            self.mechanism
+                .evaluator(ActiveSet::Immediate(&self.contact_states))
+                .evaluate_fully(self.t, &self.y, &mut rate);
             let (kinetic, potential) = self.mechanism.energies();
             kinetic + potential + self.mechanism.elastic_energy(self.t)
         }

@@ -18,7 +18,7 @@ use super::elements::ActiveSet;
 use super::equations::Equations;
 use super::flight::ActiveRanges;
 use super::model::{BallJoint, Model};
-use crate::contact::{Coefficients, Memory, Slope};
+use crate::contact::{Coefficients, ContactState, Slope};
 use crate::integrate::{Method, add_scaled, copy, divide};
 use crate::machine::{Mat3, Vec3};
 
@@ -43,7 +43,7 @@ impl TreePart {
 struct Touch {
     joint: usize,
     law: Coefficients,
-    memory: Memory,
+    contact_state: ContactState,
     /// Eccentricity, m, its rate and the slip velocity, m/s.
     eccentricity: Vec3,
     rate: Vec3,
@@ -65,10 +65,10 @@ impl Touch {
         if at.penetration <= 0.0 {
             return;
         }
-        let force = self.law.force(&self.memory, &at, || self.read);
+        let force = self.law.force(&self.contact_state, &at, || self.read);
         if force.normal > 0.0 {
             let slope = Slope::Secant;
-            let of = self.law.linearise(&self.memory, &at, &self.rate, &self.read, &force, slope);
+            let of = self.law.linearise(&self.contact_state, &at, &self.rate, &self.read, &force, slope);
             self.resistance = of.by_slip;
         }
     }
@@ -201,7 +201,7 @@ impl Friction {
         let touch = |(joint, ranges): (usize, Vec<(usize, usize)>)| Touch {
             joint,
             law: *contacts.coefficients(joint),
-            memory: Memory::default(),
+            contact_state: ContactState::default(),
             eccentricity: Vec3::zeros(),
             rate: Vec3::zeros(),
             read: Vec3::zeros(),
@@ -229,8 +229,8 @@ impl Friction {
         self.active.clear();
         for (slot, touch) in self.touches.iter_mut().enumerate() {
             let contact = contacts.joint(touch.joint);
-            let memory = touching.memory(touch.joint);
-            let Some(memory) = memory.filter(|_| contact.law.friction > 0.0) else {
+            let contact_state = touching.contact_state(touch.joint);
+            let Some(contact_state) = contact_state.filter(|_| contact.law.friction > 0.0) else {
                 continue;
             };
             if contact.gap.eccentricity == Vec3::zeros() {
@@ -239,7 +239,7 @@ impl Friction {
             self.active.push(slot);
             let n = contact.direction();
             touch.law = contact.law;
-            touch.memory = *memory;
+            touch.contact_state = *contact_state;
             touch.eccentricity = contact.gap.eccentricity;
             touch.rate = contact.gap.eccentricity_rate;
             touch.read = contact.slip_velocity(&n, equations.motion());
@@ -345,7 +345,7 @@ impl Friction {
             if at.penetration <= 0.0 {
                 return 0.0;
             }
-            let force = touch.law.force(&touch.memory, &at, || touch.read);
+            let force = touch.law.force(&touch.contact_state, &at, || touch.read);
             let (stiffness, n) = (1.5 * force.normal / at.penetration, at.normal);
             stiffness * n.dot(&(self.mobility[self.band.at(i, i)] * n))
         };
@@ -393,7 +393,7 @@ fn reach_of(
 
 #[cfg(test)]
 mod tests {
-    use crate::contact::Memory;
+    use crate::contact::ContactState;
     use crate::integrate::{FrictionSystem, StiffSystem, System};
     use crate::mechanism::{ActiveSet, Mechanism};
     use crate::scene::Scene;
@@ -438,7 +438,7 @@ mod tests {
     }
 
     /// Derivative of dv/dt for velocities along `x`, by central differences.
-    fn along(scene: &Scene, memory: &[Memory], y: &[f64], x: &[f64]) -> Vec<f64> {
+    fn along(scene: &Scene, contact_states: &[ContactState], y: &[f64], x: &[f64]) -> Vec<f64> {
         let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         let positions = mechanism.positions();
         let width = 1e-9 / x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -447,7 +447,7 @@ mod tests {
             for (v, x) in moved[positions..].iter_mut().zip(x) {
                 *v += sign * width * x;
             }
-            mechanism.evaluator(ActiveSet::Located(memory)).derivative(0.0, &moved, &mut out);
+            mechanism.evaluator(ActiveSet::Located(contact_states)).derivative(0.0, &moved, &mut out);
             out.split_off(positions)
         };
         let (plus, minus) = (at(1.0), at(-1.0));
@@ -458,18 +458,19 @@ mod tests {
     #[test]
     fn a_hanging_chain_rings_as_its_links_are_pushed_back() {
         let (scene, y) = resting().swap_remove(0);
-        let memory = Memory { active: true, approach_speed: 1e-3, floored: true, ..Memory::default() };
-        let memory = vec![memory; scene.machine.ball_joints.len()];
+        let contact_state =
+            ContactState { active: true, approach_speed: 1e-3, floored: true, ..ContactState::default() };
+        let contact_state = vec![contact_state; scene.machine.ball_joints.len()];
         let mut mechanism = Mechanism::new(&scene.machine).unwrap();
         mechanism.prepare_friction().unwrap();
-        let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::Located(&contact_state));
         evaluator.friction_alone().linearise(0.0, &y);
         let ringing = mechanism.friction_ringing();
         // Closing acceleration of the lowest joint; the highest, on the world, is stiffer.
         let mut opening = |by: f64| {
             let (mut moved, mut out) = (y.clone(), vec![0.0; y.len()]);
             moved[7 * 2 + 2] -= by;
-            let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::Located(&contact_state));
             evaluator.evaluate_fully(0.0, &moved, &mut out);
             let joint = &mechanism.contacts.joint(2).joint;
             joint.opening_acceleration(mechanism.motion()).z
@@ -483,12 +484,13 @@ mod tests {
     fn it_solves_with_what_friction_alone_adds_to_the_derivative() {
         for (scene, y) in resting() {
             let name = &scene.name;
-            let memory = Memory { active: true, approach_speed: 1e-3, floored: true, ..Memory::default() };
-            let memory = vec![memory; scene.machine.ball_joints.len()];
+            let contact_state =
+                ContactState { active: true, approach_speed: 1e-3, floored: true, ..ContactState::default() };
+            let contact_state = vec![contact_state; scene.machine.ball_joints.len()];
             let mut mechanism = Mechanism::new(&scene.machine).unwrap();
             let positions = mechanism.positions();
             mechanism.prepare_friction().unwrap();
-            let mut evaluator = mechanism.evaluator(ActiveSet::Located(&memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::Located(&contact_state));
             let mut system = evaluator.friction_alone();
             system.linearise(0.0, &y);
             let shift = 4e4;
@@ -502,8 +504,8 @@ mod tests {
             for joint in &mut smooth.machine.ball_joints {
                 joint.contact.friction = 0.0;
             }
-            let with = along(&scene, &memory, &y, x_v);
-            let without = along(&smooth, &memory, &y, x_v);
+            let with = along(&scene, &contact_state, &y, x_v);
+            let without = along(&smooth, &contact_state, &y, x_v);
             let largest = b.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
             for k in 0..x_v.len() {
                 let left = shift * x_v[k] - (with[k] - without[k]);

@@ -14,7 +14,7 @@ use super::contacts::Contacts;
 use super::elements::{ActiveSet, Counts};
 use super::equations::Equations;
 use super::model::Model;
-use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
+use crate::contact::{ApproachBranch, Coefficients, ContactState, Slope};
 use crate::integrate::Method;
 use crate::machine::{Mat3, Vec3};
 
@@ -34,7 +34,7 @@ pub const TURNS: usize = 4;
 struct Touch {
     joint: usize,
     law: Coefficients,
-    memory: Memory,
+    contact_state: ContactState,
     /// Values without contact forces: eccentricity (m), its rate and the velocity used by friction (m/s).
     eccentricity: Vec3,
     rate: Vec3,
@@ -65,7 +65,7 @@ impl Touch {
             return;
         }
         self.normal = at.normal;
-        let force = self.law.force(&self.memory, &at, || {
+        let force = self.law.force(&self.contact_state, &at, || {
             counts.friction += 1;
             read
         });
@@ -73,7 +73,7 @@ impl Touch {
             return;
         }
         let slope = Slope::Secant;
-        let stiffness = self.law.linearise(&self.memory, &at, &rate, &read, &force, slope);
+        let stiffness = self.law.linearise(&self.contact_state, &at, &rate, &read, &force, slope);
         self.force = at.normal * -force.normal + force.friction;
         self.impedance = stiffness.by_displacement * h + stiffness.by_rate;
         self.resistance = stiffness.by_slip;
@@ -167,7 +167,7 @@ impl ImplicitContacts {
             if joint.ideal.is_some() || distance < NEAR * contacts.clearance(j) {
                 continue;
             }
-            let Some(&memory) = touching.memory(j) else {
+            let Some(&contact_state) = touching.contact_state(j) else {
                 continue;
             };
             near |= gap.separation.penetration > 0.0;
@@ -175,10 +175,13 @@ impl ImplicitContacts {
             self.touches.push(Touch {
                 joint: j,
                 law,
-                memory: if memory.active {
-                    memory
+                contact_state: if contact_state.active {
+                    contact_state
                 } else {
-                    Memory { approach_piece: ApproachPiece::Held, ..Memory::begun(&law, gap.separation.rate) }
+                    ContactState {
+                        approach_branch: ApproachBranch::Held,
+                        ..ContactState::at_onset(&law, gap.separation.rate)
+                    }
                 },
                 eccentricity: gap.eccentricity,
                 rate: gap.eccentricity_rate,

@@ -136,7 +136,7 @@ pub enum MechanismError {
         /// Maximum accepted.
         most: usize,
     },
-    /// Equations that exceed the limits on memory or time.
+    /// Equations that exceed the limits on contact_state or time.
     #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
     TooCostly {
         /// The task that is too costly.

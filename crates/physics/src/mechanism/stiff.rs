@@ -440,7 +440,7 @@ fn trees_of(model: &Model) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use crate::contact::Memory;
+    use crate::contact::ContactState;
     use crate::integrate::{StiffSystem, System};
     use crate::machine::Vec3;
     use crate::mechanism::{ActiveSet, Mechanism};
@@ -448,7 +448,7 @@ mod tests {
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
     /// `remembered` is the approach speed of each contact state, m/s.
-    fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [Memory; 3]) {
+    fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [ContactState; 3]) {
         let changes: Vec<(String, String)> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         let scene = Scene::load("spcmm", &changes).unwrap();
         let mut mechanism = Mechanism::new(&scene.machine).unwrap();
@@ -459,8 +459,9 @@ mod tests {
         for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
             y[v + i] += slip;
         }
-        let memory = Memory { active: true, approach_speed: remembered, floored: true, ..Memory::default() };
-        (mechanism, y, [memory; 3])
+        let contact_state =
+            ContactState { active: true, approach_speed: remembered, floored: true, ..ContactState::default() };
+        (mechanism, y, [contact_state; 3])
     }
 
     #[test]
@@ -474,12 +475,12 @@ mod tests {
             ("surface", "largest", 1e-9),
         ] {
             let changes = [("contact.friction_velocity", surface), ("contact.approach_speed", approach)];
-            let (mut m, y, memory) = resting(&changes, remembered);
+            let (mut m, y, contact_state) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
             m.measure(t, &y);
             let rises = m.contacts.gaps().all(|gap| gap.separation.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
-            let touching = ActiveSet::Located(&memory);
+            let touching = ActiveSet::Located(&contact_state);
             m.evaluator(touching).linearise(t, &y);
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;

@@ -82,7 +82,7 @@ pub struct Pose {
 
 /// Contact state of a ball joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ContactState {
+pub enum ContactMode {
     /// The ball touches nothing.
     #[default]
     Free,
@@ -119,7 +119,7 @@ pub struct JointReport {
     /// Sliding speed used by the friction law, m/s.
     pub slip_speed: f64,
     /// Contact state.
-    pub state: ContactState,
+    pub state: ContactMode,
 }
 
 /// The largest force on a ball joint since the peaks were last taken.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{Coefficients, Memory};
+use crate::contact::{Coefficients, ContactState};
 
 /// Penetration and its rate at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -132,31 +132,31 @@ impl PenetrationCubic {
     }
 
     /// Largest ratio of damping to elastic force from `from` to the end of the step, and where. It grows with the rate.
-    pub(super) fn most_damped(&self, c: &Coefficients, memory: &Memory, from: f64) -> (f64, f64) {
+    pub(super) fn most_damped(&self, c: &Coefficients, contact_state: &ContactState, from: f64) -> (f64, f64) {
         let (rate, theta) = self.fastest(from);
-        (c.damping * rate / memory.approach(c, rate), theta)
+        (c.damping * rate / contact_state.approach(c, rate), theta)
     }
 
     /// The larger of the normal forces at both ends, and where: (N, theta).
-    pub(super) fn stronger_end(&self, c: &Coefficients, memory: &Memory) -> (f64, f64) {
-        let force = |at: &Approach| c.normal_force(at.penetration, at.rate, memory.approach(c, at.rate));
+    pub(super) fn stronger_end(&self, c: &Coefficients, contact_state: &ContactState) -> (f64, f64) {
+        let force = |at: &Approach| c.normal_force(at.penetration, at.rate, contact_state.approach(c, at.rate));
         let (f0, f1) = (force(&self.start), force(&self.end));
         if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
     }
 
-    /// Largest normal force over the step of a contact with this memory, and where: (N, theta).
-    pub(super) fn strongest(&self, c: &Coefficients, memory: &Memory) -> (f64, f64) {
+    /// Largest normal force over the step of a contact with this contact_state, and where: (N, theta).
+    pub(super) fn strongest(&self, c: &Coefficients, contact_state: &ContactState) -> (f64, f64) {
         let force = |theta: f64| {
             let (p, v, _) = self.at(theta);
-            c.normal_force(p, v, memory.approach(c, v))
+            c.normal_force(p, v, contact_state.approach(c, v))
         };
         // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, the sign of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
-            if p <= 0.0 || memory.follows(c, v) {
+            if p <= 0.0 || contact_state.follows(c, v) {
                 return v;
             }
-            let chi = c.damping / memory.approach(c, v);
+            let chi = c.damping / contact_state.approach(c, v);
             1.5 * v * (1.0 + chi * v) + p * chi * a
         };
         let (f0, f1) = (force(0.0), force(1.0));
@@ -203,7 +203,7 @@ mod tests {
         };
         let (start, end) = (0.43e-4, 0.53e-4);
         let (force, theta) =
-            PenetrationCubic::new(at(start), at(end), end - start).strongest(&c, &Memory::begun(&c, 0.1));
+            PenetrationCubic::new(at(start), at(end), end - start).strongest(&c, &ContactState::at_onset(&c, 0.1));
         let exact = c.normal_force(a, 0.0, 0.1);
         // The Hermite interpolation error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force to the power
         // 1.5.

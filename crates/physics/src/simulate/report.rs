@@ -2,17 +2,17 @@
 
 use super::Model;
 use super::angles::pose_of;
-use super::frame::{BodyMotion, ContactState, Frame, JointReport};
-use crate::contact::Memory;
+use super::frame::{BodyMotion, ContactMode, Frame, JointReport};
+use crate::contact::ContactState;
 use crate::machine::{Attachment, BallJoint, Machine, Vec3};
 use crate::mechanism::Mechanism;
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
-/// contact memory `memory`.
+/// contact state `contact_state`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
     model: &Model,
-    memory: &[Memory],
+    contact_states: &[ContactState],
     (time, y): (f64, &[f64]),
     out: &mut Frame,
 ) {
@@ -33,7 +33,7 @@ pub(super) fn fill(
     out.pose = pose_of(&out.bodies[machine.output.body]);
     out.joints.clear();
     for (j, joint) in machine.ball_joints.iter().enumerate() {
-        out.joints.push(joint_report(mechanism, joint, &memory[j], j));
+        out.joints.push(joint_report(mechanism, joint, &contact_states[j], j));
     }
     out.closing.clear();
     out.closing.extend(mechanism.closing_loads());
@@ -54,7 +54,7 @@ pub(super) fn fill(
     }
 }
 
-fn joint_report(mechanism: &Mechanism, joint: &BallJoint, memory: &Memory, j: usize) -> JointReport {
+fn joint_report(mechanism: &Mechanism, joint: &BallJoint, contact_state: &ContactState, j: usize) -> JointReport {
     let motion = mechanism.motion();
     let centre = |a: &Attachment| match a.body {
         None => a.point,
@@ -81,17 +81,17 @@ fn joint_report(mechanism: &Mechanism, joint: &BallJoint, memory: &Memory, j: us
     if let Some(reaction) = mechanism.reaction(j) {
         report.normal_force = reaction;
         report.contact_point = ball_centre;
-        report.state = ContactState::Ideal;
+        report.state = ContactMode::Ideal;
         return report;
     }
     report.normal_force = gap.separation.normal * -gap.normal_force;
     report.friction_force = gap.friction;
-    report.state = if !memory.active && gap.normal_force == 0.0 {
-        ContactState::Free
+    report.state = if !contact_state.active && gap.normal_force == 0.0 {
+        ContactMode::Free
     } else if gap.slip_speed < coefficients.slip_high {
-        ContactState::Creep
+        ContactMode::Creep
     } else {
-        ContactState::Slip
+        ContactMode::Slip
     };
     report
 }

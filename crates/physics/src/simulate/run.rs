@@ -20,7 +20,7 @@ use super::state::{Instant, State};
 use super::stepper::AnyStepper;
 use super::workspace::{Workspace, sync_parameters};
 use super::{Frame, Indeterminate, Model, StartError, StopAdvice, StopFault, Stopped};
-use crate::contact::Memory;
+use crate::contact::ContactState;
 use crate::integrate::System as _;
 use crate::machine::Machine;
 use crate::mechanism::{ActiveSet, Counts, Mechanism, MechanismError};
@@ -66,7 +66,7 @@ pub(super) struct Run<'a> {
     attempt: &'a mut Attempt,
     scratch_y: &'a mut [f64],
     scratch_k: &'a mut [f64],
-    scratch_memory: &'a mut [Memory],
+    scratch_contacts: &'a mut [ContactState],
     ideal: Option<&'a mut IdealWorkspace>,
 }
 
@@ -139,11 +139,23 @@ impl<'a> Run<'a> {
     /// Brings `workspace` to `state` first, if it follows another.
     pub(super) fn new(model: &'a Model, state: &'a mut State, workspace: &'a mut Workspace) -> Self {
         workspace.follow(model, state);
-        let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_memory, ideal, .. } =
+        let Workspace { mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_contacts, ideal, .. } =
             workspace;
         let machine = model.machine();
         let ideal = ideal.as_deref_mut();
-        Self { model, machine, state, mechanism, stepper, before, attempt, scratch_y, scratch_k, scratch_memory, ideal }
+        Self {
+            model,
+            machine,
+            state,
+            mechanism,
+            stepper,
+            before,
+            attempt,
+            scratch_y,
+            scratch_k,
+            scratch_contacts,
+            ideal,
+        }
     }
 }
 
@@ -199,7 +211,7 @@ impl Run<'_> {
         let located = self.locates();
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
-        let touching = ActiveSet::by(located, &now.memory);
+        let touching = ActiveSet::by(located, &now.contact_states);
         let mut evaluator = mechanism.evaluator(touching);
         evaluator.derivative(now.t, &now.y, &mut now.k);
         mechanism.complete_gaps(touching, &now.y);
@@ -261,10 +273,10 @@ impl Run<'_> {
         let located = self.locates();
         let Self { mechanism, stepper, state, attempt, .. } = self;
         let State { now, conditions, polynomial, .. } = &mut **state;
-        let Instant { t, y, k, memory, .. } = &*now;
+        let Instant { t, y, k, contact_states, .. } = &*now;
         mechanism.hold_elements(&attempt.sides);
         attempt.left.fill(false);
-        let mut evaluator = mechanism.evaluator_watching(ActiveSet::by(located, memory), &mut attempt.left);
+        let mut evaluator = mechanism.evaluator_watching(ActiveSet::by(located, contact_states), &mut attempt.left);
         let end = &mut attempt.end;
         let tolerance = conditions.solver.tolerance;
         let error = stepper.attempt(&mut evaluator, *t, h, y, k, &mut end.y, &mut end.k, tolerance, polynomial);
@@ -280,7 +292,7 @@ impl Run<'_> {
         let located = self.locates();
         let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
-        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.now.memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &state.now.contact_states));
         evaluator.derivative(t_end, &end.y, &mut end.k);
         attempt.counts += evaluator.counts;
         self.finish_gaps(t_end);
@@ -288,7 +300,7 @@ impl Run<'_> {
 
     /// Computes bodies in flight, and gaps, at the end `t_end` of the current step, after an evaluation there.
     fn finish_gaps(&mut self, t_end: f64) {
-        let touching = ActiveSet::by(self.locates(), &self.state.now.memory);
+        let touching = ActiveSet::by(self.locates(), &self.state.now.contact_states);
         let end = &mut self.attempt.end;
         put_flights(self.mechanism, &self.state.flights, t_end, &mut end.y);
         clear_flights(self.mechanism, &self.state.flights, &mut end.k);
@@ -316,7 +328,7 @@ impl Run<'_> {
         }
     }
 
-    /// Accepts the attempted step: projection, guard, contact memory, peaks.
+    /// Accepts the attempted step: projection, guard, contact state, peaks.
     fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
         let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
         let mean_rates = self.stepper.has_mean_rates();
@@ -354,7 +366,7 @@ impl Run<'_> {
         std::mem::swap(self.before, now);
         std::mem::swap(now, &mut self.attempt.end);
         now.t = t_end;
-        now.memory.copy_from_slice(&self.before.memory);
+        now.contact_states.copy_from_slice(&self.before.contact_states);
         let statistics = &mut record.statistics;
         statistics.steps += 1;
         let drift = self.mechanism.constraint_drift();
@@ -376,9 +388,9 @@ impl Run<'_> {
         // if the method does not.
         if again {
             let Self { mechanism, state, scratch_k, .. } = self;
-            let Instant { t, y, k, memory, .. } = &mut state.now;
+            let Instant { t, y, k, contact_states, .. } = &mut state.now;
             let rate: &mut [f64] = if mean_rates { scratch_k } else { k };
-            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, contact_states));
             evaluator.derivative(*t, y, rate);
             let counts = evaluator.counts;
             mechanism.forget_evaluation();

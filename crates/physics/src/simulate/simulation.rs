@@ -7,7 +7,7 @@ use super::{
     ChangeError, Doubt, Effect, Frame, Impact, Indeterminate, Ledger, LoadPeaks, Model, Peak, ProbeFault, StartError,
     State, StateMismatch, Statistics, Stopped, Wear, Workspace,
 };
-use crate::contact::Memory;
+use crate::contact::ContactState;
 use crate::machine::{Conditions, Machine, Vec3};
 use crate::mechanism::{ElementReport, Mechanism, Pull};
 
@@ -118,9 +118,9 @@ impl Simulation {
         self.state.hash()
     }
 
-    /// As [`State::contact_memory`].
-    pub fn contact_memory(&self, j: usize) -> Memory {
-        self.state.contact_memory(j)
+    /// As [`State::contact_state`].
+    pub fn contact_state(&self, j: usize) -> ContactState {
+        self.state.contact_state(j)
     }
 
     /// As [`State::statistics`].
@@ -275,7 +275,7 @@ impl Simulation {
 
     /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state_vector`]) and continues from there. Quaternions are
     /// renormalised, ideal joints closed again. A ball moved into its wall is now in contact, a ball lifted off is not; every
-    /// other contact retains its memory. Counters are unchanged; a wear map is dropped.
+    /// other contact retains its contact_state. Counters are unchanged; a wear map is dropped.
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
     pub fn displace(&mut self, offset: &[f64]) {
@@ -285,7 +285,7 @@ impl Simulation {
     /// Moves the stored approach speeds of the contacts towards those of `other`, a run in nearly the same state, by the fraction
     /// `part` of their difference.
     pub fn remember_like(&mut self, other: &Self, part: f64) {
-        for (own, other) in self.state.now.memory.iter_mut().zip(&other.state.now.memory) {
+        for (own, other) in self.state.now.contact_states.iter_mut().zip(&other.state.now.contact_states) {
             own.approach_speed += part * (other.approach_speed - own.approach_speed);
         }
     }

@@ -12,7 +12,7 @@ use super::stepper::{ActiveScheme, AnyStepper};
 use super::wear::Wear;
 use super::workspace::Follows;
 use super::{Model, Peak, Statistics};
-use crate::contact::Memory;
+use crate::contact::ContactState;
 use crate::integrate::{Controller, Polynomial};
 use crate::machine::Conditions;
 use crate::mechanism::{Flight, Mechanism, Pull, Ramp};
@@ -47,7 +47,7 @@ pub struct State {
     pub(super) follows: Follows,
 }
 
-/// State vector, derivative, gaps and contact memory at one instant.
+/// State vector, derivative, gaps and contact state at one instant.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Instant {
     pub(super) t: f64,
@@ -56,8 +56,8 @@ pub(super) struct Instant {
     /// Their derivative.
     pub(super) k: Vec<f64>,
     pub(super) gaps: Vec<Approach>,
-    /// Contact memory for the step that begins here.
-    pub(super) memory: Vec<Memory>,
+    /// Contact contact_state for the step that begins here.
+    pub(super) contact_states: Vec<ContactState>,
 }
 
 impl Instant {
@@ -66,7 +66,7 @@ impl Instant {
             t: 0.0,
             k: vec![0.0; y.len()],
             gaps: vec![Approach::default(); joints],
-            memory: vec![Memory::default(); joints],
+            contact_states: vec![ContactState::default(); joints],
             y,
         }
     }
@@ -77,14 +77,14 @@ impl Instant {
         self.y.copy_from_slice(&other.y);
         self.k.copy_from_slice(&other.k);
         self.gaps.copy_from_slice(&other.gaps);
-        self.memory.copy_from_slice(&other.memory);
+        self.contact_states.copy_from_slice(&other.contact_states);
     }
 
     fn fits(&self, dimension: usize, joints: usize) -> bool {
         self.y.len() == dimension
             && self.k.len() == dimension
             && self.gaps.len() == joints
-            && self.memory.len() == joints
+            && self.contact_states.len() == joints
     }
 }
 
@@ -198,9 +198,9 @@ impl State {
         &self.conditions
     }
 
-    /// Contact memory of ball joint `j`: whether it is in contact, and its approach speed.
-    pub fn contact_memory(&self, j: usize) -> Memory {
-        self.now.memory[j]
+    /// Contact contact_state of ball joint `j`: whether it is in contact, and its approach speed.
+    pub fn contact_state(&self, j: usize) -> ContactState {
+        self.now.contact_states[j]
     }
 
     /// Clearance of ball joint `j`, m.
@@ -248,7 +248,7 @@ impl State {
     }
 
     /// FNV-1a, 64 bit, over the physical state: little-endian bits of time, coordinates, velocities, then for each ball joint
-    /// whether it is in contact, its approach speed, and its current clearance. The current piece of the friction law is
+    /// whether it is in contact, its approach speed, and its current clearance. The current branch of the friction law is
     /// excluded: like the step size, it belongs to the stepper.
     pub fn hash(&self) -> u64 {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
@@ -261,7 +261,7 @@ impl State {
         for y in &self.now.y {
             add(y.to_bits());
         }
-        for (j, m) in self.now.memory.iter().enumerate() {
+        for (j, m) in self.now.contact_states.iter().enumerate() {
             add(u64::from(m.active));
             add(m.approach_speed.to_bits());
             add(self.clearance(j).to_bits());

@@ -1,4 +1,4 @@
-//! Scratch memory in which a state is stepped.
+//! Scratch contact_state in which a state is stepped.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -7,7 +7,7 @@ use super::run::{Attempt, prepare_implicit};
 use super::state::{Instant, State};
 use super::stepper::AnyStepper;
 use super::{Model, StartError};
-use crate::contact::Memory;
+use crate::contact::ContactState;
 use crate::integrate::Method;
 use crate::mechanism::Mechanism;
 
@@ -24,7 +24,7 @@ pub struct Workspace {
     pub(super) attempt: Attempt,
     pub(super) scratch_y: Vec<f64>,
     pub(super) scratch_k: Vec<f64>,
-    pub(super) scratch_memory: Vec<Memory>,
+    pub(super) scratch_contacts: Vec<ContactState>,
     /// For the ideal motion alongside.
     pub(super) ideal: Option<Box<IdealWorkspace>>,
     follows: Follows,
@@ -73,7 +73,7 @@ impl Workspace {
             attempt: Attempt::new(model.machine(), n, joints),
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],
-            scratch_memory: vec![Memory::default(); joints],
+            scratch_contacts: vec![ContactState::default(); joints],
             ideal: None,
             follows: Follows::default(),
             mechanism,

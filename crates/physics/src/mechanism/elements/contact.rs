@@ -49,7 +49,7 @@ impl Contact {
     /// Whether it may carry a force.
     #[inline]
     pub fn may_press(&self, touching: ActiveSet<'_>) -> bool {
-        touching.memory(self.index).is_some()
+        touching.contact_state(self.index).is_some()
     }
 
     /// Power dissipated by friction, W.
@@ -134,18 +134,18 @@ impl ForceElement for Contact {
         }
         let separation = law.separation(&e, &velocity);
         gap.separation = separation;
-        let Some(memory) = at.touching.memory(self.index) else {
+        let Some(contact_state) = at.touching.contact_state(self.index) else {
             return;
         };
         let counts = &mut *loads.counts;
-        let force = law.force(memory, &separation, || {
+        let force = law.force(contact_state, &separation, || {
             counts.friction += 1;
             let spin = |anchor: &Anchor| &at.motion[anchor.body].angular_velocity;
             let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
             law.slip_velocity(&separation.normal, &velocity, ball, socket)
         });
         if let Some(left) = loads.left.get_mut(self.index) {
-            *left |= law.leaves_piece(memory, &separation, &force);
+            *left |= law.leaves_branch(contact_state, &separation, &force);
         }
         gap.normal_force = force.normal;
         gap.friction = force.friction;
@@ -171,13 +171,13 @@ impl ForceElement for Contact {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let gap = &self.gap;
-        let memory = at.touching.memory(self.index);
-        let memory = memory.filter(|_| gap.normal_force > 0.0)?;
+        let contact_state = at.touching.contact_state(self.index);
+        let contact_state = contact_state.filter(|_| gap.normal_force > 0.0)?;
         let n = gap.separation.normal;
         let read = self.slip_velocity(&n, at.motion);
         let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
         let mut stiffness =
-            self.law.linearise(memory, &gap.separation, &gap.eccentricity_rate, &read, &force, Slope::Tangent);
+            self.law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, Slope::Tangent);
         let [ball, socket] = self.spins(at.motion);
         stiffness.add_normal_rotation(&self.law.slip_velocity_by_normal(ball, socket));
         Some(Coupling {

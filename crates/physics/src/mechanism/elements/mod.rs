@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::drives::{Law, trajectory_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
-use crate::contact::{Memory, Stiffness};
+use crate::contact::{ContactState, Stiffness};
 use crate::machine::{Attachment, Drive, Element, ElementKind, JointCoordinate, Machine, Mat3, Vec3};
 use coordinate::Coordinate;
 pub use pull::Pull;
@@ -32,25 +32,25 @@ pub use pull::Pull;
 #[derive(Clone, Copy, Debug)]
 pub enum ActiveSet<'a> {
     /// By the contact state: the stepper locates the events that change it.
-    Located(&'a [Memory]),
+    Located(&'a [ContactState]),
     /// By penetration at every evaluation: for steppers without event location.
-    Immediate(&'a [Memory]),
+    Immediate(&'a [ContactState]),
     /// No contact carries a force.
     Nothing,
 }
 
 impl<'a> ActiveSet<'a> {
     /// By the contact state if events are `located`, otherwise by penetration.
-    pub fn by(located: bool, memory: &'a [Memory]) -> Self {
-        if located { Self::Located(memory) } else { Self::Immediate(memory) }
+    pub fn by(located: bool, contact_states: &'a [ContactState]) -> Self {
+        if located { Self::Located(contact_states) } else { Self::Immediate(contact_states) }
     }
 
     /// Contact state of joint `j` if it may carry a force.
     #[inline]
-    pub(in crate::mechanism) fn memory(self, j: usize) -> Option<&'a Memory> {
+    pub(in crate::mechanism) fn contact_state(self, j: usize) -> Option<&'a ContactState> {
         match self {
-            Self::Located(memory) => Some(&memory[j]).filter(|memory| memory.active),
-            Self::Immediate(memory) => Some(&memory[j]),
+            Self::Located(all) => Some(&all[j]).filter(|state| state.active),
+            Self::Immediate(all) => Some(&all[j]),
             Self::Nothing => None,
         }
     }

@@ -10,7 +10,7 @@ use Take::{
 
 use crate::machine::Vec3;
 use crate::simulate::angles::pose_of;
-use crate::simulate::{BodyMotion, ContactState, ElementReport, Frame, JointReport, Ledger, Pose};
+use crate::simulate::{BodyMotion, ContactMode, ElementReport, Frame, JointReport, Ledger, Pose};
 
 /// A physical quantity that a plot shows; its channels share one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -515,11 +515,11 @@ pub(super) const TABLE: &[Signal] = &[
 pub(super) const TIME: &str = "time";
 
 /// Code of a contact state in files.
-fn state_code(state: ContactState) -> f64 {
+fn state_code(state: ContactMode) -> f64 {
     match state {
-        ContactState::Free => 0.0,
-        ContactState::Creep => 1.0,
-        ContactState::Slip => 2.0,
-        ContactState::Ideal => 3.0,
+        ContactMode::Free => 0.0,
+        ContactMode::Creep => 1.0,
+        ContactMode::Slip => 2.0,
+        ContactMode::Ideal => 3.0,
     }
 }

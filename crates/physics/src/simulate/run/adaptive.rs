@@ -151,7 +151,7 @@ impl Run<'_> {
         {
             // Retry once on the other branch; if that leads back here, either branch will do.
             self.attempt.turned = true;
-            corner.next.put(&mut self.state.now.memory[corner.joint]);
+            corner.next.put(&mut self.state.now.contact_states[corner.joint]);
             self.invalidate();
             self.state.control.h_next = asked;
             self.state.control.contact_began = contact_began;
@@ -244,7 +244,7 @@ impl Run<'_> {
     fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         // Positive where the gap contradicts the recorded contact state.
-        let sign = if self.state.now.memory[j].active { -1.0 } else { 1.0 };
+        let sign = if self.state.now.contact_states[j].active { -1.0 } else { 1.0 };
         // A ball may cross its play several times in one long step: search intervals in which it moves little compared with
         // the play.
         let travel = h * start.speed.max(end.speed);

@@ -105,7 +105,7 @@ impl Run<'_> {
     /// the ringing at a multiple of the tolerance, and implicit ones would then have to resolve it.
     pub(super) fn choose_first_member(&mut self) {
         let Self { mechanism, state, .. } = self;
-        let touching = || state.now.memory.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
+        let touching = || state.now.contact_states.iter().enumerate().filter(|(_, m)| m.active).map(|(j, _)| j);
         let undamped = |j| mechanism.contacts.coefficients(j).damping == 0.0;
         let velocities = state.now.y.len() - mechanism.positions();
         if state.conditions.solver.method == Method::Automatic
@@ -143,7 +143,7 @@ impl Run<'_> {
     /// After an unstable explicit step: switches to the friction scheme if friction on its ramp may be the cause; returns whether
     /// it did so.
     pub(super) fn try_friction_scheme(&mut self) -> bool {
-        let touches = self.state.now.memory.iter().any(|m| m.active);
+        let touches = self.state.now.contact_states.iter().any(|m| m.active);
         let turns = self.state.conditions.solver.method == Method::Automatic
             && self.state.control.member == ActiveScheme::Explicit
             && self.state.control.choice.friction.wait == 0
@@ -179,7 +179,7 @@ impl Run<'_> {
             choice.since_contact = 0;
             choice.limited = 0;
             // An impact is short and not stiff: the explicit method resolves it at less cost.
-            let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
+            let strikes = state.now.contact_states.iter().any(|m| m.active && !m.floored);
             let leaves = member == ActiveScheme::Implicit && strikes;
             if leaves {
                 choice.implicit.conclude_trial(choice.explicit());
@@ -203,7 +203,7 @@ impl Run<'_> {
         choice.since_contact += 1;
         choice.explicit_progress = KEPT * choice.explicit_progress + h;
         choice.explicit_cost = KEPT * choice.explicit_cost + cost;
-        let touches = state.now.memory.iter().any(|m| m.active);
+        let touches = state.now.contact_states.iter().any(|m| m.active);
         let mut next = member;
         if member == ActiveScheme::Friction {
             // A friction step costs more than an explicit one, so it must be longer in proportion.

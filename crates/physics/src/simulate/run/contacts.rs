@@ -1,8 +1,8 @@
-//! Contact memory and continuous-time peaks of the step just accepted.
+//! Contact contact_state and continuous-time peaks of the step just accepted.
 
 use super::search::NEAR_PEAK;
 use super::{Run, State};
-use crate::contact::{Coefficients, Memory, Separation};
+use crate::contact::{Coefficients, ContactState, Separation};
 use crate::machine::least_impact_steps;
 use crate::simulate::peaks::PenetrationCubic;
 
@@ -12,7 +12,7 @@ const AT_WALL: f64 = 1e-9;
 /// Push on a ball whose motion before the contact is unknown, m/s^2.
 const UNKNOWN: f64 = f64::MAX;
 
-/// Changes in the contact memory at the end of a step.
+/// Changes in the contact state at the end of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Switched {
     /// A contact began or ended.
@@ -23,18 +23,26 @@ pub(super) struct Switched {
 
 impl State {
     /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2), and
-    /// restitution setting `asked`; returns its memory.
-    fn begin(&mut self, j: usize, time: f64, rate: f64, push: f64, asked: f64, coefficients: &Coefficients) -> Memory {
-        let among_others = self.now.memory.iter().any(|m| m.active);
+    /// restitution setting `asked`; returns its contact_state.
+    fn begin(
+        &mut self,
+        j: usize,
+        time: f64,
+        rate: f64,
+        push: f64,
+        asked: f64,
+        coefficients: &Coefficients,
+    ) -> ContactState {
+        let among_others = self.now.contact_states.iter().any(|m| m.active);
         self.record.impacts.begin(j, time, rate, asked, push, coefficients, among_others);
-        let memory = Memory::begun(coefficients, rate);
+        let contact_state = ContactState::at_onset(coefficients, rate);
         self.record.statistics.impacts[j] += 1;
         let peak = &mut self.record.peaks[j];
         peak.impacts += 1;
         peak.approach_speed = peak.approach_speed.max(rate);
         self.control.contact_began = true;
         self.control.h_next = self.control.h_next.min(self.control.h_contact);
-        memory
+        contact_state
     }
 
     /// Records a step of contact `j` that began at `start` (s), from fraction `from` on, with the largest normal force `force` (N).
@@ -45,10 +53,10 @@ impl State {
         course: &PenetrationCubic,
         c: &Coefficients,
         force: f64,
-        memory: &Memory,
+        contact_state: &ContactState,
         from: f64,
     ) {
-        let (damping, theta) = course.most_damped(c, memory, from);
+        let (damping, theta) = course.most_damped(c, contact_state, from);
         self.record.impacts.follow(j, course, force, damping);
         if damping > self.record.statistics.damping[j] {
             self.record.statistics.damping[j] = damping;
@@ -74,9 +82,9 @@ impl Run<'_> {
                 continue;
             }
             if penetration <= AT_WALL * contact.clearance && rate > 0.0 {
-                state.now.memory[j] = state.begin(j, 0.0, rate, UNKNOWN, contact.restitution, coefficients);
+                state.now.contact_states[j] = state.begin(j, 0.0, rate, UNKNOWN, contact.restitution, coefficients);
             } else {
-                state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
+                state.now.contact_states[j] = ContactState::at_onset(coefficients, f64::NEG_INFINITY);
                 state.record.statistics.impacts[j] += 1;
             }
         }
@@ -89,10 +97,10 @@ impl Run<'_> {
         let mut begins = false;
         for j in 0..state.conditions.joints.len() {
             let gap = state.now.gaps[j];
-            if mechanism.contacts.has_clearance(j) && gap.arrives() && !state.now.memory[j].active {
+            if mechanism.contacts.has_clearance(j) && gap.arrives() && !state.now.contact_states[j].active {
                 let (asked, coefficients) =
                     (state.conditions.joints[j].restitution, mechanism.contacts.coefficients(j));
-                state.now.memory[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN, asked, coefficients);
+                state.now.contact_states[j] = state.begin(j, state.now.t, gap.rate, UNKNOWN, asked, coefficients);
                 state.record.contact_steps[j] = 0;
                 begins = true;
             }
@@ -116,24 +124,24 @@ impl Run<'_> {
             }
             let (start, end) = (before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
-            if state.now.memory[j].active {
+            if state.now.contact_states[j].active {
                 let course = PenetrationCubic::new(start, end, h);
-                let memory = state.now.memory[j].unsplit();
-                state.follow(j, before.t, &course, coefficients, strongest[j].0, &memory, 0.0);
+                let contact_state = state.now.contact_states[j].unfrozen();
+                state.follow(j, before.t, &course, coefficients, strongest[j].0, &contact_state, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side. The repeated step may still show that a ball
             // about to separate has turned back.
-            let turned = state.now.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
+            let turned = state.now.contact_states[j].active && end.penetration > 0.0 && end.rate > 0.0;
             let touching = match located {
-                Some(located) if located == j => !state.now.memory[j].active || turned,
+                Some(located) if located == j => !state.now.contact_states[j].active || turned,
                 _ => end.penetration > 0.0 || end.arrives(),
             };
             state.record.contact_steps[j] += 1;
-            if touching == state.now.memory[j].active {
+            if touching == state.now.contact_states[j].active {
                 if touching {
                     let fastest = || PenetrationCubic::new(start, end, h).fastest(0.0).0;
-                    let memory = &mut state.now.memory[j];
-                    switched.forces |= memory.rise(coefficients, end.rate, fastest);
+                    let contact_state = &mut state.now.contact_states[j];
+                    switched.forces |= contact_state.rise(coefficients, end.rate, fastest);
                 }
                 continue;
             }
@@ -148,18 +156,18 @@ impl Run<'_> {
                 let time = before.t + theta * h;
                 let asked = state.conditions.joints[j].restitution;
                 let push = (rate - start.rate) / (theta * h);
-                let mut memory = state.begin(j, time, rate, push, asked, coefficients);
+                let mut contact_state = state.begin(j, time, rate, push, asked, coefficients);
                 if !fixed && located != Some(j) && end.penetration > AT_WALL * mechanism.contacts.clearance(j) {
                     let late = &mut state.record.statistics.late[j];
                     *late = late.max(end.penetration);
                 }
                 // A located contact begins where the step ends.
                 if fixed {
-                    memory.rise(coefficients, end.rate, || course.fastest(theta).0);
-                    let (force, _) = course.strongest(coefficients, &memory);
-                    state.follow(j, before.t, &course, coefficients, force, &memory, theta);
+                    contact_state.rise(coefficients, end.rate, || course.fastest(theta).0);
+                    let (force, _) = course.strongest(coefficients, &contact_state);
+                    state.follow(j, before.t, &course, coefficients, force, &contact_state, theta);
                 }
-                state.now.memory[j] = memory;
+                state.now.contact_states[j] = contact_state;
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && located != Some(j) {
@@ -170,7 +178,7 @@ impl Run<'_> {
                     (state.now.t, end.rate)
                 };
                 let statistics = &mut state.record.statistics;
-                statistics.floored[j] += u64::from(state.now.memory[j].floored);
+                statistics.floored[j] += u64::from(state.now.contact_states[j].floored);
                 if let Some(impact) = state.record.impacts.end(j, time, rate) {
                     let farthest = statistics.astray[j].map_or(0.0, |impact| impact.astray());
                     if impact.astray() > farthest {
@@ -179,7 +187,7 @@ impl Run<'_> {
                 }
                 let coarse = fixed && steps < least;
                 state.record.statistics.coarse[j] += u64::from(coarse);
-                state.now.memory[j] = Memory::default();
+                state.now.contact_states[j] = ContactState::default();
                 state.record.statistics.last_separation[j] = Some(state.now.t);
             }
         }
@@ -201,12 +209,12 @@ impl Run<'_> {
             }
             let coefficients = mechanism.contacts.coefficients(j);
             let course = PenetrationCubic::new(start, end, h);
-            let (force, theta) = if before.memory[j].active {
+            let (force, theta) = if before.contact_states[j].active {
                 attempt.strongest[j]
-            } else if state.now.memory[j].active {
-                course.strongest(coefficients, &state.now.memory[j].unsplit())
+            } else if state.now.contact_states[j].active {
+                course.strongest(coefficients, &state.now.contact_states[j].unfrozen())
             } else {
-                course.strongest(coefficients, &Memory::passing(coefficients))
+                course.strongest(coefficients, &ContactState::passing(coefficients))
             };
             let time = before.t + theta * h;
             attempt.near_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];

@@ -1,16 +1,16 @@
-//! Corners of the contact laws as events. During a step each touching joint stays on one piece of the friction law and one of the
-//! approach-speed rule; the step ends where its sliding speed or penetration rate leaves that piece.
+//! Corners of the contact laws as events. During a step each touching joint stays on one branch of the friction law and one of the
+//! approach-speed rule; the step ends where its sliding speed or penetration rate leaves that branch.
 
 use super::{Run, State};
-use crate::contact::{ApproachPiece, FrictionPiece, Memory};
+use crate::contact::{ApproachBranch, ContactState, FrictionBranch};
 use crate::integrate::{Method, find_root};
 use crate::simulate::stepper::ActiveScheme;
 
 /// Parts of a step at whose ends sliding speed and penetration rate are checked.
 const PARTS: u32 = 4;
-/// A corner earlier than this fraction of the step was passed at its start: the step is repeated on the next piece.
+/// A corner earlier than this fraction of the step was passed at its start: the step is repeated on the next branch.
 const AT_START: f64 = 1e-9;
-/// The same limit where a rate stops rising: it is stationary there, and the forces of both pieces agree to second order.
+/// The same limit where a rate stops rising: it is stationary there, and the forces of both branches agree to second order.
 const LEVEL_AT_START: f64 = 1e-3;
 /// A rate that falls over this last fraction of a step has passed its maximum inside the last part.
 const LAST: f64 = 1e-4;
@@ -31,27 +31,27 @@ pub(super) struct Corner {
     pub next: LawBranch,
 }
 
-/// Piece of a law beyond a corner.
+/// Branch of a law beyond a corner.
 #[derive(Clone, Copy)]
 pub(super) enum LawBranch {
-    /// Piece of the friction law.
-    Friction(FrictionPiece),
-    /// Piece of the approach-speed rule.
-    Approach(ApproachPiece),
+    /// Branch of the friction law.
+    Friction(FrictionBranch),
+    /// Branch of the approach-speed rule.
+    Approach(ApproachBranch),
 }
 
 impl LawBranch {
-    /// Switches a contact to this piece.
-    pub(super) fn put(self, memory: &mut Memory) {
+    /// Switches a contact to this branch.
+    pub(super) fn put(self, contact_state: &mut ContactState) {
         match self {
-            Self::Friction(piece) => memory.friction_piece = piece,
-            Self::Approach(piece) => memory.approach_piece = piece,
+            Self::Friction(branch) => contact_state.friction_branch = branch,
+            Self::Approach(branch) => contact_state.approach_branch = branch,
         }
     }
 }
 
 impl Corner {
-    /// Whether it lies so early that its joint should switch to the next piece before the step.
+    /// Whether it lies so early that its joint should switch to the next branch before the step.
     pub(super) fn is_at_start(&self) -> bool {
         self.theta <= AT_START
     }
@@ -66,15 +66,15 @@ impl Run<'_> {
         method.is_adaptive() && method != Method::Rosenbrock && !whole
     }
 
-    /// Assigns every touching joint its current pieces of the laws; joints that already have pieces retain them unless `anew`. If
+    /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless `anew`. If
     /// corners are not located, all joints use the full laws.
     pub(super) fn freeze_branches(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.control.chatters;
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
         if anew || !holds {
-            for memory in &mut now.memory {
-                *memory = memory.unsplit();
+            for contact_state in &mut now.contact_states {
+                *contact_state = contact_state.unfrozen();
             }
         }
         if !holds {
@@ -82,21 +82,21 @@ impl Run<'_> {
         }
         // With `anew`, the gaps may belong to another state until they are measured.
         if !anew {
-            for (j, memory) in now.memory.iter_mut().enumerate() {
-                memory.hold_approach(mechanism.contacts.coefficients(j), now.gaps[j].rate);
+            for (j, contact_state) in now.contact_states.iter_mut().enumerate() {
+                contact_state.freeze_approach(mechanism.contacts.coefficients(j), now.gaps[j].rate);
             }
         }
-        let holds_none = |m: &Memory| m.active && m.friction_piece == FrictionPiece::Unsplit;
-        if !now.memory.iter().any(holds_none) {
+        let holds_none = |m: &ContactState| m.active && m.friction_branch == FrictionBranch::Unfrozen;
+        if !now.contact_states.iter().any(holds_none) {
             return;
         }
         mechanism.measure(now.t, &now.y);
-        for (j, memory) in now.memory.iter_mut().enumerate() {
-            if holds_none(memory) {
+        for (j, contact_state) in now.contact_states.iter_mut().enumerate() {
+            if holds_none(contact_state) {
                 let c = mechanism.contacts.coefficients(j);
-                memory.friction_piece = c.friction_piece_at(mechanism.slip_speed(j));
+                contact_state.friction_branch = c.friction_branch_at(mechanism.slip_speed(j));
                 if anew {
-                    memory.hold_approach(c, mechanism.contacts.gap(j).separation.rate);
+                    contact_state.freeze_approach(c, mechanism.contacts.gap(j).separation.rate);
                 }
             }
         }
@@ -105,32 +105,32 @@ impl Run<'_> {
     /// First corner of the laws inside the step just attempted.
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
         let mut first: Option<Corner> = None;
-        for j in 0..self.state.now.memory.len() {
+        for j in 0..self.state.now.contact_states.len() {
             if !self.attempt.left[j] {
                 continue;
             }
-            let memory = self.state.now.memory[j];
+            let contact_state = self.state.now.contact_states[j];
             let mut take = |corner: Option<(f64, LawBranch)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
                 if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
                     first = Some(Corner { theta, joint: j, next });
                 }
             };
-            if memory.friction_piece != FrictionPiece::Unsplit {
+            if contact_state.friction_branch != FrictionBranch::Unfrozen {
                 take(self.corner_of(j, h));
             }
-            match memory.approach_piece {
-                ApproachPiece::Unsplit => {}
-                ApproachPiece::Held => take(self.overtaking(j, h)),
-                ApproachPiece::Rising => take(self.level(j, h)),
+            match contact_state.approach_branch {
+                ApproachBranch::Unfrozen => {}
+                ApproachBranch::Held => take(self.overtaking(j, h)),
+                ApproachBranch::Rising => take(self.level(j, h)),
             }
         }
         first
     }
 
-    /// Step fraction at which the penetration rate of joint `j` exceeds its largest value so far, and the next piece.
+    /// Step fraction at which the penetration rate of joint `j` exceeds its largest value so far, and the next branch.
     fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
-        let most = self.state.now.memory[j].approach_speed * (1.0 + NO_FASTER);
+        let most = self.state.now.contact_states[j].approach_speed * (1.0 + NO_FASTER);
         let mut left = (0.0, self.state.now.gaps[j].rate - most);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
@@ -143,14 +143,14 @@ impl Run<'_> {
                 } else {
                     left.0
                 };
-                return Some((at, LawBranch::Approach(ApproachPiece::Rising)));
+                return Some((at, LawBranch::Approach(ApproachBranch::Rising)));
             }
             left = right;
         }
         None
     }
 
-    /// Step fraction at which the penetration rate of joint `j`, now at its largest, stops rising, and the next piece.
+    /// Step fraction at which the penetration rate of joint `j`, now at its largest, stops rising, and the next branch.
     fn level(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let mut before = self.state.now.gaps[j].rate;
@@ -179,7 +179,7 @@ impl Run<'_> {
             }
             let at = 0.5 * (a + b);
             let at = if at < LEVEL_AT_START { 0.0 } else { at };
-            return Some((at, LawBranch::Approach(ApproachPiece::Held)));
+            return Some((at, LawBranch::Approach(ApproachBranch::Held)));
         }
         None
     }
@@ -208,7 +208,7 @@ impl Run<'_> {
         mechanism.measure_one(j, time, scratch_y);
     }
 
-    /// Step fraction at which the sliding speed of joint `j` leaves its piece, and the next piece.
+    /// Step fraction at which the sliding speed of joint `j` leaves its branch, and the next branch.
     fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, LawBranch)> {
         let mut left = (0.0, self.beyond(j, 0.0, h).0);
         for n in 1..=PARTS {
@@ -225,10 +225,10 @@ impl Run<'_> {
                 };
                 let (_, speed) = self.beyond(j, at.max(AT_START), h);
                 let c = self.mechanism.contacts.coefficients(j);
-                let next = match self.state.now.memory[j].friction_piece {
-                    FrictionPiece::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => FrictionPiece::Full,
-                    FrictionPiece::Ramp => FrictionPiece::DeadBand,
-                    _ => FrictionPiece::Ramp,
+                let next = match self.state.now.contact_states[j].friction_branch {
+                    FrictionBranch::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => FrictionBranch::Full,
+                    FrictionBranch::Ramp => FrictionBranch::DeadBand,
+                    _ => FrictionBranch::Ramp,
                 };
                 return Some((at, LawBranch::Friction(next)));
             }
@@ -253,22 +253,22 @@ impl Run<'_> {
         self.evaluate_end(t_end);
     }
 
-    /// Excess of joint `j`'s sliding speed over its piece, and that speed, m/s, on the interpolant of the attempted step.
+    /// Excess of joint `j`'s sliding speed over its branch, and that speed, m/s, on the interpolant of the attempted step.
     fn beyond(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
         self.measure_at(j, theta, h);
         let speed = self.mechanism.slip_speed(j);
-        let slip = self.state.now.memory[j].friction_piece;
+        let slip = self.state.now.contact_states[j].friction_branch;
         let c = self.mechanism.contacts.coefficients(j);
         (c.beyond(slip, speed), speed)
     }
 
-    /// After an accepted step: switches to the piece beyond the corner at its end. Stops locating corners for a while if almost
+    /// After an accepted step: switches to the branch beyond the corner at its end. Stops locating corners for a while if almost
     /// every step ends at one.
     pub(super) fn pass_corner(&mut self) {
         let state = &mut self.state;
         if let Some((j, next)) = self.attempt.corner.take() {
-            if state.now.memory[j].active {
-                next.put(&mut state.now.memory[j]);
+            if state.now.contact_states[j].active {
+                next.put(&mut state.now.contact_states[j]);
             }
             state.record.statistics.corners += 1;
             state.control.chatter += CORNER;

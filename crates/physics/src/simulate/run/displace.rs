@@ -1,7 +1,7 @@
 //! Perturbations of the state, for a twin run and its renormalisation.
 
 use super::{Attempt, Run};
-use crate::contact::Memory;
+use crate::contact::ContactState;
 use crate::simulate::state::Control;
 
 impl Run<'_> {
@@ -16,23 +16,23 @@ impl Run<'_> {
             mechanism.project(state.now.t, &mut state.now.y);
         }
         mechanism.measure(state.now.t, &state.now.y);
-        for j in 0..state.now.memory.len() {
+        for j in 0..state.now.contact_states.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
             // The offset may cross a corner of the laws.
-            state.now.memory[j] = state.now.memory[j].unsplit();
+            state.now.contact_states[j] = state.now.contact_states[j].unfrozen();
             let gap = *mechanism.contacts.gap(j);
             let touching = gap.separation.penetration > 0.0;
-            if touching == state.now.memory[j].active {
+            if touching == state.now.contact_states[j].active {
                 continue;
             }
-            state.now.memory[j] = if touching {
+            state.now.contact_states[j] = if touching {
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
-                Memory::begun(mechanism.contacts.coefficients(j), gap.separation.rate)
+                ContactState::at_onset(mechanism.contacts.coefficients(j), gap.separation.rate)
             } else {
-                Memory::default()
+                ContactState::default()
             };
         }
         self.state.record.wear = None;

@@ -33,7 +33,7 @@ impl Run<'_> {
         state.record.account.powers = None;
     }
 
-    /// Records the step just accepted, of size `h`, in the ledger and the wear map, with the contact memory of the step;
+    /// Records the step just accepted, of size `h`, in the ledger and the wear map, with the contact state of the step;
     /// `switched` if that has changed at its end.
     pub(super) fn record_step(&mut self, h: f64, switched: bool) {
         let Record { account, wear, .. } = &self.state.record;
@@ -55,10 +55,10 @@ impl Run<'_> {
             }
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
-            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.memory));
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
             if self.state.record.wear.is_some() {
-                let touching = ActiveSet::by(located, &self.before.memory);
+                let touching = ActiveSet::by(located, &self.before.contact_states);
                 self.mechanism.complete_gaps(touching, &self.state.now.y);
                 self.begin_wear_of_step();
             }
@@ -87,7 +87,7 @@ impl Run<'_> {
         };
         let instants = stepper.quadrature();
         wear.begin_step(instants[0] == 0.0 && record.account.powers.is_some());
-        for (j, (before, now)) in before.memory.iter().zip(&now.memory).enumerate() {
+        for (j, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
             if now.active && !before.active {
                 wear.begin_contact(j, &mechanism.wall_direction(j));
             }
@@ -130,7 +130,7 @@ impl Run<'_> {
         let located = self.locates();
         let Self { mechanism, stepper, state, before, scratch_y, scratch_k, .. } = self;
         mechanism.forget_evaluation();
-        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, &before.contact_states));
         let powers = evaluator.powers(before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {
             // No quadrature node in a kinematic scene: no ball is in contact there.

@@ -23,7 +23,7 @@ impl Run<'_> {
         for (flyer, flight) in mechanism.free_flight_bodies().iter().zip(&mut state.flights) {
             let flew = flight.is_some();
             let held = state.pull.is_some_and(|pull| pull.body == flyer.body);
-            if held || flyer.joints.iter().any(|&j| now.memory[j].active) {
+            if held || flyer.joints.iter().any(|&j| now.contact_states[j].active) {
                 *flight = None;
                 some_land |= flew;
                 continue;
@@ -47,8 +47,8 @@ impl Run<'_> {
             // The derivative of a body that landed is still that of its flight.
             let located = self.locates();
             let Self { mechanism, state, .. } = self;
-            let Instant { t, y, k, memory, .. } = &mut state.now;
-            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, memory));
+            let Instant { t, y, k, contact_states, .. } = &mut state.now;
+            let mut evaluator = mechanism.evaluator(ActiveSet::by(located, contact_states));
             evaluator.derivative(*t, y, k);
             let counts = evaluator.counts;
             state.record.statistics.count(counts);

@@ -2,7 +2,7 @@
 
 use super::automatic::{SchemeSelector, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Run, sync_parameters};
-use crate::contact::Memory;
+use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::machine::{Machine, Vec3};
 use crate::mechanism::{MechanismError, Pull, Ramp};
@@ -151,10 +151,10 @@ impl Run<'_> {
         };
         state.clearances[j] = clearance;
         // The wall has moved away from the ball. The state of a ball just arriving or leaving does not change.
-        if clearance > now && state.now.memory[j].active && distance <= clearance {
-            state.now.memory[j] = Memory::default();
+        if clearance > now && state.now.contact_states[j].active && distance <= clearance {
+            state.now.contact_states[j] = ContactState::default();
         }
-        state.record.impacts.change(j, state.now.memory[j].active);
+        state.record.impacts.change(j, state.now.contact_states[j].active);
     }
 
     /// End of the active clearance ramp that finishes first, s.

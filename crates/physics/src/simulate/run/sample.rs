@@ -13,8 +13,8 @@ impl Run<'_> {
     pub(in crate::simulate) fn sample(&mut self, time: f64, out: &mut Frame) {
         let time = time.clamp(self.before.t, self.state.now.t);
         self.look(time);
-        let (memory, at) = (&*self.scratch_memory, (time, &*self.scratch_y));
-        report::fill(self.mechanism, self.model, memory, at, out);
+        let (contact_state, at) = (&*self.scratch_contacts, (time, &*self.scratch_y));
+        report::fill(self.mechanism, self.model, contact_state, at, out);
         for (sampled, report) in self.state.sampled.iter_mut().zip(&out.joints) {
             let force = report.normal_force.norm();
             if force > sampled.0 {
@@ -49,17 +49,17 @@ impl Run<'_> {
         }
         let flies = self.look_at_all();
         let located = self.locates();
-        let Self { mechanism, state, before, scratch_y, scratch_k, scratch_memory, .. } = self;
+        let Self { mechanism, state, before, scratch_y, scratch_k, scratch_contacts, .. } = self;
         if inside {
             mechanism.project(time, scratch_y);
         }
-        let (before, now) = (&before.memory, &state.now.memory);
-        for (j, memory) in scratch_memory.iter_mut().enumerate() {
+        let (before, now) = (&before.contact_states, &state.now.contact_states);
+        for (j, contact_state) in scratch_contacts.iter_mut().enumerate() {
             // A contact that began within a fixed step has its approach speed from then on.
             let known = !inside || (!located && !before[j].active);
-            *memory = if known { now[j] } else { before[j] };
+            *contact_state = if known { now[j] } else { before[j] };
         }
-        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, scratch_memory));
+        let mut evaluator = mechanism.evaluator(ActiveSet::by(located, scratch_contacts));
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
         if flies {
             self.leave_out_flights();

@@ -33,13 +33,13 @@ impl Run<'_> {
     pub(super) fn find_strongest(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
-            let memory = self.before.memory[j].unsplit();
-            if !memory.active || !self.mechanism.contacts.has_clearance(j) {
+            let contact_state = self.before.contact_states[j].unfrozen();
+            if !contact_state.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
             let course = PenetrationCubic::new(self.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
-            let (force, theta) = course.strongest(&c, &memory);
+            let (force, theta) = course.strongest(&c, &contact_state);
             self.attempt.strongest[j] = (force, theta);
             let least = self.state.record.statistics.peak_normal[j]
                 .min(self.state.record.peaks[j].normal)
@@ -49,7 +49,7 @@ impl Run<'_> {
             }
             self.look(self.before.t + theta * h);
             let inside = self.mechanism.contacts.gap(j).normal_force;
-            let ends = course.stronger_end(&c, &memory);
+            let ends = course.stronger_end(&c, &contact_state);
             self.attempt.strongest[j] = if inside > ends.0 { (inside, theta) } else { ends };
         }
     }

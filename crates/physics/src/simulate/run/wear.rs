@@ -8,8 +8,8 @@ impl Run<'_> {
     pub(in crate::simulate) fn keep_wear(&mut self) {
         let mut wear = Wear::new(self.machine);
         self.look(self.state.now.t);
-        for (j, memory) in self.state.now.memory.iter().enumerate() {
-            if memory.active {
+        for (j, contact_state) in self.state.now.contact_states.iter().enumerate() {
+            if contact_state.active {
                 wear.begin_contact(j, &self.mechanism.wall_direction(j));
             }
         }

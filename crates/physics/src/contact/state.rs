@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ApproachPiece, Coefficients, FrictionPiece};
+use super::{ApproachBranch, Coefficients, FrictionBranch};
 
 /// Contact state of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
+pub struct ContactState {
     /// In contact.
     pub active: bool,
     /// Approach speed in the damping term, m/s: delta_dot0 of this contact, or its largest rate so far, not below the scene's
@@ -15,25 +15,25 @@ pub struct Memory {
     /// The floor applied: this contact rebounds higher than requested.
     pub floored: bool,
     /// Active branch of the friction law.
-    pub friction_piece: FrictionPiece,
+    pub friction_branch: FrictionBranch,
     /// Active branch of the approach-speed rule.
-    pub approach_piece: ApproachPiece,
+    pub approach_branch: ApproachBranch,
 }
 
-impl Memory {
+impl ContactState {
     /// State of a contact that begins at the penetration rate `rate` (m/s).
-    pub fn begun(c: &Coefficients, rate: f64) -> Self {
+    pub fn at_onset(c: &Coefficients, rate: f64) -> Self {
         Self { active: true, approach_speed: c.floored(rate), floored: rate < c.speed_floor, ..Self::default() }
     }
 
     /// State of a contact that begins and ends within a step: its approach speed is the current rate.
     pub fn passing(c: &Coefficients) -> Self {
-        Self { approach_piece: ApproachPiece::Rising, ..Self::begun(c, c.speed_floor) }
+        Self { approach_branch: ApproachBranch::Rising, ..Self::at_onset(c, c.speed_floor) }
     }
 
     /// The same state with the full laws instead of single branches.
-    pub fn unsplit(self) -> Self {
-        Self { friction_piece: FrictionPiece::Unsplit, approach_piece: ApproachPiece::Unsplit, ..self }
+    pub fn unfrozen(self) -> Self {
+        Self { friction_branch: FrictionBranch::Unfrozen, approach_branch: ApproachBranch::Unfrozen, ..self }
     }
 
     /// Updates the largest rate, if the law uses it, after a step that ends at the rate `end`; `fastest` gives the largest rate
@@ -43,7 +43,7 @@ impl Memory {
             return false;
         }
         // With located corners, a step ends where the rate is largest.
-        let whole = self.approach_piece == ApproachPiece::Unsplit;
+        let whole = self.approach_branch == ApproachBranch::Unfrozen;
         let fastest = if whole { fastest() } else { end };
         let changes = whole && fastest > self.approach_speed.max(end);
         self.approach_speed = self.approach_speed.max(fastest);
@@ -52,32 +52,32 @@ impl Memory {
 
     /// Selects the current branch of the approach-speed rule if none is frozen. A rate below the largest so far exceeds it only
     /// at a corner, but a rising rate may have stopped rising.
-    pub fn hold_approach(&mut self, c: &Coefficients, rate: f64) {
-        if self.active && self.approach_piece == ApproachPiece::Unsplit {
-            self.approach_piece = c.approach_piece_at(self.approach_speed, rate);
-        } else if self.approach_piece == ApproachPiece::Rising && rate < self.approach_speed {
-            self.approach_piece = ApproachPiece::Held;
+    pub fn freeze_approach(&mut self, c: &Coefficients, rate: f64) {
+        if self.active && self.approach_branch == ApproachBranch::Unfrozen {
+            self.approach_branch = c.approach_branch_at(self.approach_speed, rate);
+        } else if self.approach_branch == ApproachBranch::Rising && rate < self.approach_speed {
+            self.approach_branch = ApproachBranch::Held;
         }
     }
 
     /// Approach speed in the damping term, m/s, at the penetration rate `rate`; while the joint is free, the rate itself.
     #[inline]
     pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
-        if self.active { c.approach(self.approach_piece, self.approach_speed, rate) } else { c.floored(rate) }
+        if self.active { c.approach(self.approach_branch, self.approach_speed, rate) } else { c.floored(rate) }
     }
 
     /// Whether the approach speed is the rate itself, so that the damping term does not depend on it.
     pub fn follows(&self, c: &Coefficients, rate: f64) -> bool {
-        self.active && c.approach_follows(self.approach_piece, self.approach_speed, rate)
+        self.active && c.approach_follows(self.approach_branch, self.approach_speed, rate)
     }
 
     /// Whether the rate may cross into another branch of the rule. A rising rate may pass its maximum in any step.
     #[inline]
     pub(super) fn may_turn(&self, rate: f64) -> bool {
-        match self.approach_piece {
-            ApproachPiece::Unsplit => false,
-            ApproachPiece::Held => rate > self.approach_speed,
-            ApproachPiece::Rising => true,
+        match self.approach_branch {
+            ApproachBranch::Unfrozen => false,
+            ApproachBranch::Held => rate > self.approach_speed,
+            ApproachBranch::Rising => true,
         }
     }
 }
