@@ -23,12 +23,8 @@ impl App {
     pub(super) fn compare(&mut self, is_over: bool) {
         let comparison = &mut self.plots.comparison;
         let wanted = comparison.is_on() && self.course.is_none();
-        if let Some((run, key)) = self.player.take_before().filter(|_| wanted) {
+        if let Some((run, key)) = self.player.take_before(wanted, is_over).filter(|_| wanted) {
             comparison.add(run, key);
-        }
-        self.player.keep_before(wanted);
-        if is_over {
-            self.player.end_gesture();
         }
     }
 

@@ -201,8 +201,7 @@ impl App {
             self.save_impacts();
         }
         if let Some(time) = asked {
-            self.player.go_to(time);
-            self.viewport.revisit(&self.player);
+            self.look_back(time);
         }
     }
 

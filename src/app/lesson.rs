@@ -409,8 +409,7 @@ impl App {
         {
             (course.reached, course.fresh) = (true, true);
             if self.player.is_playing() {
-                self.player.go_to(until);
-                self.viewport.revisit(&self.player);
+                self.look_back(until);
             }
             ctx.request_repaint();
         }

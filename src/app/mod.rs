@@ -468,7 +468,7 @@ impl App {
         }
         // Channels are recorded from now on, not from the first frame on.
         self.player.pick(&self.plots.picked);
-        self.replay = Replay::new(link);
+        self.replay = Replay::new(link, &mut self.player);
         if self.replay.is_some() {
             self.player.set_playing(false);
         }
@@ -632,27 +632,6 @@ impl App {
         }
     }
 
-    /// Continues towards a section within the frame budget.
-    fn advance_load(&mut self) {
-        let Some((load, twin)) = &mut self.load else {
-            return;
-        };
-        let may_step = replay_budget(self.player.clock);
-        let Some(arrival) = load.advance(&mut self.player, may_step) else {
-            return;
-        };
-        self.player.take_edits();
-        match arrival {
-            Ok(()) => {
-                self.player.set_twin(*twin);
-                self.player.set_playing(true);
-            }
-            Err(why) => self.problem = Some(why),
-        }
-        self.load = None;
-        self.viewport.arrive(&self.player);
-    }
-
     /// Opens a built-in scene or a file; on an error the running scene stays, and the reason is shown.
     pub fn open(&mut self, argument: &str) -> Result<(), String> {
         let scene = Scene::load(argument, &[]).map_err(|error| error.to_string())?;
@@ -707,6 +686,7 @@ impl App {
             self.viewport.arrive(&self.player);
         }
         if self.replay.take().is_some() {
+            self.player.drop_queued();
             let reason = "it was stopped on the way".to_owned();
             self.verdict = Some(Verdict::Failed(reason));
             self.viewport.arrive(&self.player);
@@ -767,11 +747,9 @@ impl App {
     /// Advances the state by `dt` seconds; returns whether it is still changing.
     pub fn advance(&mut self, dt: f64) -> bool {
         self.player.pick(&self.plots.picked);
-        if let Some(replay) = &mut self.replay {
+        if let Some(replay) = &self.replay {
             let may_step = replay_budget(self.player.clock);
             self.verdict = replay.advance(&mut self.player, may_step);
-            // Changes made by the link are not undoable.
-            self.player.take_edits();
             if self.verdict.is_some() {
                 self.verdict_shown = None;
                 self.replay = None;
@@ -779,8 +757,19 @@ impl App {
             }
             return true;
         }
-        if self.load.is_some() {
-            self.advance_load();
+        if let Some((load, twin)) = &mut self.load {
+            let may_step = replay_budget(self.player.clock);
+            if let Some(arrival) = load.advance(&mut self.player, may_step) {
+                match arrival {
+                    Ok(()) => {
+                        self.player.set_twin(*twin);
+                        self.player.set_playing(true);
+                    }
+                    Err(why) => self.problem = Some(why),
+                }
+                self.load = None;
+                self.viewport.arrive(&self.player);
+            }
             return true;
         }
         if self.film.is_some() {
@@ -876,8 +865,7 @@ impl App {
             }
             Action::Home | Action::End => {
                 let end = player.reached();
-                player.go_to(if action == Action::End { end } else { 0.0 });
-                self.viewport.revisit(&self.player);
+                self.look_back(if action == Action::End { end } else { 0.0 });
             }
             Action::Reset => self.reset(),
             Action::Slower | Action::Faster => {

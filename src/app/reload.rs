@@ -153,7 +153,11 @@ impl App {
         (self.plots.chosen, self.plots.window) = (chosen, window);
         self.scene_file = SceneFile { told, ..SceneFile::opened(name, given) };
         self.player.set_phase(phase);
-        let reached = self.reach(time);
+        let (clock, start) = (self.player.clock, (self.player.clock)());
+        let reached = self.player.run_towards(time, || clock() - start < QUICK);
+        if !reached {
+            self.reset();
+        }
         self.player.set_twin(twin);
         self.player.set_playing(playing);
         if let Some(pose) = link.camera {
@@ -178,18 +182,5 @@ impl App {
         };
         self.say(format!("Reloaded {at}{kept}"));
         Ok(())
-    }
-
-    /// Runs to `time`, s, if that is quick; otherwise the run is at its start afterwards. Returns whether it reached that instant
-    /// or the end of the run.
-    fn reach(&mut self, time: f64) -> bool {
-        let clock = self.player.clock;
-        let start = clock();
-        let reached = self.player.run_towards(time, || clock() - start < QUICK);
-        if !reached {
-            // The reloaded run starts again from its beginning.
-            self.reset();
-        }
-        reached
     }
 }

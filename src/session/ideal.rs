@@ -2,14 +2,11 @@
 //! computed only while shown, up to the displayed instant, and does not affect the run.
 
 use super::clock::Clock;
+use super::companion::Companion;
 use crate::machine::{Machine, Output, Vec3};
-use crate::simulate::{Frame, Simulation, StartError, State, Stopped, closed};
+use crate::simulate::{Frame, Simulation, StartError, closed};
 use crate::view::output_point;
 
-/// Most snapshots; at this number every second one is dropped.
-const KEPT: usize = 32;
-/// Initial interval between snapshots, s.
-const APART: f64 = 1e-2;
 /// The ideal motion follows the recording if it is less than this behind, s, in at most this many steps.
 const NEAR: f64 = 0.02;
 const STEPS: u32 = 512;
@@ -62,44 +59,21 @@ impl Gravity {
 /// The ideal motion of a scene.
 pub struct Ideal {
     output: Output,
-    motion: Result<Motion, StartError>,
-}
-
-struct Motion {
-    simulation: Simulation,
-    /// Frame at the latest requested instant reached.
-    frame: Frame,
-    /// Snapshots in order of time; the first is the start.
-    kept: Vec<(f64, State)>,
-    apart: f64,
-    stopped: Option<Stopped>,
+    motion: Result<Companion, StartError>,
 }
 
 impl Ideal {
     /// The ideal motion of `machine`, at its start. [`Self::fault`] reports loops that do not close and a machine too large
     /// with closed joints.
     pub fn new(machine: &Machine) -> Self {
-        let motion = Simulation::new(&closed(machine)).map(|mut simulation| {
-            let mut frame = Frame::default();
-            simulation.sample(simulation.time(), &mut frame);
-            Motion {
-                kept: vec![(simulation.time(), simulation.state().clone())],
-                simulation,
-                frame,
-                apart: APART,
-                stopped: None,
-            }
-        });
-        Self { output: machine.output.clone(), motion }
+        Self { output: machine.output.clone(), motion: Simulation::new(&closed(machine)).map(Companion::new) }
     }
 
     /// Advances to `time`, s, up to which the run is recorded, if that is near.
     pub(crate) fn follow(&mut self, time: f64, gravity: &Gravity) {
-        if let Ok(motion) = &mut self.motion
-            && time - motion.simulation.time() < NEAR
-        {
+        if self.motion.as_ref().is_ok_and(|motion| time - motion.simulation.time() < NEAR) {
             let mut left = STEPS;
-            motion.place(time, gravity, || {
+            self.place(time, gravity, || {
                 left = left.saturating_sub(1);
                 left > 0
             });
@@ -108,34 +82,51 @@ impl Ideal {
 
     /// Advances to `time`, s, within the budget of a frame.
     pub(crate) fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
-        if let Ok(motion) = &mut self.motion
-            && motion.frame.time != time
-        {
+        if self.frame(time).is_none() {
             let start = clock();
-            motion.place(time, gravity, || clock() - start < BUDGET);
+            self.place(time, gravity, || clock() - start < BUDGET);
+        }
+    }
+
+    /// Samples the state at `time`, s, if `may_step` allows the steps needed.
+    fn place(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
+        let Ok(motion) = &mut self.motion else {
+            return;
+        };
+        if time < motion.simulation.step_start() {
+            motion.go_back(time);
+        }
+        let there = motion.advance(time, |motion| {
+            may_step().then(|| {
+                motion.save_state();
+                let now = motion.simulation.time();
+                if motion.simulation.conditions().gravity != gravity.at(now) {
+                    motion.simulation.set_gravity(gravity.at(now));
+                }
+                gravity.next(now)
+            })
+        });
+        if there {
+            motion.show(time);
         }
     }
 
     /// Drops states after `time`, s, where gravity changed or the run branched.
     pub(crate) fn forget_after(&mut self, time: f64) {
         if let Ok(motion) = &mut self.motion {
-            motion.kept.retain(|(kept, _)| *kept <= time);
-            if motion.simulation.time() > time {
-                motion.go_back(time);
-            }
+            motion.forget_after(time);
         }
     }
 
     /// The frame at `time`, s; `None` if that was not reached.
     pub fn frame(&self, time: f64) -> Option<&Frame> {
         let motion = self.motion.as_ref().ok()?;
-        (motion.frame.time == time).then_some(&motion.frame)
+        Some(&motion.frame).filter(|frame| frame.time == time)
     }
 
     /// Whether it still has to reach `time`, s.
     pub fn is_behind(&self, time: f64) -> bool {
-        let motion = self.motion.as_ref();
-        motion.is_ok_and(|motion| motion.frame.time != time && motion.stopped.is_none())
+        self.motion.as_ref().is_ok_and(|motion| motion.frame.time != time && motion.stopped.is_none())
     }
 
     /// Output point of the run in `frame` minus the ideal one at that time, m; `None` if that time was not reached.
@@ -156,59 +147,11 @@ impl Ideal {
     }
 }
 
-impl Motion {
-    /// Samples the state at `time`, s, into the frame, if `may_step` allows the steps needed.
-    fn place(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
-        if time < self.simulation.step_start() {
-            self.go_back(time);
-        }
-        while self.simulation.time() < time {
-            if self.stopped.is_some() || !may_step() {
-                return;
-            }
-            let now = self.simulation.time();
-            self.keep(now);
-            let force = gravity.at(now);
-            if self.simulation.conditions().gravity != force {
-                self.simulation.set_gravity(force);
-            }
-            self.stopped = self.simulation.step_until(gravity.next(now)).err();
-        }
-        self.simulation.sample(time, &mut self.frame);
-    }
-
-    /// Stores a snapshot if the last one is old enough.
-    fn keep(&mut self, now: f64) {
-        let newest = self.kept.last().map_or(f64::NEG_INFINITY, |kept| kept.0);
-        if now < newest + self.apart {
-            return;
-        }
-        if self.kept.len() == KEPT {
-            let mut keep = false;
-            self.kept.retain(|_| {
-                keep = !keep;
-                keep
-            });
-            self.apart *= 2.0;
-        }
-        self.kept.push((now, self.simulation.state().clone()));
-    }
-
-    /// Restores the latest snapshot at or before `time`, s.
-    fn go_back(&mut self, time: f64) {
-        let known = self.kept.partition_point(|(kept, _)| *kept <= time);
-        let Some((_, snapshot)) = self.kept.get(known.max(1) - 1) else {
-            return;
-        };
-        self.simulation.restore(snapshot);
-        self.stopped = None;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{BUILT_IN, Scene};
+    use crate::session::companion::MOST_STATES;
     use crate::session::player::Player;
     use crate::simulate::Quantity;
 
@@ -354,9 +297,8 @@ mod tests {
         let mut ideal = Ideal::new(&scene.machine);
         let gravity = Gravity::new(scene.machine.gravity);
         let at = |ideal: &mut Ideal, time: f64| {
-            let motion = ideal.motion.as_mut().expect("starts");
-            motion.place(time, &gravity, || true);
-            assert!(motion.kept.len() <= KEPT);
+            ideal.place(time, &gravity, || true);
+            assert!(ideal.motion.as_ref().expect("starts").states.len() <= MOST_STATES);
             output_point(&scene.machine.output, ideal.frame(time).expect("came there")).expect("a body")
         };
         let times: Vec<f64> = (0..60).map(|k| 0.05 * f64::from(k)).collect();

@@ -10,6 +10,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
 
 use super::embedded::Embedded;
+use super::goal::Goal;
 use super::log::Log;
 use crate::scene::{DEFAULT_SCENE, LARGEST_FILE, Scene, SceneError, Texts, built_in_text, visible, visible_line};
 use crate::simulate::{Quantity, SCALE_RANGE};
@@ -486,6 +487,12 @@ impl Link {
         // Naming the default scene is a request.
         let bare = Self { theme: self.theme, embedded: self.embedded.clone(), ..Self::default() };
         !text.contains("scene=") && *self == bare
+    }
+
+    /// The instant of the link; without steps and time, the start.
+    pub fn goal(&self) -> Goal {
+        let steps = self.steps.or(self.time.is_none().then_some(0));
+        Goal { steps, time: self.time.unwrap_or(f64::INFINITY) }
     }
 
     /// Whether the link names an instant to go to.

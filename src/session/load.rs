@@ -1,16 +1,13 @@
 //! Runs a scene to a section of a sweep by the same steps as the sweep, within a time budget per frame.
 
+use std::collections::VecDeque;
+
+use super::goal::Goal;
+use super::log::{Entry, Event};
 use super::player::Player;
 use crate::analysis::section::Schedule;
 use crate::analysis::source::SceneSource;
 use crate::analysis::sweep_task::SweptPoint;
-
-/// One sweep point on the way: its settings and its step ends.
-#[derive(Clone, Debug, PartialEq)]
-struct Leg {
-    settings: Vec<(String, String)>,
-    schedule: Schedule,
-}
 
 /// A section of a sweep, and how to reach it.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +16,10 @@ pub struct Load {
     pub scene: SceneSource,
     /// Keys that the sweep varied.
     varied: Vec<String>,
-    legs: Vec<Leg>,
-    next: usize,
+    /// Legs to come: what is set at the beginning of each, and its end, s.
+    legs: VecDeque<(Vec<Event>, f64)>,
+    /// End of the current leg, s, and of the last.
+    next: f64,
     total: f64,
 }
 
@@ -37,23 +36,24 @@ impl Load {
         section: usize,
         periods: usize,
     ) -> Option<Self> {
-        let leg = |point: &SweptPoint, sections| Leg {
-            settings: point.settings.clone(),
-            schedule: Schedule { first: point.first, interval: point.interval, sections, discard: 0 },
-        };
-        let mut point = points(index)?;
-        let mut legs = vec![leg(point, section + 1)];
-        while let Some(before) = point.after {
-            point = points(before)?;
-            legs.push(leg(point, periods));
+        let mut way = vec![points(index)?];
+        while let Some(before) = way[way.len() - 1].after {
+            way.push(points(before)?);
         }
-        legs.reverse();
-        let mut scene = scene.clone();
-        let varied = legs[0].settings.iter().map(|(key, _)| key.clone()).collect();
         // The first point is where the run starts.
-        scene.changes.append(&mut legs[0].settings);
-        let last = legs.last()?.schedule;
-        Some(Self { scene, varied, total: last.time(last.sections.saturating_sub(1)), legs, next: 0 })
+        let first = way[way.len() - 1].settings.clone();
+        let leg = |(at, point): (usize, &&SweptPoint)| {
+            let sections = if at == 0 { section + 1 } else { periods };
+            let schedule = Schedule { first: point.first, interval: point.interval, sections, discard: 0 };
+            let set = point.settings.iter().filter(|_| at + 1 < way.len());
+            let set = set.map(|(key, value)| Event::set(key, value));
+            (set.chain([schedule.into()]).collect(), schedule.time(sections.saturating_sub(1)))
+        };
+        let legs: VecDeque<_> = way.iter().enumerate().map(leg).rev().collect();
+        let varied = first.iter().map(|(key, _)| key.clone()).collect();
+        let mut scene = scene.clone();
+        scene.changes.extend(first);
+        Some(Self { scene, varied, total: legs.back()?.1, legs, next: 0.0 })
     }
 
     /// Keys that the sweep varied.
@@ -69,27 +69,17 @@ impl Load {
     /// Continues while `may_step`; returns how it ended, once there.
     pub fn advance(&mut self, player: &mut Player, mut may_step: impl FnMut() -> bool) -> Option<Arrival> {
         loop {
-            if player.sections_to_come() == 0 {
-                let Some(leg) = self.legs.get(self.next) else {
-                    player.show(player.simulation().time());
-                    return Some(Ok(()));
-                };
-                for (key, value) in &leg.settings {
-                    if let Err(error) = player.set(key, value) {
-                        return Some(Err(error.to_string()));
-                    }
-                }
-                player.end_steps_at(leg.schedule);
-                self.next += 1;
+            match player.continue_to(Goal::at(self.next), &mut may_step) {
+                Ok(true) => {}
+                Ok(false) => return None,
+                Err(obstacle) => return Some(Err(obstacle.to_string())),
             }
-            if !may_step() {
-                player.show(player.simulation().time());
-                return None;
-            }
-            if !player.step() {
-                let why = player.stopped().map(ToString::to_string);
-                return Some(Err(why.unwrap_or_default()));
-            }
+            let Some((events, end)) = self.legs.pop_front() else {
+                return Some(Ok(()));
+            };
+            let steps = player.steps();
+            player.queue(events.into_iter().map(|event| Entry { steps, event }));
+            self.next = end;
         }
     }
 }

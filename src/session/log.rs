@@ -100,6 +100,13 @@ impl Event {
     }
 }
 
+impl From<Schedule> for Event {
+    fn from(schedule: Schedule) -> Self {
+        let Schedule { first, interval, sections, .. } = schedule;
+        Self::Sections { first: Number(first), interval: Number(interval), sections: sections as u64 }
+    }
+}
+
 /// A pull: the body, and the numbers of a [`Pull`]: point, hand, stiffness, damping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulled {
@@ -231,6 +238,90 @@ impl Log {
     }
 }
 
+/// A log and the position of a run in it: the entries passed, and those ahead.
+#[derive(Clone, Debug)]
+pub struct Script {
+    pub(super) log: Log,
+    /// Number of entries passed.
+    pub(super) passed: usize,
+    /// Time of every entry ever passed, s.
+    times: Vec<f64>,
+    /// Prescribed step ends.
+    sections: Option<Schedule>,
+}
+
+impl Script {
+    /// At the start of `log`.
+    pub fn new(log: Log) -> Self {
+        Self { log, passed: 0, times: Vec::new(), sections: None }
+    }
+
+    /// The log up to the position.
+    pub fn past(&self) -> Log {
+        let Log { base, entries } = &self.log;
+        Log { base: base.clone(), entries: entries[..self.passed].to_vec() }
+    }
+
+    /// Whether entries lie ahead.
+    pub fn has_more(&self) -> bool {
+        self.passed < self.log.entries.len()
+    }
+
+    /// The next event, if it is due after `steps` steps.
+    pub fn due(&self, steps: u64) -> Option<&Event> {
+        let next = self.log.entries.get(self.passed)?;
+        (next.steps <= steps).then_some(&next.event)
+    }
+
+    /// Passes the next entry at `time`, s.
+    pub fn pass(&mut self, time: f64) {
+        if self.times.len() == self.passed {
+            self.times.push(time);
+        }
+        self.passed += 1;
+        self.sections = self.log.entries[self.passed - 1].event.schedule().or(self.sections);
+    }
+
+    /// Adds entries ahead.
+    pub fn queue(&mut self, entries: impl IntoIterator<Item = Entry>) {
+        self.log.entries.extend(entries);
+    }
+
+    /// Adds an event that happened after `steps` steps at `time`, s, and drops the entries ahead.
+    pub fn note(&mut self, steps: u64, event: Event, time: f64) {
+        self.cut();
+        self.log.push(steps, event);
+        self.pass(time);
+    }
+
+    /// Returns to the position after `passed` entries.
+    pub fn go_back(&mut self, passed: usize) {
+        self.passed = passed;
+        let entries = self.log.entries[..passed].iter().rev();
+        self.sections = entries.filter_map(|entry| entry.event.schedule()).next();
+    }
+
+    /// Drops the entries ahead.
+    pub fn cut(&mut self) {
+        self.log.entries.truncate(self.passed);
+        self.times.truncate(self.passed);
+    }
+
+    /// Latest end of a step that begins at `now`, s.
+    pub fn step_end(&self, now: f64) -> f64 {
+        self.sections.map_or(f64::INFINITY, |schedule| schedule.next(now))
+    }
+
+    /// Time, s, and description of every event ever passed; a pull has only its start and end.
+    pub fn flags(&self) -> impl Iterator<Item = (f64, String)> {
+        let entries = &self.log.entries;
+        let pulls = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
+        let continues = move |at: usize| at > 0 && pulls(at) && pulls(at - 1);
+        let times = self.times.iter().enumerate().filter(move |(at, _)| !continues(*at));
+        times.map(|(at, time)| (*time, entries[at].event.words()))
+    }
+}
+
 /// Reads `FIRST INTERVAL SECTIONS`.
 fn read_sections(text: &str) -> Option<Event> {
     let mut parts = text.split(' ');
@@ -303,5 +394,22 @@ mod tests {
         ] {
             assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
         }
+    }
+    #[test]
+    fn a_script_knows_what_was_passed_and_drops_what_lies_ahead_of_another_event() {
+        let mut script = Script::new(Log::default());
+        let sections = Event::from(Schedule { first: 1.0, interval: 0.5, sections: 2, discard: 0 });
+        script.queue([Entry { steps: 4, event: sections }, Entry { steps: 9, event: Event::Stop }]);
+        assert_eq!((script.due(3), script.step_end(0.0)), (None, f64::INFINITY));
+        assert!(script.due(4).is_some());
+        script.pass(0.25);
+        assert_eq!((script.due(4), script.due(9), script.step_end(1.2)), (None, Some(&Event::Stop), 1.5));
+        assert_eq!(script.flags().map(|(time, _)| time).collect::<Vec<_>>(), [0.25]);
+        script.go_back(0);
+        assert!(script.step_end(0.0).is_infinite() && script.past().entries.is_empty());
+        script.pass(0.25);
+        script.note(5, Event::Pull(None), 0.3);
+        assert!(!script.has_more());
+        assert_eq!(script.past().entries.iter().map(|entry| entry.steps).collect::<Vec<_>>(), [4, 5]);
     }
 }

@@ -1,7 +1,9 @@
 //! An interactive run: played, rewound, recorded and changed, with companion runs. Independent of any window.
 
 pub mod clock;
+mod companion;
 pub mod embedded;
+pub mod goal;
 pub mod ideal;
 pub mod link;
 pub mod load;

@@ -1,35 +1,34 @@
 //! A running scene with its transport controls: playing, pacing, recording, peaks and warnings. No egui here.
 
+mod before_change;
 pub mod contact_history;
 pub mod impact_record;
 mod keyframes;
+mod record;
 #[cfg(test)]
 mod tests;
 mod travel;
 
 use super::clock::{Clock, wall};
+use super::goal::Goal;
 use super::ideal::{Gravity, Ideal};
-use super::log::{Entry, Event, Log, Number};
+use super::log::{Entry, Event, Log, Script};
 use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::presets::too_slow;
-use crate::analysis::section::Schedule;
 use crate::machine::Warning;
 use crate::scene::{LiveScene, SOLVER_KEYS, Scene, SetError, Value};
 use crate::simulate::{
-    Channels, ContactMode, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
-    StartError, Stopped, Wear,
+    Channels, ContactMode, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, Simulation, StartError, Stopped,
+    Wear,
 };
-use contact_history::ContactHistory;
-use impact_record::ImpactRecord;
+use before_change::{BeforeChange, copy_of};
 use keyframes::Keyframes;
+use record::Record;
 use travel::ImpactSearch;
 pub use travel::{AbandonedFuture, Flag};
-
-/// Narrowest bin of the record, s: shorter than any step that resolves an impact.
-const FINEST_BIN: f64 = 2e-6;
 
 /// A simulation and everything needed to play and plot it.
 ///
@@ -47,32 +46,13 @@ pub struct Player {
     /// The scene as loaded from its file.
     original: Scene,
     /// Warnings about settings that are valid but may surprise the user.
-    warnings: Vec<Known>,
+    warnings: Vec<(Option<&'static str>, String)>,
     playing: bool,
     /// Time runs backwards while it plays.
     backwards: bool,
     stopped: Option<Stopped>,
     frame: Frame,
-    peaks: Vec<Peak>,
-    /// Peaks of the latest step after the displayed instant.
-    coming: Vec<Peak>,
-    /// Peaks since the previous frame.
-    passed: Vec<Peak>,
-    channels: Channels,
-    /// Name patterns of the picked channels.
-    picks: Vec<String>,
-    /// Record of the channels, then the clearance of each recorded ball joint, then the picked channels.
-    history: History,
-    /// Full-resolution record of the time window last retraced.
-    near: Option<Box<History>>,
-    contact_history: ContactHistory,
-    impact_record: ImpactRecord,
-    recorded: Frame,
-    /// Time up to which the latest steps were recorded, s.
-    recorded_to: f64,
-    values: Vec<f64>,
-    settling: Settling,
-    paths: Paths,
+    record: Record,
     keyframes: Keyframes,
     /// Latest instant ever displayed, s, and largest number of steps taken.
     reached: f64,
@@ -80,21 +60,11 @@ pub struct Player {
     /// The future abandoned when the run branched from its past.
     left: Option<Box<AbandonedFuture>>,
     sought: Option<ImpactSearch>,
-    /// Events since the start.
-    log: Log,
+    /// Events since the start, and those ahead of the displayed instant.
+    script: Script,
     /// Parameter changes since the last `take_edits`.
     edits: Vec<Edit>,
-    /// Whether to copy the run before a change; the key of the current gesture, which counts as one change; the latest copy
-    /// with the key changed after it.
-    keeps_before: bool,
-    gesture: Option<String>,
-    before: Option<(Box<Self>, String)>,
-    /// Number of log entries before the displayed instant, and the time of every entry, s.
-    applied: usize,
-    event_times: Vec<f64>,
-    /// Prescribed step ends.
-    sections: Option<Schedule>,
-    watch: RunWatch,
+    before_change: BeforeChange,
     twin: Option<Box<Twin>>,
     /// Gravity since the start, for the ideal motion.
     gravity: Gravity,
@@ -130,27 +100,11 @@ const LEAST_MEASURED: f64 = 1e-3;
 /// Most instants recorded within one step.
 const MOST_RECORDED: f64 = 64.0;
 
-/// A warning about a scene before it runs.
-#[derive(Clone)]
-struct Known {
-    /// As [`Warning::key`].
-    key: Option<&'static str>,
-    sentence: String,
-}
-
-impl Known {
-    /// All warnings about `scene`.
-    fn of(scene: &Scene) -> Vec<Self> {
-        let known = |warning: Warning| Self { key: warning.key(), sentence: warning.to_string() };
-        let slow = too_slow(scene).map(|slow| Self { key: Some("solver.preset"), sentence: slow.to_string() });
-        scene.machine.warnings().into_iter().map(known).chain(slow).collect()
-    }
-
-    /// Whether it concerns `key`, a parameter of the scene or of a ball joint.
-    fn is_about(&self, key: &str) -> bool {
-        let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
-        self.key.is_some_and(|own| own == last.unwrap_or(key))
-    }
+/// The key, as [`Warning::key`], and the sentence of every warning about `scene` before it runs.
+fn warnings_of(scene: &Scene) -> Vec<(Option<&'static str>, String)> {
+    let known = |warning: Warning| (warning.key(), warning.to_string());
+    let slow = too_slow(scene).map(|slow| (Some("solver.preset"), slow.to_string()));
+    scene.machine.warnings().into_iter().map(known).chain(slow).collect()
 }
 
 impl Player {
@@ -159,159 +113,48 @@ impl Player {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
-        let simulation = LiveScene::new(scene)?;
         // The text parsed before; if it fails now, a control's default is its present value.
         let original = Scene::parse_with(&scene.source.text, scene.source.file.as_deref(), &scene.source.beside, &[])
             .unwrap_or_else(|_| scene.clone());
-        let channels = Channels::of(&scene.machine);
-        let mut player = Self {
+        let mut player = Self::of(LiveScene::new(scene)?, original);
+        player.start();
+        Ok(player)
+    }
+
+    /// A paused run that nothing is recorded of yet.
+    fn of(simulation: LiveScene, original: Scene) -> Self {
+        let scene = simulation.running();
+        Self {
             pacer: Pacer::default(),
             clock: wall,
             original,
-            warnings: Known::of(scene),
+            warnings: warnings_of(scene),
             playing: false,
             backwards: false,
             stopped: None,
             frame: Frame::default(),
-            peaks: Vec::new(),
-            coming: Vec::new(),
-            passed: Vec::new(),
             unchanged: None,
-            history: record_of(scene, &channels),
-            near: None,
-            contact_history: ContactHistory::default(),
-            impact_record: ImpactRecord::default(),
-            channels,
-            picks: Vec::new(),
-            recorded: Frame::default(),
-            recorded_to: 0.0,
-            values: Vec::new(),
-            settling: Settling::new(scene),
-            paths: Paths::new(scene),
+            record: Record::new(scene),
             keyframes: Keyframes::default(),
             reached: 0.0,
             most_steps: 0,
             left: None,
             sought: None,
-            applied: 0,
-            event_times: Vec::new(),
             stepped: 0.0,
             stepping: 0.0,
-            log: Log::new(&scene.changes),
+            script: Script::new(Log::new(&scene.changes)),
             edits: Vec::new(),
-            keeps_before: false,
-            gesture: None,
-            before: None,
-            sections: None,
-            watch: RunWatch::new(scene),
+            before_change: BeforeChange::default(),
             twin: None,
             gravity: Gravity::new(scene.machine.gravity),
             ideal: None,
             simulation,
-        };
-        player.start_record();
-        Ok(player)
-    }
-
-    /// A paused copy of the run and its record, without the twin, unaffected by later changes to this run.
-    fn copy(&self) -> Self {
-        let run = |run: &LiveScene| LiveScene::of(&run.snapshot());
-        let scene = self.simulation.running();
-        Self {
-            pacer: self.pacer.clone(),
-            clock: self.clock,
-            simulation: run(&self.simulation),
-            unchanged: self.unchanged.as_ref().map(|unchanged| Box::new(run(unchanged))),
-            original: self.original.clone(),
-            warnings: self.warnings.clone(),
-            playing: false,
-            backwards: false,
-            stopped: self.stopped.clone(),
-            frame: self.frame.clone(),
-            peaks: self.peaks.clone(),
-            coming: self.coming.clone(),
-            passed: self.passed.clone(),
-            channels: self.channels.clone(),
-            picks: self.picks.clone(),
-            history: self.history.clone(),
-            near: self.near.clone(),
-            contact_history: self.contact_history.clone(),
-            impact_record: self.impact_record.clone(),
-            recorded: self.recorded.clone(),
-            recorded_to: self.recorded_to,
-            values: self.values.clone(),
-            settling: self.settling.clone(),
-            paths: self.paths.clone(),
-            keyframes: self.keyframes.copy(),
-            reached: self.reached,
-            most_steps: self.most_steps,
-            left: None,
-            sought: None,
-            log: self.log.clone(),
-            edits: Vec::new(),
-            keeps_before: false,
-            gesture: None,
-            before: None,
-            applied: self.applied,
-            event_times: self.event_times.clone(),
-            sections: self.sections,
-            watch: self.watch.clone(),
-            twin: None,
-            gravity: self.gravity.clone(),
-            ideal: self.ideal.is_some().then(|| Box::new(Ideal::new(&scene.machine))),
-            stepped: self.stepped,
-            stepping: self.stepping,
-        }
-    }
-
-    /// Sets whether the run is copied before each parameter change, for [`Self::take_before`].
-    pub(crate) fn keep_before(&mut self, on: bool) {
-        self.keeps_before = on;
-    }
-
-    /// Ends the current gesture: the next change counts as a new one, even for the same parameter.
-    pub(crate) fn end_gesture(&mut self) {
-        self.gesture = None;
-    }
-
-    /// Takes the copy made before the latest parameter change, with the key; `None` if none was made since the last call.
-    pub(crate) fn take_before(&mut self) -> Option<(Box<Self>, String)> {
-        self.before.take()
-    }
-
-    /// Whether the whole record used the current parameters and no pull acted.
-    pub(crate) fn is_as_started(&self) -> bool {
-        self.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_waiting()
-    }
-
-    /// Displays `time`, s, stepping while `may_step`. Returns true once it is reached or the run cannot continue.
-    pub(crate) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
-        if time <= self.reached {
-            if time != self.pacer.shown() {
-                self.go_to(time);
-            }
-            true
-        } else {
-            self.run_towards(time, may_step)
         }
     }
 
     /// Name patterns of the picked channels.
     pub(crate) fn picks(&self) -> &[String] {
-        &self.picks
-    }
-
-    /// Copies the run before a change of `key`, if requested and not within the same gesture.
-    fn before_change(&self, key: &str) -> Option<Box<Self>> {
-        (self.keeps_before && self.gesture.as_deref() != Some(key)).then(|| Box::new(self.copy()))
-    }
-
-    /// Stores `before`, the copy made before `key` changed, unless the value is the same.
-    fn changed_from(&mut self, before: Option<Box<Self>>, key: &str) {
-        let changed = |before: &Self| before.pending().changes != self.pending().changes;
-        if let Some(before) = before.filter(|before| changed(before)) {
-            (self.before, self.gesture) = (Some((before, key.to_owned())), Some(key.to_owned()));
-        }
+        &self.record.picks
     }
 
     /// The simulation.
@@ -336,75 +179,68 @@ impl Player {
 
     /// Largest forces since the previous frame, per ball joint.
     pub fn peaks(&self) -> &[Peak] {
-        &self.peaks
+        &self.record.peaks
     }
 
     /// Which channels are recorded.
     pub fn channels(&self) -> &Channels {
-        &self.channels
+        &self.record.channels
     }
 
     /// Record channels that hold the clearances of the ball joints over time.
     pub fn clearances(&self) -> std::ops::Range<usize> {
-        self.channels.len()..self.history.channels() - self.channels.picked().len()
+        self.record.channels.len()..self.record.history.channels() - self.record.channels.picked().len()
     }
 
     /// Record channels that hold the picked channels.
     pub fn picked(&self) -> std::ops::Range<usize> {
-        self.clearances().end..self.history.channels()
+        self.clearances().end..self.record.history.channels()
     }
 
     /// Also records the channels that match `patterns`, from now on. Earlier picks that do not match are dropped.
     pub fn pick(&mut self, patterns: &[String]) {
-        if self.picks == patterns {
+        if self.record.picks == patterns {
             return;
         }
-        self.picks = patterns.to_vec();
-        let (first, channels) = (self.clearances().end, self.history.channels());
-        let old = self.channels.clone();
-        self.channels.pick(&self.simulation.running().machine, &self.frame, patterns);
+        self.record.picks = patterns.to_vec();
+        let (first, channels) = (self.clearances().end, self.record.history.channels());
+        let old = self.record.channels.clone();
+        self.record.channels.pick(&self.simulation.running().machine, &self.frame, patterns);
         let place = |new: &Listed| {
             let same = |old: &Listed| old.column == new.column;
             old.picked().iter().position(same).map(|at| first + at)
         };
-        let picked = self.channels.picked().iter().map(place);
+        let picked = self.record.channels.picked().iter().map(place);
         let from: Vec<Option<usize>> = (0..first).map(Some).chain(picked).collect();
         let left = self.left.as_mut().map(|left| &mut left.history);
-        let near = self.near.as_deref_mut();
-        for record in std::iter::once(&mut self.history).chain(near).chain(left) {
+        let near = self.record.near.as_deref_mut();
+        for record in std::iter::once(&mut self.record.history).chain(near).chain(left) {
             *record = record.rearranged(&from);
         }
         self.keyframes.rearrange(channels, &from);
-        self.channels.ask(&mut self.recorded);
+        self.record.channels.ask(&mut self.record.recorded);
         // New channels start at the displayed instant.
-        let mut frame = std::mem::take(&mut self.recorded);
-        let time = self.recorded_to;
-        self.run_at(time).sample(time, &mut frame);
-        self.read(&frame);
-        self.recorded = frame;
-        self.push(time);
+        self.record_at(self.record.recorded_to);
     }
 
     /// The record of the run, as far as it was ever displayed.
     pub fn history(&self) -> &History {
-        &self.history
+        &self.record.history
     }
 
     /// The recent paths of the balls.
     pub fn paths(&self) -> &Paths {
-        &self.paths
+        &self.record.paths
     }
 
     /// Events from the start of the run to the displayed instant.
     pub fn log(&self) -> Log {
-        let mut log = self.log.clone();
-        log.entries.truncate(self.applied);
-        log
+        self.script.past()
     }
 
     /// Orbit and sections of the run for the chaos bench.
     pub fn watch(&self) -> &RunWatch {
-        &self.watch
+        &self.record.watch
     }
 
     /// Wear of the sockets since the start, over the steps completed at the displayed instant.
@@ -414,7 +250,7 @@ impl Player {
 
     /// Sets the drive phase of the sections.
     pub fn set_phase(&mut self, phase: f64) {
-        self.watch.set_phase(phase, self.pacer.shown());
+        self.record.watch.set_phase(phase, self.pacer.shown());
     }
 
     /// The twin run, if there is one.
@@ -453,36 +289,26 @@ impl Player {
         self.twin = on.then(|| Box::new(Twin::new(&self.simulation)));
     }
 
-    /// Restarts the twin from the present state.
-    fn restart_twin(&mut self) {
-        if let Some(twin) = &mut self.twin {
+    /// Restarts the twin from the present state if `is_wrong` for its start, s.
+    fn restart_twin(&mut self, is_wrong: impl Fn(f64) -> bool) {
+        if let Some(twin) = self.twin.as_mut().filter(|twin| is_wrong(twin.begins())) {
             twin.restart(&self.simulation);
         }
     }
 
-    /// Makes steps end at the instants of `schedule` from now on.
-    pub(crate) fn end_steps_at(&mut self, schedule: Schedule) {
-        let event = Event::Sections {
-            first: Number(schedule.first),
-            interval: Number(schedule.interval),
-            sections: schedule.sections as u64,
-        };
-        self.branch();
-        self.sections = Some(schedule);
-        self.note(event);
+    /// Adds events that [`Self::continue_to`] applies on its way.
+    pub(crate) fn queue(&mut self, entries: impl IntoIterator<Item = Entry>) {
+        self.script.queue(entries);
+    }
+
+    /// Drops the queued events that were not reached.
+    pub(crate) fn drop_queued(&mut self) {
+        self.script.cut();
     }
 
     /// Logs an event at the present step.
     fn note(&mut self, event: Event) {
-        self.log.push(self.steps(), event);
-        self.event_times.push(self.simulation.time());
-        self.applied = self.log.entries.len();
-    }
-
-    /// Number of scheduled instants still ahead.
-    pub(crate) fn sections_to_come(&self) -> usize {
-        let now = self.simulation.time();
-        self.sections.map_or(0, |schedule| schedule.sections - schedule.passed(now))
+        self.script.note(self.steps(), event, self.simulation.time());
     }
 
     /// Accepted steps since the start.
@@ -531,7 +357,7 @@ impl Player {
 
     /// Whether the motion relative to the drives has ended.
     pub fn has_settled(&self) -> bool {
-        self.settling.has_settled()
+        self.record.settling.has_settled()
     }
 
     /// Advances by one frame, `dt` seconds after the last, and updates the display.
@@ -574,20 +400,14 @@ impl Player {
             return 0.0;
         }
         let (start, before) = ((self.clock)(), self.simulation.time());
-        while self.simulation.time() < target && may_step(&self.pacer, (self.clock)() - start) {
-            if !self.step() {
-                break;
-            }
-        }
+        let in_time = |player: &Self| may_step(&player.pacer, (player.clock)() - start);
+        // A stop is displayed by the window.
+        let _ = self.step_towards(target, |player| player.simulation.time() >= target, in_time);
         let spent = (self.clock)() - start;
-        self.measure(self.simulation.time() - before, spent);
+        let keep = libm::exp(-spent / MEASURED);
+        self.stepped = self.stepped * keep + (self.simulation.time() - before);
+        self.stepping = self.stepping * keep + spent;
         spent
-    }
-
-    fn measure(&mut self, stepped: f64, stepping: f64) {
-        let keep = libm::exp(-stepping / MEASURED);
-        self.stepped = self.stepped * keep + stepped;
-        self.stepping = self.stepping * keep + stepping;
     }
 
     /// Recent simulated seconds per second of stepping, recording included; `None` until enough steps were measured.
@@ -607,15 +427,11 @@ impl Player {
 
     /// Takes one accepted step and displays its end.
     pub fn single_step(&mut self) {
-        self.set_playing(false);
-        if self.stopped.is_some() {
-            return;
+        self.set_paused();
+        if self.stopped.is_none() {
+            self.go_on();
+            let _ = self.continue_to(Goal::after(self.steps() + 1), || true);
         }
-        self.go_on();
-        // Record to the start of the new step, not only to the displayed instant within the previous one.
-        self.record_until(self.simulation.time());
-        self.step();
-        self.show_latest();
     }
 
     /// Pauses and steps to `time`, s, without a time budget: the start of a headless frame.
@@ -624,51 +440,36 @@ impl Player {
     }
 
     /// The same while `may_step`. Returns true once `time` is reached or the run cannot continue.
-    pub fn run_towards(&mut self, time: f64, mut may_step: impl FnMut() -> bool) -> bool {
-        self.set_playing(false);
+    pub fn run_towards(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
+        self.set_paused();
         self.go_on();
-        let mut goes = true;
-        while goes && self.simulation.time() < time && self.stopped.is_none() {
-            goes = may_step();
-            if goes {
-                self.step();
-            }
-        }
-        self.show(time);
-        goes
-    }
-
-    /// Displays `time`, s, clamped to the rest of the latest step: this never goes back.
-    pub(crate) fn show(&mut self, time: f64) {
-        let shown = time.max(self.recorded_to).min(self.simulation.time());
-        self.pacer.jump(shown);
-        self.present();
+        self.continue_to(Goal::at(time), may_step) != Ok(false)
     }
 
     /// Back to t = 0 with every change applied.
     ///
     /// # Errors
-    /// As [`LiveScene::reset`]; the run is left unchanged.
+    /// As [`Simulation::new`]; the run is left unchanged.
     pub fn reset(&mut self) -> Result<(), StartError> {
-        self.simulation.reset()?;
-        self.stopped = None;
-        self.log = Log::new(&self.simulation.pending().changes);
-        self.sections = None;
-        self.watch.begin(self.simulation.running(), 0.0);
-        self.restart_twin();
-        let mut first = Frame::default();
-        if !self.picks.is_empty() {
-            self.simulation.sample(0.0, &mut first);
-        }
-        let scene = self.simulation.running();
-        let mut channels = Channels::of(&scene.machine);
-        channels.pick(&scene.machine, &first, &self.picks);
-        if channels.list() != self.channels.list() || channels.picked().len() != self.channels.picked().len() {
-            self.history = record_of(scene, &channels);
-        }
-        channels.ask(&mut self.recorded);
-        self.channels = channels;
-        self.start_record();
+        let simulation = LiveScene::new(self.pending())?;
+        // A new run with the same settings.
+        let mut run = Self {
+            pacer: self.pacer.clone(),
+            clock: self.clock,
+            playing: self.playing,
+            backwards: self.backwards,
+            edits: std::mem::take(&mut self.edits),
+            before_change: std::mem::take(&mut self.before_change),
+            stepped: self.stepped,
+            stepping: self.stepping,
+            ..Self::of(simulation, self.original.clone())
+        };
+        run.record.watch.set_phase(self.record.watch.phase(), 0.0);
+        run.set_ideal(self.ideal.is_some());
+        run.set_twin(self.twin.is_some());
+        run.start();
+        run.pick(&self.record.picks);
+        *self = run;
         Ok(())
     }
 
@@ -677,19 +478,11 @@ impl Player {
     /// # Errors
     /// As [`LiveScene::set`]; the run is left unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SetError> {
-        let run_before = self.before_change(key);
         if self.has_future() {
             // A refused change must not abandon the future.
             self.pending().clone().set(key, value)?;
-            self.branch();
         }
-        let before = self.pending().changes.clone();
-        let event = Event::set(key, value);
-        let effect = self.apply(&event)?;
-        self.note(event);
-        self.note_edits(&before);
-        self.changed_from(run_before, key);
-        Ok(effect)
+        self.change(key, Event::set(key, value))
     }
 
     /// Records the edits relative to the changes `before`.
@@ -732,7 +525,7 @@ impl Player {
         let effect = if pacer.shown() >= run.time() || run.step_start() >= run.time() {
             event.apply(run, original)?
         } else {
-            let mut copy = LiveScene::of(&run.snapshot());
+            let mut copy = copy_of(run);
             let effect = event.apply(&mut copy, original)?;
             *unchanged = Some(Box::new(std::mem::replace(run, copy)));
             effect
@@ -754,15 +547,7 @@ impl Player {
     /// As [`LiveScene::set_value`]; the run is left unchanged.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SetError> {
         self.original.get(key)?;
-        let run_before = self.before_change(key);
-        self.branch();
-        let before = self.pending().changes.clone();
-        let event = Event::Original { key: key.to_owned() };
-        let effect = self.apply(&event)?;
-        self.note(event);
-        self.note_edits(&before);
-        self.changed_from(run_before, key);
-        Ok(effect)
+        self.change(key, Event::Original { key: key.to_owned() })
     }
 
     /// Starts, changes or ends a pull on a body.
@@ -775,28 +560,25 @@ impl Player {
         }
         pull.map_or(Ok(()), |pull| self.simulation.check_pull(&pull))?;
         self.branch();
+        let event = Event::Pull(pull.map(Into::into));
+        self.apply(&event)?;
         // Only the last of several moves between two steps counts.
         let steps = self.steps();
         let moved = |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
-        if pull.is_some() && self.log.entries.last().is_some_and(moved) {
-            self.log.entries.pop();
-            self.event_times.pop();
+        if pull.is_some() && self.script.log.entries.last().is_some_and(moved) {
+            self.script.go_back(self.script.passed - 1);
         }
-        let event = Event::Pull(pull.map(Into::into));
-        self.apply(&event)?;
         self.note(event);
         Ok(())
     }
 
     fn after_change(&mut self) {
-        self.warnings = Known::of(self.pending());
-        self.watch.begin(self.simulation.running(), self.simulation.time());
-        self.settling = Settling::new(self.simulation.running());
+        self.warnings = warnings_of(self.pending());
+        self.record.watch.begin(self.simulation.running(), self.simulation.time());
+        self.record.settling = Settling::new(self.simulation.running());
         // While the run is retraced, the twin may begin later than now.
         let now = self.simulation.time();
-        if self.twin.as_ref().is_some_and(|twin| twin.begins() <= now) {
-            self.restart_twin();
-        }
+        self.restart_twin(|begins| begins <= now);
         self.present();
     }
 
@@ -812,12 +594,14 @@ impl Player {
 
     /// Warnings, as sentences, about settings that are valid but may surprise the user.
     pub fn warnings(&self) -> impl Iterator<Item = &str> {
-        self.warnings.iter().map(|known| &*known.sentence)
+        self.warnings.iter().map(|(_, sentence)| &**sentence)
     }
 
     /// Warning about the present value of `key`, if any.
     pub fn warning(&self, key: &str) -> Option<&str> {
-        self.warnings.iter().find(|known| known.is_about(key)).map(|known| &*known.sentence)
+        let last = key.strip_prefix("contact.").or_else(|| key.strip_prefix("joint.")?.rsplit('.').next());
+        let mut warnings = self.warnings.iter();
+        warnings.find(|(own, _)| own.is_some_and(|own| own == last.unwrap_or(key))).map(|(_, sentence)| &**sentence)
     }
 
     /// Value of `key` in the scene file.
@@ -829,12 +613,12 @@ impl Player {
     pub(crate) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.keep();
-        let end = self.next_section();
+        let end = self.script.step_end(self.simulation.time());
         match self.simulation.step_until(end) {
             Ok(()) => {
                 self.unchanged = None;
-                self.simulation.take_peaks(&mut self.coming);
-                self.impact_record.record(&mut self.simulation, &self.coming);
+                self.simulation.take_peaks(&mut self.record.coming);
+                self.record.impact_record.record(&mut self.simulation, &self.record.coming);
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
@@ -849,19 +633,14 @@ impl Player {
             Err(stopped) => {
                 self.playing = false;
                 self.stopped = Some(stopped);
-                match self.log.entries.get(self.applied) {
-                    // Retraced: the stop is already in the log.
-                    Some(entry) if entry.event == Event::Stop => self.applied += 1,
+                match self.script.due(self.steps()) {
+                    // Repeated: the stop is already in the log.
+                    Some(Event::Stop) => self.script.pass(self.simulation.time()),
                     _ => self.note(Event::Stop),
                 }
                 false
             }
         }
-    }
-
-    /// Latest end of the next step, s.
-    fn next_section(&self) -> f64 {
-        self.sections.map_or(f64::INFINITY, |schedule| schedule.next(self.simulation.time()))
     }
 
     /// The run to sample at `time`, s, within the latest step.
@@ -874,7 +653,11 @@ impl Player {
 
     /// Records the latest step up to `until`, s.
     fn record_until(&mut self, until: f64) {
-        let start = self.recorded_to;
+        let start = self.record.recorded_to;
+        let next_peak = |player: &Self| {
+            let forces = player.record.coming.iter().filter(|peak| peak.normal > 0.0);
+            forces.map(|peak| peak.time).min_by(f64::total_cmp)
+        };
         if until > start {
             // A long step is also recorded at instants within it, so that plots stay smooth.
             let parts = ((until - start) / self.automatic_window() * 400.0).ceil().clamp(1.0, MOST_RECORDED);
@@ -883,92 +666,72 @@ impl Player {
                     if f64::from(part) == parts { until } else { start + (until - start) * f64::from(part) / parts };
                 // A peak between two instants adds another instant.
                 let close = end - 1e-3 * (end - start) / parts;
-                while let Some(peak) = self.next_peak().filter(|peak| *peak < close) {
-                    self.record(peak);
+                while let Some(peak) = next_peak(self).filter(|peak| *peak < close) {
+                    self.record_at(peak);
                     self.pass_peaks(peak);
                 }
-                self.record(end);
+                self.record_at(end);
             }
         }
         self.pass_peaks(until);
-        let run = match &mut self.unchanged {
-            Some(run) => run,
-            None => &mut self.simulation,
-        };
-        self.watch.step(run, until);
+        self.record.watch.step(self.unchanged.as_deref_mut().unwrap_or(&mut self.simulation), until);
     }
 
-    /// Time of the next peak, s.
-    fn next_peak(&self) -> Option<f64> {
-        let forces = self.coming.iter().filter(|peak| peak.normal > 0.0);
-        forces.map(|peak| peak.time).min_by(f64::total_cmp)
-    }
-
-    fn record(&mut self, time: f64) {
-        let mut frame = std::mem::take(&mut self.recorded);
+    /// Records the instant `time`, s, of the latest step.
+    fn record_at(&mut self, time: f64) {
+        let mut frame = std::mem::take(&mut self.record.recorded);
         self.run_at(time).sample(time, &mut frame);
-        self.read(&frame);
-        for (joint, peak) in self.coming.iter().enumerate() {
+        self.record.channels.read(&frame, &mut self.record.values);
+        let joints = frame.joints.iter().take(self.clearances().len());
+        self.record.values.extend(joints.map(|joint| joint.clearance));
+        self.record.channels.read_picked(&frame, &mut self.record.values);
+        for (joint, peak) in self.record.coming.iter().enumerate() {
             // The peak comes from the cubic of the step, not from the interpolated state.
             if peak.normal > 0.0
                 && peak.time == time
-                && let Some(channel) = self.channels.normal_force(joint)
+                && let Some(channel) = self.record.channels.normal_force(joint)
             {
-                self.values[channel] = peak.normal;
+                self.record.values[channel] = peak.normal;
             }
         }
-        self.recorded_to = time;
+        self.record.recorded_to = time;
         if let Some(ideal) = &mut self.ideal {
             ideal.follow(time, &self.gravity);
             let error = ideal.output_error(&frame).map_or(f64::NAN, |e| e.norm());
-            self.values[self.channels.tip_error()] = error;
+            self.record.values[self.record.channels.tip_error()] = error;
         }
-        self.push(time);
-        self.contact_history.record(&frame);
-        self.watch.record(&frame);
-        self.settling.record(&frame);
-        self.paths.record(&frame);
-        self.recorded = frame;
-    }
-
-    /// Reads the recorded channels of `frame`.
-    fn read(&mut self, frame: &Frame) {
-        self.channels.read(frame, &mut self.values);
-        let joints = frame.joints.iter().take(self.clearances().len());
-        self.values.extend(joints.map(|joint| joint.clearance));
-        self.channels.read_picked(frame, &mut self.values);
-    }
-
-    /// Appends the values read at `time`, s, to the record.
-    fn push(&mut self, time: f64) {
-        self.history.push(time, &self.values);
-        if let Some(near) = &mut self.near {
-            near.push(time, &self.values);
+        for record in std::iter::once(&mut self.record.history).chain(self.record.near.as_deref_mut()) {
+            record.push(time, &self.record.values);
         }
+        self.record.contact_history.record(&frame);
+        self.record.watch.record(&frame);
+        self.record.settling.record(&frame);
+        self.record.paths.record(&frame);
+        self.record.recorded = frame;
     }
 
     /// Adds the peaks up to `time`, s, to the record and to the frame's peaks.
     fn pass_peaks(&mut self, time: f64) {
-        self.passed.resize(self.coming.len(), Peak::default());
+        self.record.passed.resize(self.record.coming.len(), Peak::default());
         let all = time >= self.simulation.time();
         if all {
             self.simulation.commit_wear();
         }
-        for joint in 0..self.coming.len() {
-            let peak = self.coming[joint];
+        for joint in 0..self.record.coming.len() {
+            let peak = self.record.coming[joint];
             // A contact that carries no force yet began at the end of the step.
             if !all && (peak.normal <= 0.0 || peak.time > time) {
                 continue;
             }
-            self.coming[joint] = Peak::default();
+            self.record.coming[joint] = Peak::default();
             if peak.normal > 0.0
-                && let Some(channel) = self.channels.normal_force(joint)
+                && let Some(channel) = self.record.channels.normal_force(joint)
             {
-                for record in std::iter::once(&mut self.history).chain(self.near.as_deref_mut()) {
+                for record in std::iter::once(&mut self.record.history).chain(self.record.near.as_deref_mut()) {
                     record.widen(peak.time, channel, peak.normal);
                 }
             }
-            let passed = &mut self.passed[joint];
+            let passed = &mut self.record.passed[joint];
             let (impacts, speed) = (passed.impacts, passed.approach_speed);
             if peak.normal > passed.normal {
                 *passed = peak;
@@ -980,17 +743,9 @@ impl Player {
 
     /// Hands out the peaks since the previous call.
     pub(crate) fn hand_out_peaks(&mut self) {
-        std::mem::swap(&mut self.peaks, &mut self.passed);
-        self.passed.clear();
-        self.passed.resize(self.peaks.len(), Peak::default());
-    }
-
-    fn forget_peaks(&mut self) {
-        let joints = self.simulation.running().machine.ball_joints.len();
-        for peaks in [&mut self.peaks, &mut self.coming, &mut self.passed] {
-            peaks.clear();
-            peaks.resize(joints, Peak::default());
-        }
+        std::mem::swap(&mut self.record.peaks, &mut self.record.passed);
+        self.record.passed.clear();
+        self.record.passed.resize(self.record.peaks.len(), Peak::default());
     }
 
     /// Records up to the displayed instant and samples the frame there.
@@ -998,7 +753,7 @@ impl Player {
         let shown = self.pacer.shown();
         self.record_until(shown);
         self.reached = self.reached.max(shown);
-        self.watch.show(shown);
+        self.record.watch.show(shown);
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
         // The hand is shown at its current position, although it acts only from the next step on.
@@ -1021,33 +776,17 @@ impl Player {
         }
     }
 
-    fn show_latest(&mut self) {
+    /// Records and displays the start of the run.
+    fn start(&mut self) {
+        self.simulation.keep_wear();
+        self.record.contact_history.begin(0.0);
+        // Forces at the start belong to the first frame: there has been no impact yet.
+        self.simulation.take_peaks(&mut self.record.coming);
+        self.record.impact_record.begin(&self.record.coming);
+        self.record.forget_peaks();
+        self.record_at(self.simulation.time());
+        self.keep();
         self.pacer.jump(self.simulation.time());
         self.present();
     }
-
-    fn start_record(&mut self) {
-        self.history.clear();
-        self.clear_rewind();
-        self.unchanged = None;
-        self.settling = Settling::new(self.simulation.running());
-        self.paths = Paths::new(self.simulation.running());
-        self.gravity = Gravity::new(self.simulation.running().machine.gravity);
-        self.set_ideal(self.ideal.is_some());
-        self.simulation.keep_wear();
-        // Forces at the start belong to the first frame: there has been no impact yet.
-        self.simulation.take_peaks(&mut self.coming);
-        self.impact_record.begin(&self.coming);
-        self.forget_peaks();
-        self.record(self.simulation.time());
-        self.keep();
-        self.show_latest();
-    }
-}
-
-/// An empty record of `channels`, the clearances and the picked channels.
-fn record_of(scene: &Scene, channels: &Channels) -> History {
-    let joints = scene.machine.ball_joints.len().min(RECORDED_JOINTS);
-    let picked = channels.picked().len();
-    History::new(channels.len() + joints + picked, FINEST_BIN)
 }

@@ -1,7 +1,7 @@
 //! Replays a run to the instant of a link, within a time budget per frame, and verifies the state.
 
+use super::goal::Obstacle;
 use super::link::Link;
-use super::log::{Entry, Event};
 use super::player::Player;
 
 /// The outcome of a link.
@@ -28,13 +28,15 @@ pub enum Verdict {
 #[derive(Debug)]
 pub struct Replay {
     link: Link,
-    next: usize,
 }
 
 impl Replay {
-    /// A replay to the instant of `link`; `None` if it names none.
-    pub fn new(link: Link) -> Option<Self> {
-        link.has_instant().then_some(Self { link, next: 0 })
+    /// A replay to the instant of `link` by `player`, which is at its start; `None` if the link names none.
+    pub fn new(link: Link, player: &mut Player) -> Option<Self> {
+        link.has_instant().then(|| {
+            player.queue(link.log.entries.iter().cloned());
+            Self { link }
+        })
     }
 
     /// The link.
@@ -53,66 +55,19 @@ impl Replay {
     }
 
     /// Continues while `may_step`; returns the verdict once there.
-    pub fn advance(&mut self, player: &mut Player, mut may_step: impl FnMut() -> bool) -> Option<Verdict> {
-        loop {
-            while let Some(entry) = self.due(player) {
-                self.next += 1;
-                if let Err(reason) = apply(player, &entry) {
-                    return Some(Verdict::Failed(reason));
-                }
+    pub fn advance(&self, player: &mut Player, may_step: impl FnMut() -> bool) -> Option<Verdict> {
+        match player.continue_to(self.link.goal(), may_step) {
+            Ok(true) => Some(self.compare(player)),
+            Ok(false) => None,
+            Err(Obstacle::Stopped(_)) if self.link.steps.is_none() => Some(Verdict::Reached),
+            Err(Obstacle::Stopped(_)) => {
+                Some(Verdict::Failed("the run stopped before the instant of the link".to_owned()))
             }
-            if self.missed_stop(player) {
-                let reason = "the run does not stop where the link's run did";
-                return Some(Verdict::Failed(reason.to_owned()));
-            }
-            if self.is_there(player) {
-                return Some(self.arrive(player));
-            }
-            if !may_step() {
-                player.show(player.simulation().time());
-                return None;
-            }
-            if !player.step() {
-                return Some(match self.due(player) {
-                    // As in the original run: the guard's refusal is itself the next event of the log.
-                    Some(Entry { event: Event::Stop, .. }) => {
-                        self.next += 1;
-                        continue;
-                    }
-                    _ if self.link.steps.is_none() => Verdict::Reached,
-                    _ => Verdict::Failed("the run stopped before the instant of the link".to_owned()),
-                });
-            }
+            Err(obstacle) => Some(Verdict::Failed(obstacle.to_string())),
         }
     }
 
-    /// The next event, if it is due before the next step. A stop is due only as the outcome of a step.
-    fn due(&self, player: &Player) -> Option<Entry> {
-        let entry = self.link.log.entries.get(self.next)?;
-        let stop_to_come = entry.event == Event::Stop && player.stopped().is_none();
-        (entry.steps <= player.steps() && !stop_to_come).then(|| entry.clone())
-    }
-
-    /// Whether a step succeeded that was refused in the link's run.
-    fn missed_stop(&self, player: &Player) -> bool {
-        self.link.log.entries.get(self.next).is_some_and(|entry| {
-            entry.event == Event::Stop && entry.steps < player.steps() && player.stopped().is_none()
-        })
-    }
-
-    fn is_there(&self, player: &Player) -> bool {
-        let events = self.next >= self.link.log.entries.len();
-        events
-            && match (self.link.steps, self.link.time) {
-                (Some(steps), _) => player.steps() >= steps,
-                (None, Some(time)) => player.simulation().time() >= time,
-                (None, None) => true,
-            }
-    }
-
-    fn arrive(&self, player: &mut Player) -> Verdict {
-        let time = self.link.time.unwrap_or(player.simulation().time());
-        player.show(time);
+    fn compare(&self, player: &mut Player) -> Verdict {
         player.set_playing(self.link.playing == Some(true));
         let found = player.simulation().state_hash();
         match self.link.hash {
@@ -123,29 +78,12 @@ impl Replay {
     }
 }
 
-fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
-    let done = match &entry.event {
-        Event::Set { key, value } => player.set(key, value).map(|_| ()),
-        Event::Original { key } => player.set_original(key).map(|_| ()),
-        Event::Sections { .. } => {
-            if let Some(schedule) = entry.event.schedule() {
-                player.end_steps_at(schedule);
-            }
-            Ok(())
-        }
-        Event::Pull(pulled) => player.pull(pulled.map(Into::into)),
-        // Handled by the step before.
-        Event::Stop => Ok(()),
-    };
-    done.map_err(|error| error.to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::Scene;
     use crate::session::link::SceneText;
-    use crate::session::log::Log;
+    use crate::session::log::{Event, Log};
 
     fn player(scene: &str) -> Player {
         Player::new(&Scene::load(scene, &[]).expect("built in")).expect("starts")
@@ -167,7 +105,7 @@ mod tests {
     /// Replays `link` in chunks of `piece` steps.
     fn follow(link: Link, piece: u32) -> (Player, Verdict, u32) {
         let mut player = Player::new(&link.load().expect("loads")).expect("starts");
-        let mut replay = Replay::new(link).expect("an instant");
+        let replay = Replay::new(link, &mut player).expect("an instant");
         for pieces in 1.. {
             let mut left = piece;
             let verdict = replay.advance(&mut player, || {

@@ -1,11 +1,12 @@
 //! A twin run, minimally displaced and never renormalised, and a renormalised one that yields the largest Lyapunov exponent as
 //! in a sweep. Neither affects the run.
 
+use super::companion::{Companion, CompanionState, drop_every_second};
 use crate::analysis::drive::common_period;
 use crate::analysis::exponent::{ALIGNMENT, Benettin, Exponent, offset, scaled_distance};
 use crate::analysis::orbit::Orbit as _;
 use crate::analysis::point::separation_of;
-use crate::simulate::{Frame, Simulation, State};
+use crate::simulate::{Frame, Simulation, Stopped};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
@@ -57,136 +58,104 @@ impl Growth {
     }
 }
 
-/// A saved state of a twin.
-pub struct TwinMark {
-    /// Start of that twin, s: no other can be restored from it.
-    begins: f64,
-    state: State,
-    steps: u64,
-}
-
-impl TwinMark {
-    /// Approximate memory, bytes.
-    pub fn bytes(&self) -> usize {
-        self.state.bytes()
-    }
-}
-
 /// The twin and its distances so far.
 pub struct Twin {
-    simulation: Simulation,
-    /// Start, s, and the displaced state there. While the run retraces earlier time, the twin waits.
-    begins: f64,
-    origin: State,
-    frame: Frame,
+    pub(super) motion: Companion,
+    /// Steps of the run before its start. While the run retraces earlier time, the twin waits.
+    steps_before: u64,
     /// Time in s, distance in units of the scales.
     distances: Vec<[f64; 2]>,
     /// Only every `stride`-th step is stored.
     stride: u64,
-    steps: u64,
-    /// Time that the run has reached, s, and its state there: the twin catches up when it is displayed.
+    /// Time that the run has reached, s, its steps, and its state there: the twin catches up when it is displayed.
     goal: f64,
+    goal_steps: u64,
     goal_state: Vec<f64>,
     /// `None` until the run reaches the start of the twin.
     growth: Option<Growth>,
-    ended: Option<String>,
 }
 
 impl Twin {
     /// A displaced copy of `run` in its present state.
     pub fn new(run: &Simulation) -> Self {
-        let mut simulation = run.clone();
+        let mut simulation = run.twin();
         let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
         simulation.displace(&away);
+        let steps = run.statistics().steps;
         let mut twin = Self {
-            begins: run.time(),
-            origin: simulation.state().clone(),
-            simulation,
-            frame: Frame::default(),
+            motion: Companion::new(simulation),
+            steps_before: steps,
             distances: Vec::with_capacity(KEPT),
             stride: 1,
-            steps: 0,
             goal: run.time(),
+            goal_steps: steps,
             goal_state: run.state_vector().to_vec(),
             growth: Some(Growth::new(run)),
-            ended: None,
         };
         twin.measure();
-        twin.place(run.time());
         twin
     }
 
     /// Restarts from the present state of `run`. Keeps the known distances if the start is the same.
     pub fn restart(&mut self, run: &Simulation) {
         let before = std::mem::replace(self, Self::new(run));
-        if before.begins == self.begins {
+        if before.begins() == self.begins() {
             (self.distances, self.stride) = (before.distances, before.stride);
         }
     }
 
     /// Start, s.
     pub fn begins(&self) -> f64 {
-        self.begins
+        self.motion.begins()
     }
 
-    /// Saves the present state.
-    pub fn mark(&self) -> TwinMark {
-        TwinMark { begins: self.begins, state: self.simulation.state().clone(), steps: self.steps }
-    }
-
-    /// Goes back with `run`, which was just restored to the instant of `mark`. Without a mark of this twin it waits for its
+    /// Goes back with `run`, which was just restored to the instant of `state`. Without a state of this twin it waits for its
     /// start, or restarts if that has passed.
-    pub fn go_back(&mut self, mark: Option<&TwinMark>, run: &Simulation) {
-        let mark = mark.filter(|mark| mark.begins == self.begins);
-        if mark.is_none() && self.begins < run.time() {
+    pub fn go_back(&mut self, state: Option<&CompanionState>, run: &Simulation) {
+        if !self.motion.restore(state) && self.begins() < run.time() {
             return self.restart(run);
         }
-        let (state, steps) = mark.map_or((&self.origin, 0), |mark| (&mark.state, mark.steps));
-        self.simulation.restore(state);
-        (self.steps, self.ended) = (steps, None);
-        self.goal = self.begins.max(run.time());
-        self.goal_state.copy_from_slice(run.state_vector());
+        self.aim_at(run, self.begins().max(run.time()));
         self.growth = None;
     }
 
     /// Drops the distances after `time`, s, for a new branch.
     pub fn cut(&mut self, time: f64) {
-        let time = time.max(self.begins);
+        let time = time.max(self.begins());
         self.distances.retain(|[at, _]| *at <= time);
     }
 
     /// Whether [`Self::place`] can sample `time`, s, without going back.
     pub fn reaches(&self, time: f64) -> bool {
-        time <= self.begins || self.simulation.step_start() < time
+        time <= self.begins() || self.motion.simulation.step_start() < time
     }
 
     /// Call after each step of `run`: the twin advances to the start of that step.
     pub fn follow(&mut self, run: &Simulation) {
-        if run.time() <= self.begins {
+        if run.time() <= self.begins() {
             return;
         }
         self.come_to(self.goal);
-        self.goal = run.time();
-        self.goal_state.copy_from_slice(run.state_vector());
+        self.aim_at(run, run.time());
         match &mut self.growth {
             Some(growth) => growth.follow(run),
             None => self.growth = Some(Growth::new(run)),
         }
     }
 
-    /// Steps until `time`, s, lies within the latest step.
+    /// The twin is to come to `time`, s, which `run` has reached.
+    fn aim_at(&mut self, run: &Simulation, time: f64) {
+        (self.goal, self.goal_steps) = (time, run.statistics().steps);
+        self.goal_state.copy_from_slice(run.state_vector());
+    }
+
+    /// Steps until `time`, s, lies within the latest step; the steps end where those of the run do.
     fn come_to(&mut self, time: f64) {
-        while self.ended.is_none() && self.simulation.time() < time.min(self.goal) {
-            if let Err(stopped) = self.simulation.step_until(self.goal) {
-                self.ended = Some(stopped.to_string());
-                return;
-            }
-            if self.simulation.time() == self.goal {
-                self.steps += 1;
-                if self.steps.is_multiple_of(self.stride) {
-                    self.measure();
-                }
-            }
+        let (before, goal) = (self.motion.simulation.time(), self.goal);
+        self.motion.advance(time.min(goal), |_| Some(goal));
+        let steps = self.goal_steps.saturating_sub(self.steps_before);
+        if before < goal && self.motion.simulation.time() == goal && steps.is_multiple_of(self.stride) {
+            self.measure();
         }
     }
 
@@ -195,14 +164,10 @@ impl Twin {
         if self.distances.last().is_some_and(|[at, _]| *at >= self.goal) {
             return;
         }
-        let scales = self.simulation.scales();
-        let distance = scaled_distance(&self.goal_state, self.simulation.state_vector(), scales);
+        let twin = &self.motion.simulation;
+        let distance = scaled_distance(&self.goal_state, twin.state_vector(), twin.scales());
         if self.distances.len() == KEPT {
-            let mut keep = false;
-            self.distances.retain(|_| {
-                keep = !keep;
-                keep
-            });
+            drop_every_second(&mut self.distances);
             self.stride *= 2;
         }
         // Identical states have no logarithm of their distance.
@@ -214,12 +179,12 @@ impl Twin {
     /// Samples the state at `time`, s, into [`Self::frame`], clamped to the twin's start and end.
     pub fn place(&mut self, time: f64) {
         self.come_to(time);
-        self.simulation.sample(time, &mut self.frame);
+        self.motion.show(time);
     }
 
     /// The displayed state.
     pub fn frame(&self) -> &Frame {
-        &self.frame
+        &self.motion.frame
     }
 
     /// Time in s and distance in units of the scales, in order.
@@ -228,8 +193,8 @@ impl Twin {
     }
 
     /// Why it ended before the run.
-    pub fn ended(&self) -> Option<&str> {
-        self.ended.as_deref()
+    pub fn ended(&self) -> Option<&Stopped> {
+        self.motion.stopped.as_ref()
     }
 
     /// Largest Lyapunov exponent of the run since this twin began, or since the run last went back.

@@ -177,7 +177,7 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
         ..Link::default()
     };
     let link = Link::parse(&link.format()).expect("a link");
-    let mut replay = Replay::new(link).expect("an instant");
+    let replay = Replay::new(link, &mut again).expect("an instant");
     // On the way it passes the very section of the sweep.
     let mut passed = false;
     let verdict = loop {

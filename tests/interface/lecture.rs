@@ -165,7 +165,7 @@ fn follows(player: &Player) {
     };
     let link = Link::parse(&link.format()).expect("a link");
     let mut copy = Player::new(&link.load().expect("loads")).expect("starts");
-    let mut replay = Replay::new(link).expect("an instant");
+    let replay = Replay::new(link, &mut copy).expect("an instant");
     let verdict = replay.advance(&mut copy, || true).expect("there");
     assert_eq!(verdict, Verdict::Agrees(player.simulation().state_hash()));
 }

@@ -17,7 +17,7 @@ fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
 #[test]
 fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
     let mut simulation = simulation("chain", &CHAIN);
-    let gravity = simulation.machine().gravity;
+    let gravity = simulation.conditions().gravity;
     let mut inside = Frame::default();
     let (mut flew, mut stood) = (0, 0);
     while simulation.time() < 40e-3 {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::scene::SceneSnapshot;
-use crate::session::twin::TwinMark;
+use crate::session::companion::CompanionState;
 use crate::simulate::Mark;
 
 /// Steps between keyframes.
@@ -14,32 +14,28 @@ const FINE_STRIDE: u64 = 16;
 const BUDGET: usize = 32 << 20;
 const FINE_BUDGET: usize = 4 << 20;
 
-/// A simulation state, and the player data restored with it.
+/// A simulation state, and the player data restored with it. Copies of the run share the states.
+#[derive(Clone)]
 pub(super) struct Keyframe {
-    /// Shared with copies of the run.
+    /// State of the run.
     pub state: Arc<SceneSnapshot>,
     /// Number of log entries before it.
     pub events: usize,
     /// Position in the record; only `kept` keyframes have one.
     pub record: Option<Mark>,
     /// State of the twin run.
-    pub twin: Option<TwinMark>,
+    pub twin: Option<Arc<CompanionState>>,
 }
 
 impl Keyframe {
     fn bytes(&self) -> usize {
-        let twin = self.twin.as_ref().map_or(0, TwinMark::bytes);
+        let twin = self.twin.as_ref().map_or(0, |twin| twin.1.bytes());
         self.state.bytes() + twin + self.record.as_ref().map_or(0, Mark::bytes)
-    }
-
-    /// The same without the twin.
-    fn alone(&self) -> Self {
-        Self { state: self.state.clone(), record: self.record.clone(), twin: None, ..*self }
     }
 }
 
 /// The keyframes of one run since its start.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Keyframes {
     kept: Vec<Keyframe>,
     bytes: usize,
@@ -49,17 +45,6 @@ pub(super) struct Keyframes {
 }
 
 impl Keyframes {
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
-
-    /// Keyframes for a copy of the run, without its twin.
-    pub fn copy(&self) -> Self {
-        let alone = |list: &[Keyframe]| list.iter().map(Keyframe::alone).collect();
-        Self { kept: alone(&self.kept), fine: alone(&self.fine), ..*self }
-    }
-
     /// Whether a keyframe is due after `steps` steps, the latest so far.
     pub fn is_due(&self, steps: u64) -> bool {
         let last = self.kept.last();

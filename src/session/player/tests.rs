@@ -203,6 +203,24 @@ fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
 }
 
 #[test]
+fn a_new_branch_keeps_the_record_of_the_step_before_an_earlier_change() {
+    let mut player = player("spcmm");
+    // Free fall in long steps, each of which is recorded as a curve.
+    while player.pacer.shown() < 4e-3 {
+        player.single_step();
+    }
+    let change = player.pacer.shown();
+    player.set("contact.friction", "0.2").expect("in range");
+    for _ in 0..4 {
+        player.single_step();
+    }
+    let before = recorded(&player, Quantity::Eccentricity, change);
+    player.step_back();
+    player.set("contact.friction", "0.3").expect("in range");
+    assert!(recorded(&player, Quantity::Eccentricity, change) == before);
+}
+
+#[test]
 fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
     let (mut player, mut other) = (player("spcmm"), player("spcmm"));
     for player in [&mut player, &mut other] {

@@ -1,13 +1,14 @@
-//! Going back in time and continuing from there: any instant is displayed by restoring the nearest earlier keyframe and
-//! repeating the same steps and logged events. The result is bit-identical.
+//! Going to an instant. A known one is displayed from the latest step, or by restoring the nearest earlier keyframe and repeating
+//! the same steps and logged events, with the same bits ([`Player::display`]); a later one by further steps
+//! ([`Player::continue_to`]).
 
 use super::contact_history::ContactHistory;
 use super::impact_record::ImpactRecord;
 use super::keyframes::Keyframe;
-use super::{FINEST_BIN, Known, Player};
+use super::record::drop_before;
+use super::{Player, warnings_of};
+use crate::session::goal::{Goal, Obstacle};
 use crate::session::log::Event;
-use crate::session::paths::Paths;
-use crate::session::settled::Settling;
 use crate::simulate::{Bin, History};
 
 /// Most steps retraced before a past instant, so that the plots show its history in detail.
@@ -51,13 +52,6 @@ pub struct AbandonedFuture {
     pub to: f64,
 }
 
-/// Drops the bins from index `first` on that begin before `start`, s.
-fn drop_before(bins: &mut Vec<Bin>, first: usize, start: f64) {
-    let early = bins[first..].iter().take_while(|bin| bin.from < start);
-    let count = early.count();
-    bins.drain(first..first + count);
-}
-
 impl Player {
     /// Latest instant of the run ever displayed, s.
     pub fn reached(&self) -> f64 {
@@ -66,7 +60,7 @@ impl Player {
 
     /// Whether anything after the displayed instant was displayed before, or any logged event is yet to be reapplied.
     pub fn has_future(&self) -> bool {
-        self.pacer.shown() < self.reached || self.applied < self.log.entries.len()
+        self.pacer.shown() < self.reached || self.script.has_more()
     }
 
     /// The abandoned future, while it extends beyond the run.
@@ -81,57 +75,29 @@ impl Player {
 
     /// Contact states of the ball joints over time.
     pub fn contact_history(&self) -> &ContactHistory {
-        &self.contact_history
+        &self.record.contact_history
     }
 
     /// The impacts of the run.
     pub fn impact_record(&self) -> &ImpactRecord {
-        &self.impact_record
+        &self.record.impact_record
     }
 
     /// Events of the run, its future included; a pull has only its start and end.
     pub fn flags(&self) -> impl Iterator<Item = Flag> {
-        let entries = &self.log.entries;
-        let pulls = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
-        let goes_on = move |at: usize| at > 0 && pulls(at) && pulls(at - 1);
-        let times = self.event_times.iter().enumerate();
-        times
-            .filter(move |(at, _)| !goes_on(*at))
-            .map(|(at, time)| Flag { time: *time, words: entries[at].event.words() })
+        self.script.flags().map(|(time, words)| Flag { time, words })
     }
 
     /// Appends the bins of `channel` from `from` to `to`, s, to `out`, as [`History::bins`] does. Uses the window last
     /// retraced, in full detail, where possible, and the abandoned future beyond the latest displayed instant.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
-        self.own_bins(channel, from, to, most_bins, out);
+        self.record.bins(channel, from, to, most_bins, out);
         let reached = self.reached;
         if let Some(left) = self.abandoned_future().filter(|_| to > reached) {
             let first = out.len();
             let from = from.max(reached);
             left.history.bins(channel, from, to, most_bins, out);
             drop_before(out, first, reached);
-        }
-    }
-
-    fn own_bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
-        let near = self.near.as_ref().and_then(|near| near.span());
-        let Some((start, end)) = near.filter(|(start, end)| *start < to && *end > from) else {
-            return self.history.bins(channel, from, to, most_bins, out);
-        };
-        if from < start {
-            let first = out.len();
-            self.history.bins(channel, from, start, most_bins, out);
-            // A wide bin may extend past `start`.
-            let whole = out[first..].iter().filter(|bin| bin.to <= start).count();
-            out.truncate(first + whole);
-        }
-        if let Some(near) = &self.near {
-            near.bins(channel, from.max(start), to.min(end), most_bins, out);
-        }
-        if to > end {
-            let first = out.len();
-            self.history.bins(channel, end, to, most_bins, out);
-            drop_before(out, first, end);
         }
     }
 
@@ -146,10 +112,10 @@ impl Player {
     pub fn go_to_impact(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();
         if !forward {
-            let found = self.impact_record.previous_peak(joint, shown);
+            let found = self.record.impact_record.previous_peak(joint, shown);
             return self.go_to(found.unwrap_or(0.0));
         }
-        let found = self.impact_record.next_peak(joint, shown, false);
+        let found = self.record.impact_record.next_peak(joint, shown, false);
         match found.filter(|time| *time <= self.reached) {
             Some(time) => self.go_to(time),
             None => {
@@ -168,19 +134,17 @@ impl Player {
     /// Continues towards the sought impact within the budget of a frame.
     pub(super) fn seek(&mut self, sought: ImpactSearch) {
         self.go_on();
-        let start = (self.clock)();
-        let found = loop {
-            let over = self.simulation.time() > sought.until || self.stopped.is_some();
-            // Its results are displayed with it, so it has to be over.
-            let found = self.impact_record.next_peak(sought.joint, sought.from, over);
-            if found.is_some() || over || !self.pacer.may_step((self.clock)() - start) {
-                break found.or(over.then_some(f64::INFINITY));
-            }
-            self.step();
+        let (start, before) = ((self.clock)(), self.steps());
+        let is_over = |player: &Self| player.simulation.time() > sought.until || player.stopped.is_some();
+        // Its results are displayed with it, so it has to be over.
+        let found = |player: &Self| player.record.impact_record.next_peak(sought.joint, sought.from, is_over(player));
+        let in_time = |player: &Self| player.pacer.may_step((player.clock)() - start);
+        let _ = self.step_towards(f64::INFINITY, |player| is_over(player) || found(player).is_some(), in_time);
+        if self.steps() > before {
             self.record_until(self.simulation.time());
-        };
-        self.reached = self.reached.max(self.recorded_to);
-        if let Some(time) = found {
+        }
+        self.reached = self.reached.max(self.record.recorded_to);
+        if let Some(time) = found(self).or_else(|| is_over(self).then_some(f64::INFINITY)) {
             self.sought = None;
             self.travel(time.min(self.reached));
         }
@@ -189,15 +153,8 @@ impl Player {
     /// Steps back to the start of the latest step, or of the one before if that start is already displayed.
     pub fn step_back(&mut self) {
         self.set_paused();
-        let Some(steps) = self.steps().checked_sub(1) else {
-            return;
-        };
-        let before = |keyframe: &Keyframe| keyframe.state.steps() <= steps;
-        let time = self.keyframes.latest(before).map(|k| k.state.time());
-        if let Some(time) = time {
-            self.restore_at(time);
-            self.retrace(|player| player.steps() >= steps, f64::INFINITY);
-            self.arrive(self.simulation.time());
+        if let Some(steps) = self.steps().checked_sub(1) {
+            self.display(Goal::after(steps));
         }
     }
 
@@ -206,47 +163,89 @@ impl Player {
         self.sought = None;
     }
 
-    /// Displays `time`, s.
+    /// Displays `time`, s: any instant displayed before.
     pub(super) fn travel(&mut self, time: f64) {
-        if !time.is_finite() {
-            return;
+        if time.is_finite() {
+            self.display(Goal::at(time.clamp(0.0, self.reached)));
         }
-        let time = time.clamp(0.0, self.reached);
-        let here = self.simulation.time();
-        let run = self.unchanged.as_deref().unwrap_or(&self.simulation);
-        // Any instant of the latest step can be sampled; if a change was made within it, from the run as it was before.
-        let twin_reaches = self.twin.as_ref().is_none_or(|twin| twin.reaches(time));
-        if !(run.step_start() < time && time <= here && twin_reaches) {
-            let best = self.keyframes.latest(|k| k.state.time() <= time);
-            let best = best.map_or(0.0, |k| k.state.time());
-            if here > time || here < best {
-                self.restore_at(time);
+    }
+
+    /// Displays `goal`, an instant of the past or of the known future. This is where it is decided how: from the latest step if
+    /// the goal lies in it; otherwise by repeating known steps, from here or from a keyframe.
+    fn display(&mut self, goal: Goal) {
+        let (here, now) = (self.steps(), self.simulation.time());
+        // If a change was made within the latest step, that step is displayed as it was before.
+        let latest = self.unchanged.as_deref().unwrap_or(&self.simulation).step_start();
+        let twin_reaches = self.twin.as_ref().is_none_or(|twin| twin.reaches(goal.time));
+        let in_step = goal.steps.map_or(latest < goal.time && goal.time <= now && twin_reaches, |steps| steps == here);
+        if !in_step {
+            let is_before = |k: &Keyframe| goal.is_ahead_of(k.state.steps(), k.state.time());
+            let best = self.keyframes.latest(is_before);
+            let (start, steps) = best.map_or((0.0, 0), |k| (k.state.time(), k.state.steps()));
+            if now < start || !goal.is_ahead_of(here, now) {
+                let seen = if goal.time.is_finite() { goal.time } else { start };
+                self.restore_before(start, steps, seen);
             }
-            self.retrace(|player| player.simulation.time() >= time, time);
+            // What happened before happens again; a stop is displayed by the window.
+            let _ = self.step_towards(goal.time, |player| goal.is_reached(&player.simulation), |_| true);
         }
-        self.arrive(time);
+        let _ = self.arrive(goal.time);
     }
 
-    /// Displays `time`, s, within the latest step, and reapplies the events logged there.
-    fn arrive(&mut self, time: f64) {
+    /// Steps forward to `goal` while `may_step`, and displays it, or the end of the latest step on the way there. Events that are
+    /// due are applied. Never goes back. Returns whether the goal is reached.
+    ///
+    /// # Errors
+    /// The run stopped or does not accept an event; later events are dropped.
+    pub(crate) fn continue_to(&mut self, goal: Goal, mut may_step: impl FnMut() -> bool) -> Result<bool, Obstacle> {
+        let stepped = self.step_towards(goal.time, |player| goal.is_reached(&player.simulation), |_| may_step());
+        if stepped.is_err() {
+            self.script.cut();
+        }
+        let arrived = self.arrive(goal.time.max(self.record.recorded_to));
+        if arrived.is_err() {
+            self.script.cut();
+        }
+        arrived.and(stepped)
+    }
+
+    /// Takes steps, and applies the events logged between them, until `is_there` or while `may_step`; displays nothing beyond
+    /// `time`, s. Returns whether it is there. Every step of a run is taken here.
+    pub(super) fn step_towards(
+        &mut self,
+        time: f64,
+        is_there: impl Fn(&Self) -> bool,
+        mut may_step: impl FnMut(&Self) -> bool,
+    ) -> Result<bool, Obstacle> {
+        while !is_there(self) {
+            self.apply_due(time)?;
+            if let Some(stopped) = self.stopped.clone() {
+                return Err(stopped.into());
+            }
+            if !may_step(self) {
+                return Ok(false);
+            }
+            self.step();
+        }
+        Ok(true)
+    }
+
+    /// Displays `time`, s, within the latest step, and applies the events logged at its end.
+    fn arrive(&mut self, time: f64) -> Result<(), Obstacle> {
         self.pacer.jump(time.min(self.simulation.time()));
-        if time >= self.simulation.time().min(self.reached) {
-            self.apply_due();
-        }
+        let applied = if time >= self.simulation.time().min(self.reached) { self.apply_due(time) } else { Ok(()) };
         self.present();
+        applied
     }
 
-    /// Restores a keyframe before `time`, s: an earlier one if the history of that instant must be recorded in detail.
-    fn restore_at(&mut self, time: f64) {
-        let best = self.keyframes.latest(|k| k.state.time() <= time);
-        let Some((start, steps)) = best.map(|k| (k.state.time(), k.state.steps())) else {
-            return;
-        };
-        let span = self.near.as_ref().and_then(|near| near.span());
+    /// Restores the keyframe at `start`, s, after `steps` steps, or an earlier one if the history of the instant `seen`, s, must
+    /// be recorded in detail.
+    fn restore_before(&mut self, start: f64, steps: u64, seen: f64) {
+        let span = self.record.near.as_ref().and_then(|near| near.span());
         if span.is_some_and(|(from, to)| from <= start && start <= to) {
             return self.restore(start, false);
         }
-        let lead = time - self.automatic_window();
+        let lead = seen - self.automatic_window();
         let early = |k: &Keyframe| k.state.time() <= lead || k.state.steps() + LEAD <= steps;
         let first = self.keyframes.latest_kept(early);
         let start = first.map_or(0.0, |k| k.state.time());
@@ -259,72 +258,45 @@ impl Player {
             return;
         };
         self.simulation.restore(&keyframe.state);
-        self.applied = keyframe.events;
+        self.script.go_back(keyframe.events);
         if let Some(twin) = &mut self.twin {
-            twin.go_back(keyframe.twin.as_ref(), &self.simulation);
+            twin.go_back(keyframe.twin.as_deref(), &self.simulation);
         }
         let now = self.simulation.time();
         self.stopped = None;
         self.unchanged = None;
-        if now > self.recorded_to {
-            // The time skipped was not recorded.
-            self.paths = Paths::new(self.simulation.running());
-        }
-        self.recorded_to = now;
-        let entries = self.log.entries[..self.applied].iter().rev();
-        let mut schedules = entries.filter_map(|entry| entry.event.schedule());
-        self.sections = schedules.next();
-        self.watch.go_to(now);
-        self.settling = Settling::new(self.simulation.running());
-        self.forget_peaks();
-        self.warnings = Known::of(self.pending());
+        self.record.go_back(now, self.simulation.running());
+        self.warnings = warnings_of(self.pending());
         if anew {
             self.keyframes.forget_fine();
-            let channels = self.history.channels();
-            match &mut self.near {
-                Some(near) => near.clear(),
-                None => self.near = Some(Box::new(History::new(channels, FINEST_BIN))),
-            }
-            self.record(now);
+            self.record.begin_near();
+            self.record_at(now);
         }
     }
 
-    /// Repeats steps and logged events until `is_there`; displays nothing beyond `time`, s.
-    fn retrace(&mut self, is_there: impl Fn(&Self) -> bool, time: f64) {
-        while !is_there(self) {
-            self.pacer.jump(self.simulation.time().min(time));
-            self.apply_due();
-            if self.stopped.is_some() || !self.step() {
-                break;
+    /// Applies the events logged after this number of steps, with nothing displayed beyond `time`, s.
+    fn apply_due(&mut self, time: f64) -> Result<(), Obstacle> {
+        while let Some(event) = self.script.due(self.steps()).cloned() {
+            if event == Event::Stop {
+                // The step is refused again, which passes the event.
+                if self.step() {
+                    return Err(Obstacle::MissedStop);
+                }
+                continue;
             }
+            // The latest step is recorded as it was before the event.
+            let shown = self.simulation.time().min(time);
+            self.pacer.jump(shown);
+            self.record_until(shown);
+            self.apply(&event)?;
+            self.script.pass(self.simulation.time());
         }
-    }
-
-    /// Reapplies the events logged after this number of steps.
-    fn apply_due(&mut self) {
-        while let Some(entry) = self.log.entries.get(self.applied) {
-            if entry.steps > self.steps() {
-                break;
-            }
-            if entry.event == Event::Stop {
-                // The step is refused again and sets `stopped`.
-                self.step();
-                break;
-            }
-            let entry = entry.clone();
-            self.applied += 1;
-            if let Some(schedule) = entry.event.schedule() {
-                self.sections = Some(schedule);
-            } else {
-                // It was accepted before, for the same scene in the same state.
-                let _ = self.apply(&entry.event);
-            }
-        }
+        Ok(())
     }
 
     /// Continues from the displayed instant by repeating the known steps; a future with later events is abandoned.
     pub(super) fn go_on(&mut self) {
-        if self.applied < self.log.entries.len() {
+        if self.script.has_more() {
             self.branch();
         }
     }
@@ -334,42 +306,34 @@ impl Player {
         if !self.has_future() {
             return;
         }
-        let (steps, shown, applied) = (self.steps(), self.pacer.shown(), self.applied);
+        let (steps, shown, passed) = (self.steps(), self.pacer.shown(), self.script.passed);
         if shown < self.reached {
             let after = |flag: &Flag| flag.time > shown;
             self.left = Some(Box::new(AbandonedFuture {
-                history: self.history.clone(),
-                contact_history: self.contact_history.clone(),
+                history: self.record.history.clone(),
+                contact_history: self.record.contact_history.clone(),
                 flags: self.flags().filter(after).collect(),
                 from: shown,
                 to: self.reached,
             }));
         }
-        self.log.entries.truncate(applied);
-        self.event_times.truncate(applied);
-        let before = |k: &Keyframe| k.state.steps() <= steps && k.events <= applied;
+        self.script.cut();
+        let before = |k: &Keyframe| k.state.steps() <= steps && k.events <= passed;
         let Some(keyframe) = self.keyframes.latest_kept(before) else {
             return;
         };
         let (start, start_steps) = (keyframe.state.time(), keyframe.state.steps());
-        if let Some(mark) = &keyframe.record {
-            self.history.rewind(mark);
-        }
-        self.contact_history.cut(start);
-        self.impact_record.cut(start, start_steps);
-        self.watch.cut(start);
+        self.record.cut(start, start_steps, keyframe.record.as_ref());
         self.keyframes.cut(start_steps);
-        self.near = None;
         if let Some(twin) = &mut self.twin {
             twin.cut(start);
         }
         (self.reached, self.most_steps) = (start, start_steps);
         self.restore(start, false);
-        self.retrace(|player| player.steps() >= steps, shown);
-        if self.twin.as_ref().is_some_and(|twin| twin.begins() > self.simulation.time()) {
-            self.restart_twin();
-        }
-        self.arrive(shown);
+        let _ = self.step_towards(shown, |player| player.steps() >= steps, |_| true);
+        let now = self.simulation.time();
+        self.restart_twin(|begins| begins > now);
+        let _ = self.arrive(shown);
     }
 
     /// Stores a keyframe of the latest state if one is due, while the run advances or retraces.
@@ -378,7 +342,7 @@ impl Player {
         let new = steps >= self.most_steps;
         self.most_steps = self.most_steps.max(steps);
         if new && self.keyframes.is_due(steps) {
-            let record = Some(self.history.mark());
+            let record = Some(self.record.history.mark());
             self.keyframes.keep(self.keyframe(record));
         } else if !new && self.keyframes.is_fine(steps) {
             let keyframe = self.keyframe(None);
@@ -389,22 +353,10 @@ impl Player {
     fn keyframe(&self, record: Option<crate::simulate::Mark>) -> Keyframe {
         Keyframe {
             state: self.simulation.snapshot().into(),
-            events: self.applied,
+            events: self.script.passed,
             record,
-            twin: self.twin.as_ref().map(|twin| twin.mark()),
+            twin: self.twin.as_ref().map(|twin| twin.motion.state().into()),
         }
-    }
-
-    /// Clears the rewind data for a new run.
-    pub(super) fn clear_rewind(&mut self) {
-        self.keyframes.clear();
-        self.near = None;
-        self.left = None;
-        self.sought = None;
-        self.contact_history.begin(0.0);
-        self.event_times.clear();
-        (self.applied, self.most_steps) = (0, 0);
-        (self.reached, self.recorded_to) = (0.0, 0.0);
     }
 
     /// Approximate memory of the keyframes, bytes.

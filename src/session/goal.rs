@@ -1,0 +1,49 @@
+//! An instant of a run to go to, and what may prevent the run from getting there.
+
+use crate::scene::SetError;
+use crate::simulate::{Simulation, Stopped};
+
+/// An instant of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// Accepted steps before it; `None`: as many as its time needs.
+    pub steps: Option<u64>,
+    /// Time within the last of these steps, s; infinite for the end of the step.
+    pub time: f64,
+}
+
+impl Goal {
+    /// The instant `time`, s.
+    pub fn at(time: f64) -> Self {
+        Self { steps: None, time }
+    }
+
+    /// The end of step number `steps`.
+    pub fn after(steps: u64) -> Self {
+        Self { steps: Some(steps), time: f64::INFINITY }
+    }
+
+    /// Whether `run` has taken all steps before it.
+    pub fn is_reached(&self, run: &Simulation) -> bool {
+        self.steps.map_or(run.time() >= self.time, |steps| run.statistics().steps >= steps)
+    }
+
+    /// Whether a run leads to it from the state at `time`, s, after `steps` steps.
+    pub fn is_ahead_of(&self, steps: u64, time: f64) -> bool {
+        self.steps.map_or(time <= self.time, |goal| steps <= goal)
+    }
+}
+
+/// Why a run does not reach an instant.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Obstacle {
+    /// The divergence guard stopped the run.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// A logged event is not accepted.
+    #[error(transparent)]
+    Refused(#[from] SetError),
+    /// A step is accepted that the log says was refused.
+    #[error("the run does not stop where the link's run did")]
+    MissedStop,
+}

@@ -1,0 +1,82 @@
+//! The run from before a parameter change: a copy that goes to the same instants with the old value.
+
+use super::{Effect, Event, Ideal, LiveScene, Player, SetError};
+
+/// Whether and when the run is copied.
+#[derive(Default)]
+pub(super) struct BeforeChange {
+    enabled: bool,
+    /// Key of the current gesture, which counts as one change.
+    gesture: Option<String>,
+    /// The latest copy, with the key changed after it.
+    copy: Option<(Box<Player>, String)>,
+}
+
+/// A simulation in the same state as `run`.
+pub(super) fn copy_of(run: &LiveScene) -> LiveScene {
+    LiveScene::of(&run.snapshot())
+}
+
+impl Player {
+    /// A paused copy of the run and its record, without the twin, unaffected by later changes to this run.
+    fn copy(&self) -> Self {
+        Self {
+            pacer: self.pacer.clone(),
+            clock: self.clock,
+            unchanged: self.unchanged.as_deref().map(|run| Box::new(copy_of(run))),
+            stopped: self.stopped.clone(),
+            frame: self.frame.clone(),
+            record: self.record.clone(),
+            keyframes: self.keyframes.clone(),
+            reached: self.reached,
+            most_steps: self.most_steps,
+            script: self.script.clone(),
+            gravity: self.gravity.clone(),
+            ideal: self.ideal.is_some().then(|| Box::new(Ideal::new(&self.simulation.running().machine))),
+            ..Self::of(copy_of(&self.simulation), self.original.clone())
+        }
+    }
+
+    /// Takes the copy made before the latest parameter change, with the key; `None` if none was made since the last call. `enabled`:
+    /// whether the run is copied before the next change. `is_over`: the gesture has ended, so that the next change counts as a
+    /// new one, even of the same parameter.
+    pub(crate) fn take_before(&mut self, enabled: bool, is_over: bool) -> Option<(Box<Self>, String)> {
+        self.before_change.enabled = enabled;
+        self.before_change.gesture.take_if(|_| is_over);
+        self.before_change.copy.take()
+    }
+
+    /// Applies and logs a change of `key` at the displayed instant; the future is abandoned. The run is copied before it, if
+    /// requested, unless the change belongs to the same gesture as the last or the value is the same.
+    pub(super) fn change(&mut self, key: &str, event: Event) -> Result<Effect, SetError> {
+        let BeforeChange { enabled, gesture, .. } = &self.before_change;
+        let copies = *enabled && gesture.as_deref() != Some(key);
+        let copy = copies.then(|| Box::new(self.copy()));
+        self.branch();
+        let before = self.pending().changes.clone();
+        let effect = self.apply(&event)?;
+        self.note(event);
+        self.note_edits(&before);
+        if let Some(copy) = copy.filter(|_| before != self.pending().changes) {
+            self.before_change.copy = Some((copy, key.to_owned()));
+            self.before_change.gesture = Some(key.to_owned());
+        }
+        Ok(effect)
+    }
+
+    /// Whether the whole record used the current parameters and no pull acted.
+    pub(crate) fn is_as_started(&self) -> bool {
+        self.script.log.entries.iter().all(|entry| entry.event == Event::Stop) && !self.has_waiting()
+    }
+
+    /// Displays `time`, s, stepping while `may_step`. Returns true once it is reached or the run cannot continue.
+    pub(crate) fn follow(&mut self, time: f64, may_step: impl FnMut() -> bool) -> bool {
+        if time > self.reached {
+            return self.run_towards(time, may_step);
+        }
+        if time != self.pacer.shown() {
+            self.go_to(time);
+        }
+        true
+    }
+}
