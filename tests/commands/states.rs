@@ -182,7 +182,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
         refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
-        (good.replace("\"state_format\":3", "\"state_format\":4"), "format 3"),
+        (good.replace("\"state_format\":4", "\"state_format\":5"), "format 4"),
         ("{}".to_owned(), "not a state"),
         ("[1, 2]".to_owned(), "not a state"),
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),
@@ -193,15 +193,15 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     // Right in itself, and not a state of this scene.
     let mut json: Json = serde_json::from_str(&good).unwrap();
     for (pointer, value, words) in [
-        ("/state/state/now/y", serde_json::json!([1.0]), "not those of a run"),
-        ("/state/state/flights", serde_json::json!([null, null]), "not those of a run"),
+        ("/state/now/y", serde_json::json!([1.0]), "not those of a run"),
+        ("/state/flights", serde_json::json!([null, null]), "not those of a run"),
         ("/state/sampled", serde_json::json!([]), "not those of a run"),
         (
             "/state/loads",
             serde_json::json!({"parts": [[[1.0, 0.0], null]], "seen": 0.0, "actuators": []}),
             "not those of a run",
         ),
-        ("/state/state", serde_json::json!({}), "not a state"),
+        ("/state", serde_json::json!({}), "not a state"),
     ] {
         *json.pointer_mut(pointer).unwrap() = value;
         let content = json.as_object_mut().unwrap();

@@ -95,7 +95,7 @@ pub enum MechanismError {
     },
     /// Loops that close but that the drives open again immediately.
     #[error(
-        "{}: the drives ask for speeds at which it {}; no motion that the mechanism has follows both",
+        "{}: at the speeds of the drives it {}; no motion of the mechanism satisfies both",
         .rate.title(), .rate.opens()
     )]
     InconsistentDrives {
@@ -105,7 +105,7 @@ pub enum MechanismError {
     /// A ball that starts implausibly deep in its socket wall.
     #[error(
         "ball joint {joint}: ball and socket centres are {} apart as given, \
-         deeper in the wall than the clearance {} and a hundredth of the ball radius allow",
+         deeper in the wall than the clearance {} plus a hundredth of the ball radius",
         length(*.distance), length(*.clearance)
     )]
     OutsideSocket {
@@ -117,7 +117,7 @@ pub enum MechanismError {
         clearance: f64,
     },
     /// Loops that close on a different branch from the drives' closed form.
-    #[error("the loops close on another branch than the drives ask for: start poses are too far off")]
+    #[error("the loops close in an assembly mode other than that of the drives: the start poses are too far off")]
     OtherBranch,
     /// A start pose in which the ideal joints do not determine the velocities.
     #[error(
@@ -136,7 +136,7 @@ pub enum MechanismError {
         /// Maximum accepted.
         most: usize,
     },
-    /// Equations that exceed the limits on contact_state or time.
+    /// Equations that exceed the limits on memory or time.
     #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
     TooCostly {
         /// The task that is too costly.
@@ -152,8 +152,8 @@ pub enum MechanismError {
     },
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
-        "the mechanism starts in a singular pose: at {} directions that the ideal joints hold elsewhere coincide here, \
-         and the motion could continue in more than one way; start it away from that pose",
+        "the mechanism starts in a singular pose: at {} constraints are dependent here that are independent in \
+         neighbouring poses, and the motion could continue in more than one way; start it away from that pose",
         .joints.join(", ")
     )]
     Branching {
