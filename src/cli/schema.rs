@@ -212,7 +212,7 @@ fn numbers(count: usize, items: Json) -> Json {
 }
 
 fn whole(least: u64, most: u64) -> Json {
-    json!({ "type": ["integer", "string"], "minimum": least, "maximum": most, "pattern": "^\\s*\\+?[0-9]+\\s*$" })
+    json!({ "type": ["integer", "string"], "minimum": least, "maximum": most })
 }
 
 /// Converts a value in scene file syntax to JSON.

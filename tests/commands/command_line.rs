@@ -669,7 +669,6 @@ fn help_version_and_the_reference_page_are_results() {
         "contact.friction_velocity",
         "gravity.x",
         "spcmm.slider_plane",
-        "chain.links",
         "formulation",
         "solver.preset",
         "view.down",

@@ -59,12 +59,13 @@ fn built_in(name: &str) -> &'static Scene {
 
 /// One that has this row.
 fn with_row(row: &Parameter) -> Scene {
-    built_in(if row.scope == Scope::Chain { "chain" } else { "spcmm" }).clone()
+    built_in(if row.scope == Scope::Own { "chain" } else { "spcmm" }).clone()
 }
 
-/// Any row of the table.
+/// Any row of the table, or the number of links of `chain`.
 fn rows() -> impl Strategy<Value = &'static Parameter> {
-    (0..table().len()).prop_map(|row| &table()[row])
+    let rows: Vec<&Parameter> = table().iter().chain(built_in("chain").parameter("chain.links")).collect();
+    proptest::sample::select(rows)
 }
 
 /// A row of the table that `scene` has, as a key: of all joints, or of one of them.

@@ -1,5 +1,6 @@
 //! Shapes from files beside a scene, roles and colours.
 
+use std::collections::BTreeMap;
 use std::fs;
 
 use jointplay::machine::{Geometry, Role};
@@ -44,7 +45,7 @@ impl Folder {
     }
 
     fn read(&self, text: &str) -> Result<Scene, String> {
-        let read = Scene::parse_in_folder(text, Some("scene.toml"), self.0.path(), &[]);
+        let read = Scene::parse_given(text, Some("scene.toml"), &BTreeMap::new(), Some(self.0.path()), &[]);
         read.map_err(|error| error.to_string())
     }
 }

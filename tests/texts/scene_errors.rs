@@ -217,8 +217,32 @@ fn every_broken_line_is_named_with_its_remedy() {
             "formulation = \"trees\"",
             &["my.toml:2:15", "formulation = \"trees\"", "did you mean `tree`"],
         ),
-        ("start = \"as-given\"", "chain.links = 0", &["my.toml:2:15", "chain.links = 0", "allowed 1 to 4096"]),
-        ("start = \"as-given\"", "chain.links = 2.5", &["chain.links = 2.5", "whole number"]),
+        ("start = \"as-given\"", "chain.links = 0", &["my.toml:2:1", "chain:", "write a [[pattern]]", "previous.link"]),
+        (
+            "start = \"as-given\"",
+            "parameter = [{ name = \"n\", key = \"chain.links\", value = 0, whole = true, range = [1, 4096] }]",
+            &["my.toml:2:57", "chain.links = 0", "allowed 1 to 4096"],
+        ),
+        (
+            "start = \"as-given\"",
+            "parameter = [{ name = \"n\", key = \"chain.links\", value = 2.5, whole = true }]",
+            &["chain.links = 2.5", "whole number"],
+        ),
+        (
+            "start = \"as-given\"",
+            "parameter = [{ name = \"n\", key = \"contact.friction\", value = 2 }]",
+            &["parameter.n.key = \"contact.friction\"", "is not a key", "not first a key of the file"],
+        ),
+        (
+            "start = \"as-given\"",
+            "parameter = [{ name = \"n\", value = \"2 mm\", whole = true }]",
+            &["parameter.n.whole = true", "a whole number has no unit"],
+        ),
+        (
+            "start = \"as-given\"",
+            "joint_contact = [{ name = \"S9\", friction = 0.1 }]",
+            &["my.toml:2:27", "joint_contact.S9.name", "no ball joint `S9`", "ball joints: S1"],
+        ),
         (
             "start = \"as-given\"",
             "gravity.z = \"9.81 m/s\"",
@@ -333,7 +357,7 @@ fn changes_are_refused_with_key_value_and_range() {
                 "Ball joints, B, C, have joint.<ball joint>.<key>; keys: clearance, friction,",
             ],
         ),
-        ("spcmm", "chain.links", "4", &["chain.links = 4", "has no such key", "chains"]),
+        ("spcmm", "chain.links", "4", &["chain.links = 4", "unknown key"]),
         ("chain", "chain.links", "-4", &["chain.links = -4", "allowed 1 to 4096"]),
         ("pendulum", "spcmm.frequency", "1 Hz", &["has no such key", "inverse kinematics"]),
         ("spcmm", "spcmm.frequency", "51 Hz", &["allowed 0 Hz to 50 Hz"]),
@@ -477,7 +501,7 @@ fn a_scene_beyond_a_limit_is_refused_with_its_line() {
     let chain = jointplay::scene::built_in_text("chain").unwrap();
     let changes = vec![("chain.links".to_owned(), "4096".to_owned())];
     let beside = chain.to_owned() + &many(5905, &body) + &many(5905, &joint);
-    let words = "chain.links: too many bodies with those of the file: 5905 and 4096; allowed at most 10000";
+    let words = "too many: 10001 bodies with those of patterns and included files; allowed at most 10000";
     let error = Scene::parse(&beside, None, &changes).expect_err(words);
     holds("chain", &error, &[words]);
 

@@ -407,7 +407,7 @@ mod tests {
             ("contact.clearance=0.1mm..20mm:5", "below the ball radius"),
             ("contact.clearence=0.1mm..1mm:5", "did you mean `contact.clearance`?"),
             ("contact.normal_law=hertz..flores:2", "only numbers"),
-            ("chain.links=2..4:3", "has no such key"),
+            ("chain.links=2..4:3", "unknown key"),
             ("contact.friction=-1..1:3", "-1: out of range"),
         ] {
             let error = axis(text).expect_err(text).to_string();

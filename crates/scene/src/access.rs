@@ -1,12 +1,13 @@
 //! Reading and changing the parameters of a scene by key.
 
-use super::error::nearest_parameter;
+use super::assets::AssetResolver;
+use super::error::{nearest_parameter, no_ball_joint};
 use super::field::Access;
-use super::numbers::{row_of_number, row_of_own};
-use super::read::{REBUILDS, file_only};
-use super::table::{contact_part, contact_rows, find};
+use super::numbers::row_of_number;
+use super::read::{file_only, is_of_text};
+use super::table::{contact_part, contact_rows, find, joint_part};
 use super::*;
-use jointplay_physics::suggest::{brief, nearest};
+use jointplay_physics::suggest::nearest;
 
 /// A key resolved against a scene: its row, and the joint it applies to.
 struct Resolved {
@@ -31,14 +32,13 @@ impl Scene {
         match parameter.scope {
             Scope::Every | Scope::Contact => true,
             Scope::Spcmm => self.machine.spcmm.is_some(),
-            Scope::Chain => self.chain.is_some(),
             Scope::Own => self.source.numbers.contains_key(parameter.key),
         }
     }
 
     /// Parameters of this scene in table order, then user-defined ones; a contact row also stands for `joint.<name>.<key>`.
     pub fn parameters(&self) -> Vec<&'static Parameter> {
-        table().iter().filter(|parameter| self.has(parameter)).chain(self.source.own.iter().map(row_of_own)).collect()
+        table().iter().filter(|parameter| self.has(parameter)).chain(self.source.own.iter().copied()).collect()
     }
 
     /// Row of a number of the file, by key.
@@ -47,70 +47,65 @@ impl Scene {
         if file_only(key) {
             return None;
         }
-        let own = self.source.own.iter().find(|row| row.key == key);
-        Some(own.map_or_else(|| row_of_number(key, number), row_of_own))
+        let own = self.source.own.iter().copied().find(|row| row.key == key);
+        Some(own.unwrap_or_else(|| row_of_number(key, number)))
+    }
+
+    fn lookup(&self, key: &str) -> Option<Resolved> {
+        if let Some(parameter) = self.number(key) {
+            return Some(Resolved { parameter, joint: None });
+        }
+        let Some((name, part)) = joint_part(key) else {
+            let parameter = find(key).filter(|parameter| self.has(parameter))?;
+            return Some(Resolved { parameter, joint: None });
+        };
+        let joint = self.machine.ball_joints.iter().position(|joint| joint.name == name)?;
+        Some(Resolved { parameter: find(&format!("contact.{part}"))?, joint: Some(joint) })
     }
 
     fn resolve(&self, key: &str) -> Result<Resolved, SceneError> {
-        if let Some(parameter) = self.number(key) {
-            return Ok(Resolved { parameter, joint: None });
-        }
-        let Some((name, part)) = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) else {
-            return match find(key) {
-                Some(parameter) if self.has(parameter) => Ok(Resolved { parameter, joint: None }),
-                Some(parameter) => {
-                    let place = parameter.scope.describe();
-                    Err(SceneError::about(
-                        key,
-                        None,
-                        format!("the scene `{}` has no such key: it exists only in {place}", self.name),
-                    ))
-                }
-                None if file_only(key) => {
-                    Err(SceneError::about(key, None, "only in the scene file: it cannot be changed from outside it"))
-                }
-                None => {
-                    let here = self.parameters();
-                    let table = here.iter().map(|parameter| parameter.key);
-                    // A longer search would cost more than the hint is worth.
-                    let numbers = self.source.numbers.keys().map(String::as_str).take(MOST_CHANGES);
-                    let near = nearest_parameter(key, table.chain(numbers), &[]);
-                    Err(SceneError::about(key, None, format!("unknown key{near}")))
-                }
-            };
-        };
-        let Some(joint) = self.machine.ball_joints.iter().position(|joint| joint.name == name) else {
-            let names: Vec<&str> = self.machine.ball_joints.iter().map(|joint| joint.name.as_str()).collect();
-            let listed = if names.len() > 12 { format!("{}, …", names[..12].join(", ")) } else { names.join(", ") };
-            let first = name.split('.').next().unwrap_or(name);
-            let mut others = self.machine.joints.iter().chain(&self.machine.closing_joints);
-            let hinge = others.any(|joint| joint.name == first);
-            let message = if hinge {
-                // Its numbers are keys only if they are in the file.
-                let own = format!("joint.{first}.");
-                let numbers = self.source.numbers.keys().map(String::as_str);
-                let given: Vec<&str> = numbers.filter(|key| key.starts_with(&own)).collect();
-                let near = nearest(key, given.iter().copied());
-                let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
-                format!(
-                    "`{first}` is not a ball joint, and the file gives no such number of it{near}; its numbers: {}. Ball joints, \
-                     {listed}, have joint.<ball joint>.<key>; keys: {}",
-                    if given.is_empty() { "none".to_owned() } else { given.join(", ") },
-                    parts.join(", ")
-                )
-            } else {
-                let near = nearest(name, names.iter().copied());
-                format!("no ball joint `{}`{near}; ball joints: {listed}", brief(name))
-            };
-            return Err(SceneError::about(key, None, message));
-        };
-        match find(&format!("contact.{part}")) {
-            Some(parameter) => Ok(Resolved { parameter, joint: Some(joint) }),
-            None => {
-                let parts = table().iter().filter_map(contact_part);
-                Err(SceneError::about(key, None, format!("unknown key{}", nearest(part, parts))))
+        self.lookup(key).ok_or_else(|| SceneError::about(key, None, self.explain_missing(key)))
+    }
+
+    /// Why this scene has no such key, with the nearest one.
+    fn explain_missing(&self, key: &str) -> String {
+        let numbers = self.source.numbers.keys().map(String::as_str);
+        let Some((name, part)) = joint_part(key) else {
+            if let Some(parameter) = find(key) {
+                let place = parameter.scope.describe();
+                return format!("the scene `{}` has no such key: it exists only in {place}", self.name);
             }
+            if file_only(key) {
+                return "only in the scene file: it cannot be changed from outside it".to_owned();
+            }
+            let here = self.parameters();
+            let table = here.iter().map(|parameter| parameter.key);
+            // A longer search would cost more than the hint is worth.
+            let near = nearest_parameter(key, table.chain(numbers.take(MOST_CHANGES)), &[]);
+            return format!("unknown key{near}");
+        };
+        let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
+        let balls = &self.machine.ball_joints;
+        if balls.iter().any(|joint| joint.name == name) {
+            return format!("unknown key{}", nearest(part, parts.iter().copied()));
         }
+        let first = name.split('.').next().unwrap_or(name);
+        let mut others = self.machine.joints.iter().chain(&self.machine.closing_joints);
+        if !others.any(|joint| joint.name == first) {
+            return no_ball_joint(name, balls);
+        }
+        // Its numbers are keys only if they are in the file.
+        let own = format!("joint.{first}.");
+        let given: Vec<&str> = numbers.filter(|key| key.starts_with(&own)).collect();
+        let near = nearest(key, given.iter().copied());
+        let names: Vec<&str> = balls.iter().map(|joint| joint.name.as_str()).collect();
+        let listed = if names.len() > 12 { format!("{}, …", names[..12].join(", ")) } else { names.join(", ") };
+        format!(
+            "`{first}` is not a ball joint, and the file gives no such number of it{near}; its numbers: {}. Ball joints, \
+             {listed}, have joint.<ball joint>.<key>; keys: {}",
+            if given.is_empty() { "none".to_owned() } else { given.join(", ") },
+            parts.join(", ")
+        )
     }
 
     /// Value of `key` (including `joint.<name>.<…>`).
@@ -127,7 +122,7 @@ impl Scene {
             Access::Scene(field) => (field.get)(self),
             Access::Number => {
                 let number = self.source.numbers.get(key);
-                number.map_or(Value::Unset, |number| Value::Number(number.value))
+                number.map_or(Value::Unset, |number| parameter.kind.value_of(number.value))
             }
         })
     }
@@ -140,15 +135,14 @@ impl Scene {
         self.resolve(key).map(|resolved| resolved.parameter)
     }
 
-    /// Changes a parameter in place and records it in `changes`. Some parameters rebuild the scene from its source with all
-    /// changes so far.
+    /// Changes a parameter in place and records it in `changes`, or reads the scene again from its source with all changes so far.
     ///
     /// # Errors
     /// Unknown key, wrong unit, out of range, or an inconsistent scene; `self` is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
         let mut next = self.clone();
         let parameter = next.change(key, value)?;
-        if REBUILDS.contains(&key) || matches!(parameter.access, Access::Number) {
+        if is_of_text(key) {
             next = next.rebuilt()?;
         }
         next.machine.check_contacts().map_err(|conflict| next.blame_change(&conflict, key))?;
@@ -183,19 +177,13 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// The scene read again from its text with its changes, except those of joints that no longer exist.
+    /// The scene read again from its text with its changes, except those of keys that it no longer has, such as those of a
+    /// joint beyond the end of a shortened chain.
     fn rebuilt(&self) -> Result<Self, SceneError> {
-        let mut changes = self.changes.clone();
-        if let Some((_, links)) = changes.iter().find(|(key, _)| key == "chain.links") {
-            // The ball joints of a chain are J1 to JN.
-            let links: u64 = links.parse().unwrap_or(u64::MAX);
-            changes.retain(|(key, _)| match key.strip_prefix("joint.J").and_then(|rest| rest.split('.').next()) {
-                Some(index) => index.parse::<u64>().map_or(true, |index| index <= links),
-                None => true,
-            });
-        }
         let source = &self.source;
-        Self::parse_with(&source.text, source.file.as_deref(), &source.beside, &changes)
+        let beside = AssetResolver::known(&source.beside);
+        let has = |scene: &Self, key: &str| scene.lookup(key).is_some();
+        Self::read(&source.text, source.file.as_deref(), beside, &self.changes, has)
     }
 
     /// Applies and records one change, without the checks across parameters.
@@ -214,6 +202,8 @@ impl Scene {
                     self.overrides[joint].push(part);
                 }
             }
+            // Applied when the text is read.
+            _ if is_of_text(key) => {}
             _ => self.write(parameter, &value),
         }
         self.changes.retain(|(changed, _)| changed != key);
@@ -222,9 +212,6 @@ impl Scene {
             return Err(SceneError::about(key, Some(text), message));
         }
         self.changes.push((key.to_owned(), text.to_owned()));
-        if parameter.key.starts_with("solver.") {
-            self.resolve_preset();
-        }
         Ok(parameter)
     }
 
@@ -240,37 +227,7 @@ impl Scene {
                 }
             }
             Access::Scene(field) => (field.set)(self, value),
-            // Applied when the text is read.
             Access::Number => {}
-        }
-    }
-
-    /// Applies a preset to the solver settings that the scene's text does not set.
-    pub(super) fn apply_preset(&mut self, preset: Preset) {
-        let (method, step, tolerance) = preset.point();
-        let [method_free, step_free, tolerance_free] = SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));
-        let solver = &mut self.machine.solver;
-        solver.preset = Some(preset);
-        if method_free {
-            solver.method = method;
-        }
-        if step_free {
-            solver.step = step;
-        }
-        if tolerance_free {
-            solver.tolerance = tolerance;
-        }
-    }
-
-    /// Solver settings changed by name take precedence over a preset, in either order.
-    fn resolve_preset(&mut self) {
-        for key in SOLVER_KEYS {
-            let changed = self.changes.iter().rfind(|(changed, _)| changed == key);
-            if let (Some((_, text)), Some(parameter)) = (changed, find(key))
-                && let Ok(value) = parameter.read(text)
-            {
-                self.write(parameter, &value);
-            }
         }
     }
 }

@@ -9,8 +9,11 @@ use jointplay_physics::simulate::StartError;
 impl Scene {
     /// Explains why the machine cannot start, with the relevant line of the file and change.
     pub fn locate(&self, error: &StartError) -> SceneError {
+        let own = self.source.own.iter();
+        let counts = own.clone().filter(|own| matches!(own.kind, Kind::Count { .. }));
         let one = |joint: &str, parts: &[&str]| {
             let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
+            keys.extend(own.clone().map(|own| own.key.to_owned()));
             for part in parts {
                 keys.push(format!("contact.{part}"));
                 keys.push(format!("joint.{joint}.{part}"));
@@ -26,10 +29,10 @@ impl Scene {
             | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => one(joint, &["clearance", "ball_radius"]),
             MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
-                let keys = ["solver.method", "chain.links", "formulation"];
                 let of_form = matches!(error.0, MechanismError::TooCostly { of: CostOf::Formulation(_), .. });
-                let title = if of_form { keys[2] } else { keys[0] };
-                (title.to_owned(), keys.map(str::to_owned).to_vec())
+                let title = if of_form { "formulation" } else { "solver.method" };
+                let keys = ["solver.method", "formulation"].into_iter().chain(counts.map(|own| own.key));
+                (title.to_owned(), keys.map(str::to_owned).collect())
             }
             // The reader builds only consistent machines.
             MechanismError::Machine(_) => ("body".to_owned(), Vec::new()),

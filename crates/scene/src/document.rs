@@ -17,6 +17,11 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// Error for a `[chain]`, a section of earlier versions.
+const NO_CHAIN: &str = "a row of links is a pattern: write a [[pattern]] with `count` and `along`, with the link as [[pattern.body]], \
+     a free [[pattern.joint]], and a [[pattern.ball_joint]] with `socket = { body = \"previous.link\" }`; a [[ball_joint]] holds \
+     `link1`; the built-in scene `chain` is written so";
+
 /// The text being read, its name in errors, and the context of its values.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'d> {
@@ -151,7 +156,10 @@ impl<'d> Section<'d> {
             return node.error(format!("not allowed here: a {one} has {}; a {its} has `{name}`", own.join(", ")));
         }
         let near = nearest(name, known.iter().copied());
-        let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
+        let message = match (&*self.path, &**name) {
+            ("", "chain") => NO_CHAIN.to_owned(),
+            _ => format!("unknown key{near}; allowed here: {}", known.join(", ")),
+        };
         let document = self.document;
         document.error(key.span(), &self.key(name), None, message)
     }
@@ -165,6 +173,12 @@ impl<'d> Section<'d> {
     pub fn get(&self, name: &str) -> Option<Node<'d>> {
         debug_assert!(self.rows.key(name, None).is_some(), "no row for `{name}` in the table `{}`", self.rows.name);
         self.find(name)
+    }
+
+    /// The change of the key `name` of the absent table `table`.
+    pub fn change(&self, table: &str, name: &str) -> Option<Node<'d>> {
+        let row = self.rows.key(table, None)?.table()?.key(name, None)?;
+        Node::new(self.document, format!("{table}.{name}"), row, None)
     }
 
     /// The value of a key, if present and with a row.
@@ -384,16 +398,19 @@ impl<'d> Node<'d> {
         dimension.unwrap_or(Dimension::None)
     }
 
-    /// A whole number in the range of its row.
+    /// A whole number in the range of its row: a number or an expression.
     pub fn whole(&self) -> Result<u32, SceneError> {
         let (least, most) = match self.row.takes {
             ValueType::Whole(least, most) => (least, most),
             _ => (0, u32::MAX),
         };
-        match self.scalar()?.parse() {
-            Ok(number) if (least..=most).contains(&number) => Ok(number),
-            _ => Err(self.error(format!("out of range; allowed {least} to {most}; a whole number, no unit"))),
+        let allowed = format!("allowed {least} to {most}; a whole number, no unit");
+        let number = self.document.reading.evaluate(self.scalar()?, Dimension::None, self.document.copy);
+        let number = number.map_err(|why| self.error(format!("{why}; {allowed}")))?;
+        if number.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&number) {
+            return Ok(number as u32);
         }
+        Err(self.error(format!("out of range; {allowed}")))
     }
 
     /// One of the words of its row.

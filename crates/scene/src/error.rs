@@ -119,8 +119,17 @@ pub(super) fn nearest_parameter<'a>(
 
 /// "No such body", with the nearest name and all names.
 pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+    no_such(["body", "bodies"], wanted, names)
+}
+
+/// "No such ball joint", with the nearest name and all names.
+pub(super) fn no_ball_joint(wanted: &str, joints: &[super::BallJoint]) -> String {
+    no_such(["ball joint", "ball joints"], wanted, joints.iter().map(|joint| joint.name.as_str()))
+}
+
+fn no_such<'a>([what, plural]: [&str; 2], wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
     let near = nearest(wanted, names.clone());
     let listed: Vec<&str> = names.clone().take(12).collect();
     let more = if names.count() > listed.len() { ", …" } else { "" };
-    format!("no body `{}`{near}; bodies: {}{more}", brief(wanted), listed.join(", "))
+    format!("no {what} `{}`{near}; {plural}: {}{more}", brief(wanted), listed.join(", "))
 }

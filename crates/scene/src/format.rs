@@ -80,12 +80,6 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
             SPCMM.help,
         ),
         key(
-            "chain",
-            ValueType::Table(&CHAIN),
-            "{ link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }",
-            CHAIN.help,
-        ),
-        key(
             "include",
             ValueType::Files(many(MOST_FILES, "files")),
             "[\"leg.toml\"]",
@@ -93,11 +87,13 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
         ),
     ]
     .map(|key| key.absent("none"));
+    let joints =
+        [list_of(&JOINT_CONTACT, many(MOST_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
     FileTable::new(
         "scene",
         "the file",
         "a machine, and how it is simulated and shown",
-        joined(&[&names, &sections, &others, &lists()]),
+        joined(&[&names, &sections, &others, &lists(), &joints]),
     )
 });
 
@@ -229,77 +225,20 @@ static SPCMM: LazyLock<FileTable> = LazyLock::new(|| {
     )
 });
 
-static CHAIN: LazyLock<FileTable> = LazyLock::new(|| {
-    let own = [
-        key("hang", vector(D::Length), "\"0 0 500 mm\"", "the socket from which the first link hangs")
-            .zero()
-            .frame(WORLD),
-        key(
-            "rotation",
-            ValueType::Table(&ROTATION),
-            "{ axis = [0, 1, 0], angle = \"-30 deg\" }",
-            "orientation of every link at the start",
-        )
-        .zero()
-        .frame(WORLD),
-        key(
-            "link",
-            ValueType::Table(&LINK),
-            "{ mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" }",
-            "what each link is",
-        ),
-        key(
-            "joint",
-            ValueType::List(&CHAIN_JOINT, many(MOST_BALL_JOINTS, "ball joints")),
-            "[{ name = \"J1\", clearance = \"0.1 mm\" }]",
-            "joints with contact parameters of their own",
-        )
-        .absent("none"),
-    ];
+static JOINT_CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
+    let name = [key("name", ValueType::Joint, "\"J2\"", "which one")];
     FileTable::new(
-        "chain",
-        "[chain]",
-        "a row of equal links, each hung on the one before by a ball joint",
-        joined(&[&parameters("chain"), &own]),
-    )
-});
-
-static LINK: LazyLock<FileTable> = LazyLock::new(|| {
-    let own = [
-        key("ball", vector(D::Length), "\"0 0 100 mm\"", "its ball, in the socket of the link before")
-            .frame("the link's"),
-        key("socket", vector(D::Length), "\"0 0 -100 mm\"", "its socket, for the ball of the next link")
-            .frame("the link's"),
-        opening().frame("the link's"),
-    ];
-    let keys = joined(&[&own, &mass()]);
-    FileTable::new("link", "[chain.link]", "a link of a chain", keys)
-});
-
-static CHAIN_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
-    let name = [key("name", ValueType::Joint, "\"J1\"", "which one: `J1`, `J2`, …, from the top")];
-    FileTable::new(
-        "chain_joint",
-        "[[chain.joint]]",
-        "a ball joint of the chain that differs from the others",
+        "joint_contact",
+        "[[joint_contact]]",
+        "contact parameters of one ball joint, such as one copy of a pattern",
         joined(&[&name, &contact_keys()]),
     )
     .also(&CONTACT)
 });
 
-fn opening() -> FileKey {
-    let help = "side on which the socket is drawn open; no effect on the motion";
-    key("opening", ValueType::Direction, "[0, 0, 1]", help).absent("`view.down`")
-}
-
 static BODY: LazyLock<FileTable> = LazyLock::new(|| {
-    let name = [key("name", ValueType::Name, "\"rod\"", "its name, not `world`")];
-    FileTable::new("body", "[[body]]", "a rigid body", joined(&[&name, &mass()]))
-});
-
-/// Rows of mass properties and shapes.
-fn mass() -> [FileKey; 6] {
-    [
+    let keys = [
+        key("name", ValueType::Name, "\"rod\"", "its name, not `world`"),
         key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "its mass").or("density"),
         key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid").zero().frame("the body's"),
         key(
@@ -333,8 +272,9 @@ fn mass() -> [FileKey; 6] {
              `check` prints the result",
         )
         .absent("`mass` and `inertia` are given"),
-    ]
-}
+    ];
+    FileTable::new("body", "[[body]]", "a rigid body", joined(&[&keys]))
+});
 
 static SHAPE: LazyLock<FileTable> = LazyLock::new(|| of_shape("shape", "a shape", &[]));
 
@@ -626,7 +566,14 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         key("name", ValueType::Name, "\"S1\"", "its name, different from those of other joints"),
         end("socket", "the socket's centre"),
         end("ball", "the ball's centre, on another body"),
-        opening().frame("that of the socket's body"),
+        key(
+            "opening",
+            ValueType::Direction,
+            "[0, 0, 1]",
+            "side on which the socket is drawn open; no effect on the motion",
+        )
+        .absent("`view.down`")
+        .frame("that of the socket's body"),
     ];
     FileTable::new(
         "ball_joint",
@@ -648,6 +595,8 @@ static PARAMETER: FileTable = FileTable::new(
         key("unit", ValueType::Text, "\"mm\"", "unit in which it is shown")
             .absent("that of `value`; required where that is an expression"),
         key("range", ValueType::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
+        key("whole", ValueType::Flag, "true", "whether it is a whole number").absent("false"),
+        key("key", ValueType::Text, "\"chain.links\"", "its key for `--set`").absent("`parameter.` and its name"),
         key("help", ValueType::Text, "\"How far it goes.\"", "what it is").absent("none"),
     ],
 );

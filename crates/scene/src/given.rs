@@ -1,4 +1,4 @@
-//! Values parsed from the scene file: numbers by key, and user-defined parameters.
+//! Numbers parsed from the scene file.
 
 use std::ops::Range;
 
@@ -34,23 +34,4 @@ impl FileNumber {
     pub(super) fn new(value: f64, dimension: Dimension, place: Place, text: &str) -> Self {
         Self { value, dimension, place, unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)) }
     }
-}
-
-/// A user-defined parameter from `[[parameter]]`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct UserParameter {
-    /// `parameter.<name>`.
-    pub key: String,
-    /// Display name.
-    pub label: String,
-    /// Help text.
-    pub help: String,
-    /// Physical dimension.
-    pub dimension: Dimension,
-    /// Display unit.
-    pub unit: &'static str,
-    /// Closed range, SI; `None` if the file gives none.
-    pub range: Option<(f64, f64)>,
-    /// Value in the file, SI; `None` if it is an expression.
-    pub default: Option<f64>,
 }

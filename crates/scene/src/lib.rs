@@ -30,7 +30,6 @@
 
 mod access;
 mod assets;
-mod chain;
 mod check;
 mod document;
 mod drives;
@@ -71,7 +70,7 @@ pub use drives::{DRIVE_LAWS, DriveLaw};
 pub use elements::is_element;
 pub use error::SceneError;
 pub use format::{FILE, file_tables};
-pub use given::{FileNumber, UserParameter};
+pub use given::FileNumber;
 pub use key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, ValueType, Variants};
 pub use live::{LiveScene, SceneSnapshot, SetError};
 pub use load::*;

@@ -36,9 +36,9 @@ embedded! {
 /// The scene opened if none is named.
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 
-/// Maximum number of bodies in a scene, including chain links.
+/// Maximum number of bodies in a scene.
 pub const MOST_BODIES: usize = 10_000;
-/// Maximum number of ball joints in a scene, including a chain's.
+/// Maximum number of ball joints in a scene.
 pub const MOST_BALL_JOINTS: usize = 10_000;
 /// Maximum number of shapes in a scene, on bodies and fixed.
 pub const MOST_SHAPES: usize = 50_000;

@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::given::{FileNumber, UserParameter};
+use super::Parameter;
+use super::given::FileNumber;
 use jointplay_physics::machine::{Machine, Vec3};
 use jointplay_physics::words::words;
 
@@ -19,8 +20,6 @@ pub struct Scene {
     pub description: String,
     /// The machine to simulate.
     pub machine: Machine,
-    /// Set if the file has a `[chain]`.
-    pub chain: Option<Chain>,
     /// View settings.
     pub view: ViewSettings,
     /// Keys (without prefix) in which each ball joint differs from the scene's `contact.*`.
@@ -42,21 +41,14 @@ pub struct Source {
     /// The TOML text.
     pub text: String,
     /// Byte offsets in the text for errors found after reading: each parameter in the text, by key; `spcmm` for its section;
-    /// `joint.<name>` for each ball joint (in a chain, the chain's section).
+    /// `joint.<name>` for each ball joint.
     pub places: BTreeMap<String, usize>,
     /// Numbers parsed from the text, by key.
     pub numbers: Arc<BTreeMap<String, FileNumber>>,
-    /// User-defined parameters, in file order.
-    pub own: Vec<UserParameter>,
+    /// Rows of the user-defined parameters, in file order.
+    pub own: Vec<&'static Parameter>,
     /// Contents of the files named by the scene, as of loading.
     pub beside: Texts,
-}
-
-/// A chain of identical links.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Chain {
-    /// Number of links.
-    pub links: usize,
 }
 
 /// A world axis with its sign.

@@ -1,8 +1,7 @@
 //! User-defined parameters of a scene file.
 
 use super::document::{Node, Section, lists};
-use super::given::UserParameter;
-use super::numbers::row_of_own;
+use super::numbers::{LARGEST, row_of_file};
 use super::*;
 use jointplay_physics::units::{all_units, same_unit, split_unit};
 
@@ -10,12 +9,13 @@ use jointplay_physics::units::{all_units, same_unit, split_unit};
 ///
 /// # Errors
 /// An invalid or repeated parameter.
-pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<UserParameter>, SceneError> {
-    let mut all: Vec<UserParameter> = Vec::new();
+pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>, SceneError> {
+    let mut all: Vec<(&Parameter, bool)> = Vec::new();
     let nodes = lists(files, "parameter", Vec::new())?;
     for (i, node) in nodes.iter().enumerate() {
-        let own = read_parameter(node).map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
-        if let Some(first) = all.iter().position(|other| other.key == own.key) {
+        let own = read_parameter(node, files[0].rows)
+            .map_err(|error| defined_later(node, &nodes[i + 1..]).unwrap_or(error))?;
+        if let Some(first) = all.iter().position(|(other, _)| other.key == own.0.key) {
             let [name, first] =
                 [node, &nodes[first]].map(|node| node.section_as(node.title("parameter"))?.require("name"));
             let name = name?;
@@ -23,9 +23,7 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<UserParameter>, Scen
         }
         all.push(own);
     }
-    // An expression without a range is an ordinary number, not an adjustable parameter.
-    all.retain(|own| own.default.is_some() || own.range.is_some());
-    Ok(all)
+    Ok(all.into_iter().filter_map(|(row, adjustable)| adjustable.then_some(row)).collect())
 }
 
 /// The error for a value that uses a parameter defined later; `None` if it uses none.
@@ -38,7 +36,8 @@ fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
     Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
 }
 
-fn read_parameter(node: &Node<'_>) -> Result<UserParameter, SceneError> {
+/// Reads a `[[parameter]]` of a file with the keys `file`: its row, and whether it is adjustable.
+fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Parameter, bool), SceneError> {
     let title = node.title("parameter");
     let section = node.section_as(title.clone())?;
     let name_node = section.require("name")?;
@@ -73,7 +72,12 @@ fn read_parameter(node: &Node<'_>) -> Result<UserParameter, SceneError> {
             return Err(at.error(key));
         }
     };
-    let value_node = value_node.retitled(title);
+    let key = section.get("key").map_or(Ok(title.clone()), |node| read_key(&node, file))?;
+    let whole = section.get("whole").map_or(Ok(false), |node| node.flag())?;
+    if let (true, Some(node), false) = (whole, section.get("whole"), dimension == Dimension::None) {
+        return Err(node.error("a whole number has no unit"));
+    }
+    let value_node = value_node.retitled(key.clone());
     let value = value_node.quantity(dimension)?;
     let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
     let label = words("label")?.unwrap_or(&name);
@@ -88,18 +92,36 @@ fn read_parameter(node: &Node<'_>) -> Result<UserParameter, SceneError> {
             Some((least, most))
         }
     };
-    let own = UserParameter {
-        key: format!("parameter.{name}"),
-        label: visible_line(label).into_owned(),
-        help: visible_line(help).into_owned(),
-        dimension,
-        unit,
-        range,
-        default: parse_quantity(text, dimension).ok(),
+    let default = parse_quantity(text, dimension).ok();
+    let around = match default.unwrap_or_default() {
+        0.0 => (-1.0, 1.0),
+        default => ((2.0 * default).min(0.0), (2.0 * default).max(0.0)),
     };
-    let row = row_of_own(&own);
-    let checked = row.check(&Value::Number(value));
+    let (min, max) = range.unwrap_or((-LARGEST, LARGEST));
+    let slider = range.unwrap_or(around);
+    let kind = match whole {
+        true => Kind::Count { min: min as u64, max: max as u64 },
+        false => Kind::Number { dimension, min, max, display: unit, slider, logarithmic: false },
+    };
+    let given = default.map_or(Value::Unset, |default| kind.value_of(default));
+    let row = row_of_file([&key, &visible_line(label), &visible_line(help)], kind, given);
+    let checked = if whole { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
     checked.map_err(|error| value_node.error(error.to_string()))?;
     section.document.reading.own(&name, value, dimension);
-    Ok(own)
+    // An expression without a range is an ordinary number, not an adjustable parameter.
+    Ok((row, default.is_some() || range.is_some()))
+}
+
+/// Reads the key by which a parameter is changed: names with dots between them, the first of which is no key of the `file`.
+fn read_key(node: &Node<'_>, file: &FileTable) -> Result<String, SceneError> {
+    let key = node.text()?;
+    let letters = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+    let name = |part: &str| !part.is_empty() && part.chars().all(letters);
+    let taken = key.split('.').next().is_some_and(|first| file.key(first, None).is_some());
+    if key.len() > 40 || taken || !key.split('.').all(name) {
+        return Err(node.error(
+            "is not a key; allowed 1 to 40 letters (a to z), digits, `_`, `-`, and dots between them, and not first a key of the file",
+        ));
+    }
+    Ok(key.to_owned())
 }

@@ -34,6 +34,16 @@ pub enum Kind {
     Choice(&'static [&'static str]),
 }
 
+impl Kind {
+    /// The value of this kind that is `number` in SI units.
+    pub(super) fn value_of(self, number: f64) -> Value {
+        match self {
+            Self::Count { .. } => Value::Count(number as u64),
+            _ => Value::Number(number),
+        }
+    }
+}
+
 /// Scenes in which a key exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
@@ -43,8 +53,6 @@ pub enum Scope {
     Contact,
     /// Only in scenes with the paper's inverse kinematics.
     Spcmm,
-    /// Only in chains.
-    Chain,
     /// Only in the scene whose file defines it.
     Own,
 }
@@ -56,7 +64,6 @@ impl Scope {
             Self::Every => "every scene",
             Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
             Self::Spcmm => "scenes with the paper's inverse kinematics",
-            Self::Chain => "chains",
             Self::Own => "scenes whose file gives it",
         }
     }
@@ -85,6 +92,13 @@ pub struct Parameter {
     pub help: &'static str,
     /// Which equation it enters, e.g. "paper eqs. (9), (10)".
     pub equation: &'static str,
+}
+
+/// Each row exists once.
+impl PartialEq for Parameter {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::eq(self, other)
+    }
 }
 
 /// Why a text or a value is not valid for a parameter.

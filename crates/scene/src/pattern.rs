@@ -6,7 +6,7 @@ use toml::de::DeValue;
 
 use super::document::{Node, Section, lists};
 use super::key::ValueType;
-use super::pattern_instance::PatternInstance;
+use super::pattern_instance::{PREVIOUS, PatternInstance};
 use super::*;
 
 /// A `[[pattern]]` with its copies.
@@ -42,6 +42,16 @@ fn values(value: &DeValue<'_>) -> usize {
         DeValue::Array(array) => array.iter().map(|value| values(value.get_ref())).sum(),
         DeValue::Table(table) => table.iter().map(|(_, value)| values(value.get_ref())).sum(),
         _ => 1,
+    }
+}
+
+/// Whether a value, or one within it, refers to the previous copy.
+fn names_previous(value: &DeValue<'_>) -> bool {
+    match value {
+        DeValue::String(text) => text.starts_with(PREVIOUS),
+        DeValue::Array(array) => array.iter().any(|value| names_previous(value.get_ref())),
+        DeValue::Table(table) => table.iter().any(|(_, value)| names_previous(value.get_ref())),
+        _ => false,
     }
 }
 
@@ -130,7 +140,8 @@ impl<'d> Pattern<'d> {
         if let Some(list) = self.section.get(name) {
             let entries = list.entries()?;
             for copy in &self.copies {
-                for entry in &entries {
+                // The first copy has no previous one.
+                for entry in entries.iter().filter(|entry| copy.number > 1 || !names_previous(entry.value.get_ref())) {
                     let mut node = entry.clone();
                     node.document.copy = Some(copy);
                     nodes.push(node);

@@ -6,6 +6,9 @@ use std::sync::Arc;
 
 use jointplay_physics::machine::{Quat, Vec3};
 
+/// Begins a reference to a body or a joint of the previous copy.
+pub(super) const PREVIOUS: &str = "previous.";
+
 /// One copy of a pattern: its numbered names, and the transform of its attachments to the outside.
 #[derive(Clone, Debug)]
 pub(super) struct PatternInstance {
@@ -26,7 +29,8 @@ impl PatternInstance {
         format!("{name}{}", self.number)
     }
 
-    /// Resolves a body name: numbered if the pattern has the body, otherwise unchanged.
+    /// Resolves a body name: numbered if the pattern has the body, otherwise unchanged. A name after [`PREVIOUS`] gets the number of
+    /// the previous copy.
     pub fn body<'a>(&self, name: &'a str) -> Cow<'a, str> {
         self.own(&self.bodies, name)
     }
@@ -37,13 +41,17 @@ impl PatternInstance {
     }
 
     fn own<'a>(&self, names: &BTreeSet<String>, name: &'a str) -> Cow<'a, str> {
-        if names.contains(name) { Cow::Owned(self.name(name)) } else { Cow::Borrowed(name) }
+        match name.strip_prefix(PREVIOUS) {
+            Some(own) if names.contains(own) => Cow::Owned(format!("{own}{}", self.number - 1)),
+            None if names.contains(name) => Cow::Owned(self.name(name)),
+            _ => Cow::Borrowed(name),
+        }
     }
 
-    /// Whether `name` is a body of this copy.
+    /// Whether `name` is a body of this copy or of the previous one.
     pub fn made(&self, name: &str) -> bool {
-        let own = name.strip_suffix(&self.number.to_string());
-        own.is_some_and(|own| self.bodies.contains(own))
+        let own = |number: u32| name.strip_suffix(&number.to_string());
+        [self.number, self.number - 1].into_iter().filter_map(own).any(|own| self.bodies.contains(own))
     }
 
     /// Transforms a point of the first copy to this one, m.

@@ -3,21 +3,19 @@
 use super::assets::AssetResolver;
 use super::document::{Document, Node, Section, lists};
 use super::elements::{ELEMENTS, read_element};
-use super::error::no_body;
+use super::error::{no_ball_joint, no_body};
 use super::format::FILE;
 use super::include::{self, included_texts};
 use super::own::read_own;
 use super::pattern::{Pattern, read_patterns};
 use super::read_bodies::{read_body, read_shape};
-use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
+use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
 use super::reading::Reading;
+use super::table::joint_part;
 use super::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Parameters that determine the bodies: changing one reads the file again.
-pub(super) const REBUILDS: [&str; 2] = ["chain.links", "spcmm.slider_plane"];
 
 /// Node of each parameter given in the file, by key.
 type Places<'d> = BTreeMap<String, Node<'d>>;
@@ -29,19 +27,6 @@ impl Scene {
     /// Same as [`Self::load`].
     pub fn parse(text: &str, file: Option<&str>, changes: &[(String, String)]) -> Result<Self, SceneError> {
         Self::parse_beside(text, file, AssetResolver::default(), changes)
-    }
-
-    /// Like [`Self::parse`], for the text of a file in `folder`, from which the files it names are read.
-    ///
-    /// # Errors
-    /// Same as [`Self::load`].
-    pub fn parse_in_folder(
-        text: &str,
-        file: Option<&str>,
-        folder: &Path,
-        changes: &[(String, String)],
-    ) -> Result<Self, SceneError> {
-        Self::parse_beside(text, file, AssetResolver::in_folder(folder), changes)
     }
 
     /// Like [`Self::parse`], for a text opened together with other files, `given` by name without folder. A file that also
@@ -79,16 +64,31 @@ impl Scene {
         beside: AssetResolver<'_>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
+        Self::read(text, file, beside, changes, |_, _| true)
+    }
+
+    /// Like [`Self::parse_beside`], without the changes of keys that `keeps` rejects once the bodies and joints are read.
+    pub(super) fn read(
+        text: &str,
+        file: Option<&str>,
+        beside: AssetResolver<'_>,
+        changes: &[(String, String)],
+        keeps: fn(&Self, &str) -> bool,
+    ) -> Result<Self, SceneError> {
         let of_text = changes.iter().filter(|(key, _)| is_of_text(key));
         let reading = Reading::new(of_text);
         let document =
             Document { file, text, reading: &reading, beside: &beside, included: false, copy: None, on_hinge: false };
-        let mut scene = Self::read_document(document, changes)?;
+        let mut scene = Self::read_document(document, changes, keeps)?;
         scene.source.beside = beside.into_texts();
         Ok(scene)
     }
 
-    fn read_document(document: Document<'_>, changes: &[(String, String)]) -> Result<Self, SceneError> {
+    fn read_document(
+        document: Document<'_>,
+        changes: &[(String, String)],
+        keeps: fn(&Self, &str) -> bool,
+    ) -> Result<Self, SceneError> {
         let Document { file, text, .. } = document;
         if text.trim().is_empty() {
             return Err(document.error(0..0, "", None, "the file is empty; a scene needs at least one body"));
@@ -113,16 +113,13 @@ impl Scene {
             .map(|(key, node)| (key.clone(), node.place()))
             .chain(top.get("spcmm").map(|node| ("spcmm".to_owned(), node.place())))
             .collect();
-        for (key, value) in changes {
-            if REBUILDS.contains(&key.as_str()) {
-                scene.change(key, value)?;
-            }
-        }
         read_mechanism(&files, &patterns, &mut scene, &mut places)?;
         scene.source.numbers = Arc::new(document.reading.numbers());
         scene.source.own = own;
         for (key, value) in changes {
-            scene.change(key, value)?;
+            if keeps(&scene, key) {
+                scene.change(key, value)?;
+            }
         }
         scene.machine.check_contacts().map_err(|conflict| {
             let message = conflict.fault.to_string();
@@ -136,11 +133,12 @@ impl Scene {
     }
 }
 
-/// Whether a key may be a number of the text rather than a parameter of the table.
-fn is_of_text(key: &str) -> bool {
-    let of_joint = key.strip_prefix("joint.").and_then(|key| key.rsplit_once('.'));
-    let in_table = |part: &str| find(&format!("contact.{part}")).is_some();
-    find(key).is_none() && !of_joint.is_some_and(|(_, part)| in_table(part)) && !file_only(key)
+/// Whether a change of a key replaces a value of the text, which is read again: a number of the text, the parameter that places
+/// bodies, or the preset, which gives way to other settings. Other parameters of the table are changed in the machine.
+pub(super) fn is_of_text(key: &str) -> bool {
+    let in_table = |(_, part): (&str, &str)| find(&format!("contact.{part}")).is_some();
+    ["solver.preset", "spcmm.slider_plane"].contains(&key)
+        || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !file_only(key)
 }
 
 /// Whether a key exists in scene files but can never be changed from outside.
@@ -207,7 +205,6 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
         machine: Machine { spcmm, ..Machine::default() },
-        chain: top.get("chain").map(|_| Chain { links: 0 }),
         view,
         overrides: Vec::new(),
         source: Source { file: document.file.map(str::to_owned), text: document.text.to_owned(), ..Source::default() },
@@ -227,7 +224,10 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         }
     }
     let find_node = |key: &'static str| match key.split_once('.') {
-        Some((section, name)) => sections.get(section).and_then(|section| section.get(name)),
+        Some((section, name)) => match sections.get(section) {
+            Some(section) => section.get(name),
+            None => top.change(section, name),
+        },
         None => top.get(key),
     };
     // The preset first: other settings in the file take precedence over it.
@@ -326,19 +326,7 @@ fn read_mechanism<'d>(
         let shape = read_shape(&node, true, scene.machine.spcmm.as_ref())?;
         scene.machine.fixed_shapes.push(shape);
     }
-    if let Some(node) = top.get("chain") {
-        places.extend(super::chain::expand(&node, scene)?);
-        for joint in &scene.machine.ball_joints {
-            let title = format!("joint.{}", joint.name);
-            scene.source.places.entry(title).or_insert(node.place());
-        }
-        let joints = scene.machine.joints.iter().map(|joint| &joint.name);
-        for name in joints.chain(scene.machine.ball_joints.iter().map(|joint| &joint.name)) {
-            joint_names.taken(name, &node);
-        }
-    }
-    // Elements follow the chain, because they may be attached to its links.
-    let by_name = indices_by_name(&scene.machine.bodies);
+    read_joint_contacts(top, scene, places)?;
     let joints = scene.machine.kinematic_joints().zip(0..);
     let joints = joints.map(|(joint, index)| (joint.name.clone(), index));
     let joints: BTreeMap<String, usize> = joints.collect();
@@ -357,9 +345,31 @@ fn read_mechanism<'d>(
         return Err(top.document.error(0..0, "shapes", None, message));
     }
     if scene.machine.bodies.is_empty() {
-        return Err(top.document.error(0..0, "body", None, "a scene needs at least one [[body]], or a [chain]"));
+        return Err(top.document.error(0..0, "body", None, "a scene needs at least one [[body]]"));
     }
     read_output(top, scene, &file_order)
+}
+
+/// Reads every `[[joint_contact]]`: contact parameters of a ball joint in addition to those of its own entry.
+fn read_joint_contacts<'d>(top: &Section<'d>, scene: &mut Scene, places: &mut Places<'d>) -> Result<(), SceneError> {
+    let mut names = Names::default();
+    for node in lists(std::slice::from_ref(top), "joint_contact", Vec::new())? {
+        let section = node.section_as(node.title("joint_contact"))?;
+        let node = section.require("name")?;
+        let name = node.text()?;
+        names.add(&section, "[[joint_contact]]", name)?;
+        let joints = &mut scene.machine.ball_joints;
+        let Some(index) = joints.iter().position(|joint| joint.name == name) else {
+            return Err(node.error(no_ball_joint(name, joints)));
+        };
+        for (part, node) in read_own_contact(&section, &mut joints[index])? {
+            if !scene.overrides[index].contains(&part) {
+                scene.overrides[index].push(part);
+            }
+            places.insert(format!("joint.{name}.{part}"), node);
+        }
+    }
+    Ok(())
 }
 
 /// Index of each body, by name.
@@ -370,11 +380,10 @@ fn indices_by_name(bodies: &[Body]) -> BTreeMap<String, usize> {
 
 fn read_output(top: &Section<'_>, scene: &mut Scene, file_order: &[String]) -> Result<(), SceneError> {
     // Default: the last body (the end of a chain, the platform of most files).
-    let last = scene.machine.bodies.last().map_or("", |body| body.name.as_str());
-    let last = if scene.chain.is_some() { last } else { file_order.last().map_or(last, String::as_str) }.to_owned();
+    let last = file_order.last().map_or("", String::as_str);
     let section = top.get("output").map(|node| node.section()).transpose()?;
     let node = section.as_ref().and_then(|section| section.get("body"));
-    let wanted = node.as_ref().map_or(Ok(last.as_str()), |node| node.text())?;
+    let wanted = node.as_ref().map_or(Ok(last), |node| node.text())?;
     let found = scene.machine.bodies.iter().position(|body| body.name == wanted);
     let names = || scene.machine.bodies.iter().map(|body| body.name.as_str());
     let body = match (found, node) {
@@ -394,11 +403,6 @@ struct Names<'d> {
 }
 
 impl<'d> Names<'d> {
-    /// Reserves `name` for the item at `node`, unless already taken.
-    fn taken(&mut self, name: &str, node: &Node<'d>) {
-        self.places.entry(name.to_owned()).or_insert_with(|| node.clone());
-    }
-
     fn add(&mut self, section: &Section<'d>, what: &str, name: &str) -> Result<(), SceneError> {
         let node = section.require("name")?;
         match self.places.insert(name.to_owned(), node.clone()) {

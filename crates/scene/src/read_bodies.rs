@@ -53,26 +53,22 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
         let why = "`world` is the fixed frame; choose another name";
         return Err(name_node.error(why));
     }
-    Ok((read_rigid_body(&section, name)?, section))
-}
-
-/// Reads mass, centroid, inertia and shapes.
-pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Body, SceneError> {
     let shapes = match section.get("shapes") {
         Some(node) => node.entries()?.iter().map(|shape| read_shape(shape, false, None)).collect::<Result<_, _>>()?,
         None => Vec::new(),
     };
     if let Some(node) = section.get("density") {
-        return read_solid(section, &node, name, shapes);
+        return Ok((read_solid(&section, &node, name, shapes)?, section));
     }
-    Ok(Body {
+    let body = Body {
         name,
         mass: section.number("mass")?,
         centre: section.vector("centre")?,
-        inertia: read_inertia(section)?,
+        inertia: read_inertia(&section)?,
         shapes,
         density: None,
-    })
+    };
+    Ok((body, section))
 }
 
 /// A body whose mass, centroid and inertia follow from its shapes and the density in `node`.

@@ -87,7 +87,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 29] = [
+static TABLE: [Parameter; 28] = [
     contact(
         "contact.clearance",
         field!(clearance),
@@ -288,28 +288,6 @@ static TABLE: [Parameter; 29] = [
         "Paper eq. (59)",
     ),
     at_reset(row(
-        "chain.links",
-        Access::Scene(Field {
-            get: |scene| {
-                let links = scene.chain.map(|chain| Value::Count(chain.links as u64));
-                links.unwrap_or(Value::Unset)
-            },
-            set: |scene, value| {
-                if let (Some(chain), Value::Count(links)) = (&mut scene.chain, value) {
-                    chain.links = usize::try_from(*links).expect("the table allows a few thousand");
-                }
-            },
-        }),
-        "Links",
-        "Chain",
-        Kind::Count { min: 1, max: 4096 },
-        Value::Count(8),
-        Scope::Chain,
-        "Number of equal links, each hung on the one above by a ball joint with clearance. The cost of a step grows \
-         in proportion.",
-        "Newton-Euler equations of each link; the mass matrix is block diagonal",
-    )),
-    at_reset(row(
         "formulation",
         Access::Scene(word_field!(machine.formulation)),
         "Formulation",
@@ -382,7 +360,12 @@ static TABLE: [Parameter; 29] = [
         "solver.preset",
         Access::Scene(Field {
             get: |scene| scene.machine.solver.preset.map_or(Value::Unset, |preset| Value::Choice(preset.word())),
-            set: |scene, value| scene.apply_preset(word_of(value)),
+            set: |scene, value| {
+                let preset: Preset = word_of(value);
+                let solver = &mut scene.machine.solver;
+                (solver.method, solver.step, solver.tolerance) = preset.point();
+                solver.preset = Some(preset);
+            },
         }),
         "Preset",
         "Solver",
@@ -448,6 +431,11 @@ pub fn reference_page() -> String {
 /// The row of a key (without a joint's name).
 pub fn find(key: &str) -> Option<&'static Parameter> {
     TABLE.iter().find(|parameter| parameter.key == key)
+}
+
+/// Name and rest of a key that begins with `joint.`: `("S1", "friction")`.
+pub(super) fn joint_part(key: &str) -> Option<(&str, &str)> {
+    key.strip_prefix("joint.")?.rsplit_once('.')
 }
 
 /// Last part of a contact key: `clearance` of `contact.clearance`.

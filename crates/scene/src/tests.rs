@@ -209,7 +209,37 @@ fn a_chain_is_rebuilt_with_its_links() {
     // A change of a joint that no longer exists is dropped with it.
     assert!(scene.get("joint.J7.friction").is_err());
     assert_eq!(scene.changes.len(), 2);
+    scene.set("chain.links", "9").unwrap();
+    scene.set("joint.J9.friction", "0.5").unwrap();
+    scene.set("body.link9.mass", "1 kg").unwrap();
+    scene.undo_change("chain.links").unwrap();
+    assert_eq!(scene.changes, [("joint.J2.friction".to_owned(), "0.4".to_owned())]);
     assert_eq!(changed("chain", &[("chain.links", "256")]).machine.bodies.len(), 256);
+}
+
+#[test]
+fn a_copy_of_a_pattern_refers_to_the_previous_one() {
+    let text = "parameter = [{ name = \"n\", key = \"links\", value = 3, whole = true }]\n\
+                joint = [{ name = \"h1\", kind = \"revolute\", child = \"bar1\", axis = [0, 1, 0] }]\n\
+                [[pattern]]\nname = \"bars\"\ncount = \"n\"\nalong = \"0 0 -1 m\"\n\
+                body = [{ name = \"bar\", mass = \"1 kg\", inertia = \"1 1 1 kg m^2\" }]\n\
+                joint = [{ name = \"h\", kind = \"revolute\", parent = \"previous.bar\", child = \"bar\", axis = [0, 1, 0], \
+                parent_point = \"0 0 -1 m\" }]\n\
+                joint_spring = [{ name = \"k\", joint = \"previous.h\", stiffness = \"1 N m/rad\" }]\n";
+    let mut scene = Scene::parse(text, None, &[]).unwrap();
+    let parents = |scene: &Scene| scene.machine.joints.iter().map(|joint| joint.parent).collect::<Vec<_>>();
+    assert_eq!(parents(&scene), [None, Some(0), Some(1)]);
+    // Coordinates of the previous bar are its own, and do not shift with the copy.
+    assert!(scene.machine.joints[1..].iter().all(|joint| joint.parent_point == Vec3::new(0.0, 0.0, -1.0)));
+    let springs: Vec<&str> = scene.machine.elements.iter().map(|element| &*element.name).collect();
+    assert_eq!(springs, ["k2", "k3"]);
+    scene.set("links", "5").unwrap();
+    assert_eq!(parents(&scene).len(), 5);
+    assert!(scene.to_toml().unwrap().contains("value = 5, whole"));
+    let error = Scene::parse(&text.replace("previous.bar", "previous.rod"), None, &[]).unwrap_err().to_string();
+    assert!(error.contains("no body `previous.rod`"), "{error}");
+    let error = Scene::parse(&text.replace("count = \"n\"", "count = \"n / 2\""), None, &[]).unwrap_err().to_string();
+    assert!(error.contains("allowed 1 to 10000; a whole number"), "{error}");
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! Writes a scene back to TOML: its source text with changed values replaced; comments and order are preserved.
 
-use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value};
+use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, TableLike, Value as Toml, value};
 
 use std::collections::BTreeMap;
 
 use super::given::{FileNumber, Place};
-use super::{Kind, Scene, SceneError, Value};
+use super::table::joint_part;
+use super::{Scene, SceneError, Value};
 use jointplay_physics::units::exact_quantity;
 
 /// Maximum number of components in a vector.
@@ -52,10 +53,8 @@ impl Scene {
                 let message = format!("cannot be written to a scene file: {why}");
                 SceneError::about(key, Some(value), message)
             };
-            let text = |number: &FileNumber| {
-                let text = exact_quantity(number.value, number.unit, number.dimension);
-                format!("\"{text}\"")
-            };
+            let text =
+                |number: &FileNumber| toml_of(&exact_quantity(number.value, number.unit, number.dimension)).to_string();
             let here = |other: &&FileNumber| other.place == number.place;
             let same: Vec<&FileNumber> = numbers.values().filter(here).collect();
             let (span, text) = match &number.place {
@@ -85,27 +84,26 @@ impl Scene {
     fn write_change(&self, document: &mut DocumentMut, key: &str) -> Result<(), SceneError> {
         let parameter = self.parameter(key)?;
         let item = self.item(key)?;
-        if let Some((name, part)) = key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
-            let placed = put_joint(document.get_mut("ball_joint"), name, part, &item)
-                || put_chain_joint(document.get_mut("chain"), name, part, item);
-            return placed.then_some(()).ok_or_else(|| SceneError {
-                key: Some(key.to_owned()),
-                message: "cannot be written to a scene file: every copy of a pattern has it".to_owned(),
-                ..SceneError::default()
-            });
+        if let Some((name, part)) = joint_part(key) {
+            let mut lists = ["joint_contact", "ball_joint"].into_iter();
+            if !lists.any(|list| put_joint(document.get_mut(list), name, part, &item)) {
+                add_joint_contact(document, name, part, item);
+            }
+            return Ok(());
         }
         match parameter.key.split_once('.') {
             None => put(document.as_table_mut(), parameter.key, item),
             Some((section, part)) => {
                 let fresh = !document.contains_key(section);
                 let table = document.entry(section).or_insert_with(|| Item::Table(Table::new()));
+                let table = table.as_table_like_mut().expect("the scene was read from this text");
                 // If a section gives one component of gravity, the others are 0.
                 if fresh && section == "gravity" {
                     for part in ["x", "y", "z"] {
-                        place(table, part, self.item(&format!("gravity.{part}"))?);
+                        put(table, part, self.item(&format!("gravity.{part}"))?);
                     }
                 } else {
-                    place(table, part, item);
+                    put(table, part, item);
                 }
             }
         }
@@ -117,88 +115,43 @@ impl Scene {
         let parameter = self.parameter(key)?;
         let now = self.get(key)?;
         let text = parameter.write(&now);
-        let bare =
-            matches!(parameter.kind, Kind::Number { display: "", .. }) || matches!(parameter.kind, Kind::Count { .. });
-        Ok(match (&now, text.parse::<Toml>()) {
-            (Value::Number(_) | Value::Count(_), Ok(number)) if bare => value(number),
-            _ => value(text),
-        })
+        Ok(value(if matches!(now, Value::Choice(_)) { text.into() } else { toml_of(&text) }))
     }
+}
+
+/// A number as TOML: bare if it has no unit, otherwise a string.
+fn toml_of(text: &str) -> Toml {
+    text.parse().unwrap_or_else(|_| text.into())
 }
 
 /// Writes `item` to the entry named `name` in a list of joints, if there is one.
 fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
-    match joints {
-        Some(Item::ArrayOfTables(tables)) => tables
-            .iter_mut()
-            .find(|table| text_of(table.get("name")) == Some(name))
-            .map(|table| put(table, part, item.clone())),
-        Some(Item::Value(Toml::Array(array))) => array
-            .iter_mut()
-            .filter_map(Toml::as_inline_table_mut)
-            .find(|table| table.get("name").and_then(Toml::as_str) == Some(name))
-            .zip(item.as_value())
-            .map(|(table, item)| drop(table.insert(part, item.clone()))),
-        _ => None,
-    }
-    .is_some()
+    let mut entries: Vec<&mut dyn TableLike> = match joints {
+        Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|table| table as _).collect(),
+        Some(Item::Value(Toml::Array(array))) => {
+            array.iter_mut().filter_map(Toml::as_inline_table_mut).map(|table| table as _).collect()
+        }
+        _ => Vec::new(),
+    };
+    let named = entries.iter_mut().find(|entry| entry.get("name").and_then(Item::as_str) == Some(name));
+    named.map(|entry| put(*entry, part, item.clone())).is_some()
 }
 
-/// Writes `item` to the `[[chain.joint]]` named `name`, adding it if needed; returns whether there is a chain.
-fn put_chain_joint(chain: Option<&mut Item>, name: &str, part: &str, item: Item) -> bool {
-    match chain {
-        Some(Item::Table(chain)) => {
-            if put_joint(chain.get_mut("joint"), name, part, &item) {
-                return true;
-            }
-            let mut own = Table::new();
-            own.insert("name", value(name));
-            own.insert(part, item);
-            match chain.entry("joint").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())) {
-                Item::ArrayOfTables(tables) => tables.push(own),
-                Item::Value(Toml::Array(array)) => array.push(own.into_inline_table()),
-                _ => return false,
-            }
-            true
-        }
-        Some(Item::Value(Toml::InlineTable(chain))) => {
-            let joints = chain.entry("joint").or_insert_with(|| Array::new().into());
-            let (Some(joints), Item::Value(item)) = (joints.as_array_mut(), item) else {
-                return false;
-            };
-            let at = joints.iter().position(|joint| {
-                let own = joint.as_inline_table().and_then(|own| own.get("name"));
-                own.and_then(Toml::as_str) == Some(name)
-            });
-            let there = at.and_then(|at| joints.get_mut(at));
-            if let Some(own) = there.and_then(Toml::as_inline_table_mut) {
-                own.insert(part, item);
-            } else {
-                let mut own = InlineTable::new();
-                own.insert("name", name.into());
-                own.insert(part, item);
-                joints.push(own);
-            }
-            true
-        }
-        _ => false,
-    }
-}
-
-/// Writes `item` to a section, which is a table or an inline table.
-fn place(section: &mut Item, name: &str, item: Item) {
-    match (section, item) {
-        (Item::Table(table), item) => put(table, name, item),
-        (Item::Value(Toml::InlineTable(table)), Item::Value(item)) => {
-            table.insert(name, item);
-        }
-        // Unreachable: the scene was read from this text, so a section is a table.
+/// Adds a `[[joint_contact]]` with `item` for the ball joint `name`.
+fn add_joint_contact(document: &mut DocumentMut, name: &str, part: &str, item: Item) {
+    let mut own = Table::new();
+    own.insert("name", value(name));
+    own.insert(part, item);
+    match document.entry("joint_contact").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())) {
+        Item::ArrayOfTables(tables) => tables.push(own),
+        Item::Value(Toml::Array(array)) => array.push(own.into_inline_table()),
+        // Unreachable: the scene was read from this text.
         _ => {}
     }
 }
 
 /// Writes `item` to `table`; comments above and after the old value are preserved.
-fn put(table: &mut Table, name: &str, mut item: Item) {
+fn put(table: &mut dyn TableLike, name: &str, mut item: Item) {
     let Some(old) = table.get_mut(name) else {
         table.insert(name, item);
         return;
@@ -210,14 +163,10 @@ fn put(table: &mut Table, name: &str, mut item: Item) {
     *old = item;
 }
 
-fn text_of(item: Option<&Item>) -> Option<&str> {
-    item.and_then(Item::as_str)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::table::{contact_part, find};
-    use super::super::{BUILT_IN, Scope, table};
+    use super::super::{BUILT_IN, Kind, Scope, table};
     use super::*;
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
@@ -269,16 +218,7 @@ mod tests {
                         assert!(matches!(parameter.scope, Scope::Contact), "{error}");
                         continue;
                     }
-                    let text = match changed.to_toml() {
-                        Ok(text) => text,
-                        // The text cannot express a change of a single copy.
-                        Err(error) if error.message.contains("every copy of a pattern") => {
-                            assert!(key.starts_with("joint.") && key.contains("1."), "{key}");
-                            assert!(plain.source.text.contains("[[pattern]]"), "{name}");
-                            continue;
-                        }
-                        Err(error) => panic!("{name} {key}: {error}"),
-                    };
+                    let text = changed.to_toml().unwrap_or_else(|error| panic!("{name} {key}: {error}"));
                     let read = Scene::parse(&text, None, &[]).expect("reads");
                     assert_eq!(bits(&read), bits(&changed), "{name} {key}\n{text}");
                     assert!(read.changes.is_empty());
@@ -337,11 +277,11 @@ mod tests {
     }
 
     #[test]
-    fn joints_of_a_chain_have_values_of_their_own_in_every_form_of_the_file() {
+    fn copies_of_a_pattern_have_values_of_their_own_in_every_form_of_the_file() {
         let changes = [("joint.J2.clearance", "0.5 mm"), ("joint.J8.friction", "0.4"), ("joint.J2.friction", "0.1")];
         let plain = scene("chain", &[]).source.text;
-        let inline = plain.replacen("[chain]\n", "[chain]\njoint = [{ name = \"J3\" }]\n", 1);
-        let there = format!("{plain}\n[[chain.joint]]\nname = \"J2\" # the second\nrestitution = 0.7\n");
+        let inline = format!("joint_contact = [{{ name = \"J3\" }}]\n{plain}");
+        let there = format!("{plain}\n[[joint_contact]]\nname = \"J2\" # the second\nrestitution = 0.7\n");
         for text in [plain, inline, there] {
             let mut changed = Scene::parse(&text, None, &[]).expect("reads");
             for (key, value) in changes {
@@ -358,21 +298,9 @@ mod tests {
             let written = again.to_toml().expect("has its places");
             assert_eq!(written.matches("\"J8\"").count(), 1, "{written}");
         }
-        let bad = format!("{}\n[[chain.joint]]\nname = \"J9\"\n", scene("chain", &[]).source.text);
-        let error = Scene::parse(&bad, None, &[]).expect_err("eight links").to_string();
-        assert!(error.contains("no ball joint `J9`; it has 8 links: J1 to J8"), "{error}");
-    }
-
-    #[test]
-    fn an_inline_chain_keeps_its_form() {
-        let text = "chain = { links = 3, link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }\n";
-        let mut changed = Scene::parse(text, None, &[]).expect("reads");
-        changed.set("joint.J3.clearance", "0.2 mm").expect("in range");
-        changed.set("joint.J3.friction", "0.2").expect("in range");
-        changed.set("joint.J1.friction", "0.1").expect("in range");
-        let written = changed.to_toml().expect("written");
-        let read = Scene::parse(&written, None, &[]).expect("reads");
-        assert_eq!(bits(&read), bits(&changed), "{written}");
-        assert_eq!(written.lines().filter(|line| line.starts_with("chain = {")).count(), 1);
+        let twice = "[[joint_contact]]\nname = \"J2\"\n";
+        let bad = format!("{}\n{twice}{twice}", scene("chain", &[]).source.text);
+        let error = Scene::parse(&bad, None, &[]).expect_err("twice").to_string();
+        assert!(error.contains("already a [[joint_contact]] of this name"), "{error}");
     }
 }

@@ -94,7 +94,7 @@ pub struct Constraints {
     scratch: Vec<f64>,
     step: Vec<f64>,
     square: Vec<f64>,
-    /// Instant and positions of the latest factorisation.
+    /// StepEnd and positions of the latest factorisation.
     time: Option<f64>,
     positions: Vec<f64>,
     /// Smallest pivot ratio of the latest factorisation.

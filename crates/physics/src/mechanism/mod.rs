@@ -4,6 +4,7 @@
 //! adds either three constraint rows (ideal) or one contact force (clearance), any other cut joint up to six rows. A scene pays
 //! only for what it contains.
 
+mod assembly;
 mod band;
 mod bounds;
 mod closed_form;
@@ -37,6 +38,7 @@ mod systems;
 mod tree;
 
 pub use crate::jet::Jet;
+pub use assembly::{Assembly, Placement};
 pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
@@ -48,7 +50,6 @@ pub use flight::{Flight, FreeFlightBody};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use spcmm::Unreachable;
-pub use start::{Assembly, Placement};
 pub use summary::Summary;
 pub use systems::Evaluator;
 

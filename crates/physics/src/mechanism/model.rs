@@ -2,12 +2,11 @@
 
 use std::sync::{Arc, OnceLock};
 
+use super::assembly::{Assembled, Settled};
 use super::closed_form::{ClosedForm, ClosedMotion};
 use super::drives::{Law, Trajectory, trajectory_of};
 use super::factor::{NONE, Pattern};
-use super::settled::Settled;
 use super::spcmm::SliderTrajectory;
-use super::start::Assembled;
 use crate::jet::Jet;
 use crate::machine::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Quat, StartRule, Vec3};
 

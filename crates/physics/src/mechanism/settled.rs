@@ -1,7 +1,7 @@
 //! Settled start: every ball rests on its socket wall where the reaction of the same machine without play presses it, so that a
 //! run does not begin with a drop.
 
-use super::start::Assembly;
+use super::assembly::Settled;
 use super::{ActiveSet, Mechanism, MechanismError};
 use crate::contact::{Coefficients, Parameters, settled_penetration};
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
@@ -9,15 +9,6 @@ use crate::machine::{Formulation, Machine, StartRule, Vec3};
 /// Fixed-point iterations between reactions and ball positions. The positions change the reactions by about the ratio of
 /// clearance to machine size, typically a thousandth, and each iteration reduces the error by that factor.
 const ROUNDS: usize = 4;
-
-/// A settled start.
-#[derive(Clone, Debug)]
-pub(super) struct Settled {
-    /// Positions and velocities in the coordinates of the tree.
-    pub state: Vec<f64>,
-    /// Assembly of the machine without play, before the balls were displaced by their play.
-    pub assembly: Assembly,
-}
 
 /// Settled start of `machine` at t = 0, with the velocities of the machine without play.
 ///

@@ -1,5 +1,6 @@
 //! Start of a mechanism: assembly from the scene's values, displacement of the bodies, and rank of the constraints.
 
+use super::assembly::{Assembled, Assembly, Placement};
 use super::closed_form::ClosedForm;
 use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
@@ -20,40 +21,6 @@ pub(super) const HELD: f64 = 1e-8;
 const BESIDE: f64 = 0.01;
 /// Assembly has converged once it moves by less than this fraction of the scales.
 const AT_REST: f64 = 1e-9;
-
-/// Changes to the scene's values made by assembly at the start. In a scene with a closed form, the guess comes from it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Assembly {
-    /// Displacement of each body from the guess.
-    pub bodies: Vec<Placement>,
-    /// Closed joint with the widest gap in the guess, and that gap (|Z_j - Z_i| of a ball joint), m. Other loop-closing joints
-    /// are numbered after the ball joints.
-    pub widest: Option<(usize, f64)>,
-    /// Loop-closing joint with the largest angular misalignment in the guess, and that angle, rad.
-    pub most_turned: Option<(usize, f64)>,
-    /// Whether the loops closed in a different assembly mode from the guess, across a singular pose. Known only if closed joints
-    /// and drives leave no degree of freedom.
-    pub other_mode: bool,
-    /// Whether the guess comes from the closed form.
-    pub closed_form: bool,
-}
-
-/// What assembly at the start finds about a compiled machine.
-#[derive(Clone, Debug)]
-pub(super) struct Assembled {
-    pub assembly: Assembly,
-    /// Rank of the rows of loop-closing joints, if some are dependent.
-    pub rank: Option<usize>,
-}
-
-/// Displacement of a body by assembly.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Placement {
-    /// Distance of the origin of its frame from the guess, m.
-    pub moved: f64,
-    /// Angle from its orientation in the guess, rad.
-    pub turned: f64,
-}
 
 impl Mechanism {
     /// Changes to the scene's values made by [`Self::start`]; none before.

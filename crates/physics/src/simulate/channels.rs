@@ -11,10 +11,10 @@ use super::Frame;
 use crate::machine::{Freedom, Joint, JointKind, Machine};
 use table::{Each, Signal, TABLE, Take};
 
-/// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the contact_state.
+/// Largest number of ball joints and drives that are recorded: in a longer chain the rest is not worth the memory.
 pub const RECORDED_JOINTS: usize = 12;
 
-/// Largest number of channels picked by name: each costs as much contact_state as any other.
+/// Largest number of channels picked by name: each costs as much memory as any other.
 pub const MOST_PICKED: usize = 32;
 
 /// Where a value is found in a frame.

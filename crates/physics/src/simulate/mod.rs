@@ -3,42 +3,33 @@
 mod angles;
 mod channels;
 mod doubt;
-mod doubts;
 mod frame;
 mod history;
-mod ideal;
 mod impacts;
 mod ledger;
 mod load_peaks;
-mod model;
 mod pace;
 mod peaks;
 mod report;
-mod run;
 mod simulation;
-mod state;
 mod stepper;
 mod stopped;
 mod wear;
-mod workspace;
 
 pub use angles::angles_of;
 pub use channels::*;
 pub use doubt::{Doubt, Joints, LedgerTerm};
 pub use frame::*;
 pub use history::{Bin, History, Mark};
-pub use ideal::{ProbeFault, closed};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use load_peaks::{LoadPeak, LoadPeaks};
-pub use model::Model;
 pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE, SPELL};
-pub use run::{CLEARANCE_SPEED, ChangeError};
-pub use simulation::Simulation;
-pub use state::{State, StateMismatch};
+pub use simulation::{
+    CLEARANCE_SPEED, ChangeError, Model, ProbeFault, Simulation, State, StateMismatch, Workspace, closed,
+};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
-pub use workspace::Workspace;
 
 use serde::{Deserialize, Serialize};
 

@@ -144,7 +144,7 @@ impl PenetrationCubic {
         if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
     }
 
-    /// Largest normal force over the step of a contact with this contact_state, and where: (N, theta).
+    /// Largest normal force over the step of a contact in the state `contact_state`, and where: (N, theta).
     pub(super) fn strongest(&self, c: &Coefficients, contact_state: &ContactState) -> (f64, f64) {
         let force = |theta: f64| {
             let (p, v, _) = self.at(theta);

@@ -8,7 +8,7 @@ use crate::machine::{Attachment, BallJoint, Machine, Vec3};
 use crate::mechanism::Mechanism;
 
 /// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
-/// contact state `contact_state`.
+/// contact states `contact_states`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
     model: &Model,

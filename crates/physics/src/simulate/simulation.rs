@@ -1,15 +1,293 @@
-//! A running simulation: a model with one state and its workspace.
+//! A running simulation: a constant model, the state of a run, and the workspace in which it is stepped. What each of them can do
+//! is in the files beside. Reads no clock.
+
+mod adaptive;
+mod automatic;
+mod contacts;
+mod corners;
+mod displace;
+mod doubts;
+mod edges;
+mod energy;
+mod flights;
+mod guard;
+mod ideal;
+mod live;
+mod model;
+mod sample;
+mod search;
+mod state;
+mod step;
+mod wear;
+mod workspace;
+
+use serde::{Deserialize, Serialize};
 
 use std::sync::Arc;
 
-use super::run::Run;
+use super::impacts::Impacts;
+use super::ledger::Account;
+use super::peaks::{Approach, Recent};
+use super::stepper::{ActiveScheme, AnyStepper};
 use super::{
-    ChangeError, Doubt, Effect, Frame, Impact, Indeterminate, Ledger, LoadPeaks, Model, Peak, ProbeFault, StartError,
-    State, StateMismatch, Statistics, Stopped, Wear, Workspace,
+    Doubt, Effect, Frame, Impact, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped, Wear,
 };
 use crate::contact::ContactState;
+use crate::integrate::{Controller, Method, Polynomial};
 use crate::machine::{Conditions, Machine, Vec3};
-use crate::mechanism::{ElementReport, Mechanism, Pull};
+use crate::mechanism::{self, Counts, ElementReport, Flight, Mechanism, Pull, Ramp};
+use adaptive::Whole;
+use automatic::SchemeSelector;
+use corners::LawBranch;
+use ideal::TipHistory;
+pub use ideal::{ProbeFault, closed};
+pub use live::ChangeError;
+
+/// Rate at which a clearance shrinks when a jump would place the ball inside its socket wall, m/s: an impact at this speed gives
+/// a force of the order of the static ones.
+pub const CLEARANCE_SPEED: f64 = 2e-3;
+/// Longest step of an adaptive method, s.
+const LONGEST_STEP: f64 = 10e-3;
+/// Shortest step of an adaptive method, s.
+const SHORTEST_STEP: f64 = 1e-14;
+/// A step that would end within this fraction of its length of a limit ends at the limit.
+const NEARLY: f64 = 1e-6;
+/// Distance of an ideal motion from its closed form, m, beyond which it has switched to another branch.
+const OTHER_BRANCH: f64 = 1e-6;
+/// Shortest retry of a kinematic step, s: how closely it approaches a pose that it cannot pass.
+const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
+/// First step after a contact begins, before a workable one is known, s: a tenth of a typical impact.
+const FIRST_CONTACT_STEP: f64 = 1e-5;
+/// Loops still open by more than this after projection have come apart, m.
+const OPEN_LOOP: f64 = 1e-7;
+
+/// Shortest adaptive step, s, that still advances the time `t`.
+fn shortest_step(t: f64) -> f64 {
+    SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
+}
+
+/// A machine compiled for simulation. It is constant, and threads may share it; what changes is a [`State`], which is stepped in a
+/// [`Workspace`].
+///
+/// ```
+/// # use jointplay_physics::{machine::*, simulate::*};
+/// # let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
+/// # let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
+/// # let joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
+/// # machine.ball_joints.push(joint.with_clearance(0.2e-3));
+/// let model = Model::new(&machine)?;
+/// let mut state = model.start();
+/// let mut workspace = model.workspace(&state);
+/// while state.time() < 0.01 {
+///     model.step(&mut state, &mut workspace)?;
+/// }
+/// // A copy continues with the same bits, in this workspace or another one.
+/// let mut copy = state.clone();
+/// model.step(&mut state, &mut workspace)?;
+/// model.step(&mut copy, &mut workspace)?;
+/// assert_eq!(copy, state);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Model {
+    machine: Machine,
+    compiled: Arc<mechanism::Model>,
+    ideal: IdealSource,
+    start: State,
+}
+
+/// The state of a run of a [`Model`]: all that changes, each fact once. A clone is a snapshot, and serialised it is a saved run;
+/// stepping on from either gives the same bits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct State {
+    /// The physical state.
+    now: StepEnd,
+    /// Gravity, contacts and stepper with the live changes so far.
+    conditions: Conditions,
+    /// Active clearance ramps, and clearances without them, m.
+    ramps: Vec<Option<Ramp>>,
+    clearances: Vec<f64>,
+    /// The hand's pull, if any.
+    pull: Option<Pull>,
+    /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
+    flights: Vec<Option<Flight>>,
+    control: Control,
+    /// Empty with a method that has none.
+    polynomial: Polynomial,
+    record: Record,
+    /// Largest sampled force, N, and its time, s, by joint: kept apart from the record, which sampling does not change.
+    sampled: Vec<(f64, f64)>,
+    /// Load peaks, if tracked; sampling changes them.
+    loads: Option<LoadPeaks>,
+    /// The ideal motion, if it is simulated alongside; sampling takes it along.
+    ideal: Option<Box<IdealState>>,
+    #[serde(skip)]
+    follows: Follows,
+}
+
+/// State vector, derivative, gaps and contact state at one instant.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct StepEnd {
+    t: f64,
+    /// Coordinates, then velocities.
+    y: Vec<f64>,
+    /// Their derivative.
+    k: Vec<f64>,
+    gaps: Vec<Approach>,
+    /// Contact states for the step that begins here.
+    contact_states: Vec<ContactState>,
+}
+
+/// Step control: not part of the physical state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Control {
+    /// Next step of an adaptive method.
+    h_next: f64,
+    /// Step that worked after the latest contact began.
+    h_contact: f64,
+    /// A contact began at the latest event.
+    contact_began: bool,
+    /// Measure of how often corners of the friction law occur, and whether that is too often to locate them.
+    chatter: u32,
+    chatters: bool,
+    /// Active scheme of the automatic method.
+    member: ActiveScheme,
+    /// Data for the automatic choice of scheme.
+    choice: SchemeSelector,
+    controller: Controller,
+    /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
+    grid_origin: f64,
+    grid_count: u64,
+}
+
+/// Diagnostics of the run so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Record {
+    account: Account,
+    wear: Option<Wear>,
+    impacts: Impacts,
+    statistics: Statistics,
+    /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
+    reactions: Vec<Recent>,
+    /// Steps since the current contact began, by joint.
+    contact_steps: Vec<u64>,
+    /// Peaks of each ball joint since they were last taken.
+    peaks: Vec<Peak>,
+    /// The stop that starts deepest relative to its nominal depth, if any exceeds that: index, [depth, nominal depth] (m or rad),
+    /// force (N or N m).
+    starts_inside: Option<(usize, [f64; 2], f64)>,
+    /// Side of singular poses on which a kinematic scene started.
+    determinant_positive: bool,
+}
+
+/// A state of another model, or one that no run of the model can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the numbers are not those of a run of this scene")]
+pub struct StateMismatch;
+
+/// What stepping needs besides [`Model`] and [`State`]: matrices, stages, the latest step for samples within it, and forces of the
+/// latest evaluation. It follows one state at a time; given another, it is first brought to that state, which evaluates nothing.
+/// Steps then allocate nothing.
+pub struct Workspace {
+    mechanism: Mechanism,
+    stepper: AnyStepper,
+    /// Method for which the two are prepared.
+    method: Method,
+    /// Start of the latest step: samples lie between it and the state.
+    before: StepEnd,
+    attempt: Attempt,
+    scratch_y: Vec<f64>,
+    scratch_k: Vec<f64>,
+    scratch_contacts: Vec<ContactState>,
+    /// For the ideal motion alongside.
+    ideal: Option<Box<IdealWorkspace>>,
+    follows: Follows,
+}
+
+/// Ties a state to the workspace that follows it: both hold the same number, drawn anew whenever a workspace turns to a state. A
+/// clone of a state, and a state that was read, are followed by none. The numbers do not enter any computation.
+#[derive(Debug, Default)]
+struct Follows(u64);
+
+/// A state of a model being stepped in a workspace that follows it.
+struct Run<'a> {
+    model: &'a Model,
+    machine: &'a Machine,
+    state: &'a mut State,
+    mechanism: &'a mut Mechanism,
+    stepper: &'a mut AnyStepper,
+    /// Start of the latest step.
+    before: &'a mut StepEnd,
+    attempt: &'a mut Attempt,
+    scratch_y: &'a mut [f64],
+    scratch_k: &'a mut [f64],
+    scratch_contacts: &'a mut [ContactState],
+    ideal: Option<&'a mut IdealWorkspace>,
+}
+
+/// The step being taken.
+struct Attempt {
+    end: StepEnd,
+    /// Joint whose contact starts or ends at the step's end.
+    located: Option<usize>,
+    /// Joint that switches to another branch of a law there, and that branch.
+    corner: Option<(usize, LawBranch)>,
+    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::pressed`]; empty if steps do
+    /// not end at edges of elements.
+    sides: Vec<f64>,
+    /// Whether it ends at an edge.
+    edge: bool,
+    /// Contact indicators at both ends of a part of the step.
+    pressed: [Vec<f64>; 2],
+    /// Whether it was restarted on another branch.
+    turned: bool,
+    /// Joints whose contact left the frozen branches of its laws in an evaluation.
+    left: Vec<bool>,
+    /// The full step, if an event truncated it, and the full step that the next one must reproduce to follow another run.
+    whole: Option<Whole>,
+    beside: Option<Whole>,
+    /// Whether it may contain the largest force of a contact.
+    near_peak: bool,
+    /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
+    strongest: Vec<(f64, f64)>,
+    /// Step size times the largest eigenvalue seen; 0 if unknown.
+    stiffness: f64,
+    /// Evaluations spent so far, and factorisations.
+    counts: Counts,
+    factorisations: u32,
+}
+
+/// Source of the ideal tip of a model.
+enum IdealSource {
+    /// There is no probe, or the drives' closed form gives it.
+    ClosedForm,
+    /// Every ball joint is ideal: the motion is its own reference.
+    SelfReference,
+    /// A simulation alongside.
+    Simulated(Box<IdealModel>),
+    /// The ideal mechanism cannot start.
+    None(StartError),
+}
+
+/// The ideal machine, and the point on its output body that is followed.
+struct IdealModel {
+    model: Model,
+    body: usize,
+    probe: Vec3,
+}
+
+/// State of the ideal motion, and past positions of its tip.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct IdealState {
+    state: State,
+    tips: TipHistory,
+}
+
+/// Workspace of the ideal motion.
+struct IdealWorkspace {
+    workspace: Workspace,
+    frame: Frame,
+}
 
 /// A running simulation of one machine: a [`Model`], a [`State`] and the [`Workspace`] in which it is stepped.
 ///
@@ -200,7 +478,7 @@ impl Simulation {
 
     /// Whether `end` would truncate the next step.
     pub fn is_cut_by(&self, end: f64) -> bool {
-        super::run::is_cut_by(&self.state, &self.workspace.mechanism, end)
+        step::is_cut_by(&self.state, &self.workspace.mechanism, end)
     }
 
     /// Samples the latest state.
@@ -261,7 +539,7 @@ impl Simulation {
     /// # Errors
     /// An unknown body, or a position out of reach.
     pub fn check_pull(&self, pull: &Pull) -> Result<(), ChangeError> {
-        super::run::check_pull(self.machine(), pull)
+        live::check_pull(self.machine(), pull)
     }
 
     /// Force of the pulling hand, if any, with the bodies as in `frame`.
@@ -275,7 +553,7 @@ impl Simulation {
 
     /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state_vector`]) and continues from there. Quaternions are
     /// renormalised, ideal joints closed again. A ball moved into its wall is now in contact, a ball lifted off is not; every
-    /// other contact retains its contact_state. Counters are unchanged; a wear map is dropped.
+    /// other contact retains its state. Counters are unchanged; a wear map is dropped.
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
     pub fn displace(&mut self, offset: &[f64]) {
@@ -332,5 +610,15 @@ impl Simulation {
     /// Tracks load peaks from now on. This does not affect the steps.
     pub fn keep_load_peaks(&mut self) {
         self.run().keep_load_peaks();
+    }
+}
+
+fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
+    for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
+        *out = Approach {
+            penetration: gap.separation.penetration,
+            rate: gap.separation.rate,
+            speed: gap.eccentricity_rate.norm(),
+        };
     }
 }

@@ -1,66 +1,19 @@
 //! Everything about a run that changes.
 
-use serde::{Deserialize, Serialize};
-
-use super::ideal::IdealState;
-use super::impacts::{Impact, Impacts};
-use super::ledger::{Account, Ledger};
-use super::load_peaks::LoadPeaks;
-use super::peaks::{Approach, Recent};
-use super::run::{FIRST_CONTACT_STEP, LONGEST_STEP, SchemeSelector, controller_of};
-use super::stepper::{ActiveScheme, AnyStepper};
-use super::wear::Wear;
-use super::workspace::Follows;
-use super::{Model, Peak, Statistics};
+use super::automatic::{SchemeSelector, controller_of};
+use super::{Control, FIRST_CONTACT_STEP, Follows, LONGEST_STEP, Model, Record, State, StateMismatch, StepEnd};
 use crate::contact::ContactState;
-use crate::integrate::{Controller, Polynomial};
+use crate::integrate::Polynomial;
 use crate::machine::Conditions;
-use crate::mechanism::{Flight, Mechanism, Pull, Ramp};
+use crate::mechanism::{Flight, Mechanism, Pull};
+use crate::simulate::impacts::{Impact, Impacts};
+use crate::simulate::ledger::{Account, Ledger};
+use crate::simulate::load_peaks::LoadPeaks;
+use crate::simulate::peaks::{Approach, Recent};
+use crate::simulate::stepper::{ActiveScheme, AnyStepper};
+use crate::simulate::{Peak, Statistics, Wear};
 
-/// The state of a run of a [`Model`]: all that changes, each fact once. A clone is a snapshot, and serialised it is a saved run;
-/// stepping on from either gives the same bits.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct State {
-    /// The physical state.
-    pub(super) now: Instant,
-    /// Gravity, contacts and stepper with the live changes so far.
-    pub(super) conditions: Conditions,
-    /// Active clearance ramps, and clearances without them, m.
-    pub(super) ramps: Vec<Option<Ramp>>,
-    pub(super) clearances: Vec<f64>,
-    /// The hand's pull, if any.
-    pub(super) pull: Option<Pull>,
-    /// Flights of the bodies excluded from the latest step, indexed like the mechanism's free-flight bodies.
-    pub(super) flights: Vec<Option<Flight>>,
-    pub(super) control: Control,
-    /// Empty with a method that has none.
-    pub(super) polynomial: Polynomial,
-    pub(super) record: Record,
-    /// Largest sampled force, N, and its time, s, by joint: kept apart from the record, which sampling does not change.
-    pub(super) sampled: Vec<(f64, f64)>,
-    /// Load peaks, if tracked; sampling changes them.
-    pub(super) loads: Option<LoadPeaks>,
-    /// The ideal motion, if it is simulated alongside; sampling takes it along.
-    pub(super) ideal: Option<Box<IdealState>>,
-    #[serde(skip)]
-    pub(super) follows: Follows,
-}
-
-/// State vector, derivative, gaps and contact state at one instant.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Instant {
-    pub(super) t: f64,
-    /// Coordinates, then velocities.
-    pub(super) y: Vec<f64>,
-    /// Their derivative.
-    pub(super) k: Vec<f64>,
-    pub(super) gaps: Vec<Approach>,
-    /// Contact contact_state for the step that begins here.
-    pub(super) contact_states: Vec<ContactState>,
-}
-
-impl Instant {
+impl StepEnd {
     pub(super) fn new(y: Vec<f64>, joints: usize) -> Self {
         Self {
             t: 0.0,
@@ -87,53 +40,6 @@ impl Instant {
             && self.contact_states.len() == joints
     }
 }
-
-/// Step control: not part of the physical state.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Control {
-    /// Next step of an adaptive method.
-    pub(super) h_next: f64,
-    /// Step that worked after the latest contact began.
-    pub(super) h_contact: f64,
-    /// A contact began at the latest event.
-    pub(super) contact_began: bool,
-    /// Measure of how often corners of the friction law occur, and whether that is too often to locate them.
-    pub(super) chatter: u32,
-    pub(super) chatters: bool,
-    /// Active scheme of the automatic method.
-    pub(super) member: ActiveScheme,
-    /// Data for the automatic choice of scheme.
-    pub(super) choice: SchemeSelector,
-    pub(super) controller: Controller,
-    /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
-    pub(super) grid_origin: f64,
-    pub(super) grid_count: u64,
-}
-
-/// Diagnostics of the run so far.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Record {
-    pub(super) account: Account,
-    pub(super) wear: Option<Wear>,
-    pub(super) impacts: Impacts,
-    pub(super) statistics: Statistics,
-    /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
-    pub(super) reactions: Vec<Recent>,
-    /// Steps since the current contact began, by joint.
-    pub(super) contact_steps: Vec<u64>,
-    /// Peaks of each ball joint since they were last taken.
-    pub(super) peaks: Vec<Peak>,
-    /// The stop that starts deepest relative to its nominal depth, if any exceeds that: index, [depth, nominal depth] (m or rad),
-    /// force (N or N m).
-    pub(super) starts_inside: Option<(usize, [f64; 2], f64)>,
-    /// Side of singular poses on which a kinematic scene started.
-    pub(super) determinant_positive: bool,
-}
-
-/// A state of another model, or one that no run of the model can have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the numbers are not those of a run of this scene")]
-pub struct StateMismatch;
 
 impl State {
     /// The state at t = 0 with coordinates and velocities `y`.
@@ -173,7 +79,7 @@ impl State {
             loads: None,
             ideal: None,
             follows: Follows::default(),
-            now: Instant::new(y, joints),
+            now: StepEnd::new(y, joints),
             conditions,
         }
     }
@@ -198,7 +104,7 @@ impl State {
         &self.conditions
     }
 
-    /// Contact contact_state of ball joint `j`: whether it is in contact, and its approach speed.
+    /// Contact state of ball joint `j`: whether it is in contact, and its approach speed.
     pub fn contact_state(&self, j: usize) -> ContactState {
         self.now.contact_states[j]
     }

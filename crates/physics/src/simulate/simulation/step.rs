@@ -1,113 +1,22 @@
-//! Steps, events and live changes of a state. Reads no clock.
+//! Steps of a state: start, fixed and kinematic steps, and what every accepted step does.
 
-mod adaptive;
-mod automatic;
-mod contacts;
-mod corners;
-mod displace;
-mod edges;
-mod energy;
-mod flights;
-mod guard;
-mod live;
-mod sample;
-mod search;
-mod wear;
-
-use super::ideal::IdealWorkspace;
-use super::peaks::{Approach, Recent};
-use super::state::{Instant, State};
-use super::stepper::AnyStepper;
-use super::workspace::{Workspace, sync_parameters};
-use super::{Frame, Indeterminate, Model, StartError, StopAdvice, StopFault, Stopped};
-use crate::contact::ContactState;
+use super::flights::{clear_flights, put_flights};
+use super::{
+    Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, OTHER_BRANCH, Run, SHORTEST_KINEMATIC_STEP, State, StepEnd,
+    Workspace, store_gaps,
+};
 use crate::integrate::System as _;
 use crate::machine::Machine;
 use crate::mechanism::{ActiveSet, Counts, Mechanism, MechanismError};
-use adaptive::Whole;
-pub(super) use automatic::{SchemeSelector, controller_of, prepare_implicit};
-use corners::LawBranch;
-use flights::{clear_flights, put_flights};
-pub use live::ChangeError;
-pub(super) use live::check_pull;
-
-/// Rate at which a clearance shrinks when a jump would place the ball inside its socket wall, m/s: an impact at this speed gives
-/// a force of the order of the static ones.
-pub const CLEARANCE_SPEED: f64 = 2e-3;
-/// Longest step of an adaptive method, s.
-pub(super) const LONGEST_STEP: f64 = 10e-3;
-/// Shortest step of an adaptive method, s.
-const SHORTEST_STEP: f64 = 1e-14;
-/// A step that would end within this fraction of its length of a limit ends at the limit.
-const NEARLY: f64 = 1e-6;
-/// Distance of an ideal motion from its closed form, m, beyond which it has switched to another branch.
-const OTHER_BRANCH: f64 = 1e-6;
-/// Shortest retry of a kinematic step, s: how closely it approaches a pose that it cannot pass.
-const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
-/// First step after a contact begins, before a workable one is known, s: a tenth of a typical impact.
-pub(super) const FIRST_CONTACT_STEP: f64 = 1e-5;
-/// Loops still open by more than this after projection have come apart, m.
-const OPEN_LOOP: f64 = 1e-7;
-
-/// Shortest adaptive step, s, that still advances the time `t`.
-fn shortest_step(t: f64) -> f64 {
-    SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
-}
-
-/// A state of a model being stepped in a workspace that follows it.
-pub(super) struct Run<'a> {
-    model: &'a Model,
-    machine: &'a Machine,
-    state: &'a mut State,
-    mechanism: &'a mut Mechanism,
-    stepper: &'a mut AnyStepper,
-    /// Start of the latest step.
-    before: &'a mut Instant,
-    attempt: &'a mut Attempt,
-    scratch_y: &'a mut [f64],
-    scratch_k: &'a mut [f64],
-    scratch_contacts: &'a mut [ContactState],
-    ideal: Option<&'a mut IdealWorkspace>,
-}
-
-/// The step being taken.
-pub(super) struct Attempt {
-    end: Instant,
-    /// Joint whose contact starts or ends at the step's end.
-    located: Option<usize>,
-    /// Joint that switches to another branch of a law there, and that branch.
-    corner: Option<(usize, LawBranch)>,
-    /// Contact indicators that fix the side of each element during the step, as from [`Mechanism::pressed`]; empty if steps do
-    /// not end at edges of elements.
-    sides: Vec<f64>,
-    /// Whether it ends at an edge.
-    edge: bool,
-    /// Contact indicators at both ends of a part of the step.
-    pressed: [Vec<f64>; 2],
-    /// Whether it was restarted on another branch.
-    turned: bool,
-    /// Joints whose contact left the frozen branches of its laws in an evaluation.
-    left: Vec<bool>,
-    /// The full step, if an event truncated it, and the full step that the next one must reproduce to follow another run.
-    whole: Option<Whole>,
-    beside: Option<Whole>,
-    /// Whether it may contain the largest force of a contact.
-    near_peak: bool,
-    /// Largest normal force of each joint in contact, N, and the fraction of the step at which it occurs.
-    strongest: Vec<(f64, f64)>,
-    /// Step size times the largest eigenvalue seen; 0 if unknown.
-    stiffness: f64,
-    /// Evaluations spent so far, and factorisations.
-    counts: Counts,
-    factorisations: u32,
-}
+use crate::simulate::peaks::Recent;
+use crate::simulate::{Frame, Indeterminate, StartError, StopAdvice, StopFault, Stopped};
 
 impl Attempt {
     /// For the steps of a state of `dimension` components.
     pub(super) fn new(machine: &Machine, dimension: usize, joints: usize) -> Self {
         let edges = 2 * machine.elements.len();
         Self {
-            end: Instant::new(vec![0.0; dimension], joints),
+            end: StepEnd::new(vec![0.0; dimension], joints),
             located: None,
             corner: None,
             sides: Vec::with_capacity(edges),
@@ -177,13 +86,13 @@ impl Run<'_> {
     }
 
     /// Discards what the stepper computed at a state that is no longer current.
-    fn invalidate(&mut self) {
+    pub(super) fn invalidate(&mut self) {
         self.stepper.invalidate();
         self.state.polynomial.clear();
     }
 
     /// Discards the previous step.
-    fn discard_previous_step(&mut self) {
+    pub(super) fn discard_previous_step(&mut self) {
         self.before.copy_from(&self.state.now);
         self.state.control.grid_origin = self.state.now.t;
         self.state.control.grid_count = 0;
@@ -200,12 +109,12 @@ impl Run<'_> {
     }
 
     /// Whether the method locates the instants at which contacts begin and end.
-    fn locates(&self) -> bool {
+    pub(super) fn locates(&self) -> bool {
         self.state.conditions.solver.method.is_adaptive()
     }
 
     /// Recomputes derivative and gaps after a change of state other than a step; discards the previous step.
-    fn refresh(&mut self) {
+    pub(super) fn refresh(&mut self) {
         self.end_flights();
         self.freeze_branches(true);
         let located = self.locates();
@@ -246,7 +155,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
+    pub(super) fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
         let step = self.state.conditions.solver.step;
         let control = &self.state.control;
         let mut t_end = control.grid_origin + (control.grid_count + 1) as f64 * step;
@@ -269,11 +178,11 @@ impl Run<'_> {
     }
 
     /// Tries a step of size `h` from the current state; returns the scaled error estimate.
-    fn try_step(&mut self, h: f64) -> f64 {
+    pub(super) fn try_step(&mut self, h: f64) -> f64 {
         let located = self.locates();
         let Self { mechanism, stepper, state, attempt, .. } = self;
         let State { now, conditions, polynomial, .. } = &mut **state;
-        let Instant { t, y, k, contact_states, .. } = &*now;
+        let StepEnd { t, y, k, contact_states, .. } = &*now;
         mechanism.hold_elements(&attempt.sides);
         attempt.left.fill(false);
         let mut evaluator = mechanism.evaluator_watching(ActiveSet::by(located, contact_states), &mut attempt.left);
@@ -288,7 +197,7 @@ impl Run<'_> {
     }
 
     /// Evaluates derivative and gaps at the end `t_end` of the current step.
-    fn evaluate_end(&mut self, t_end: f64) {
+    pub(super) fn evaluate_end(&mut self, t_end: f64) {
         let located = self.locates();
         let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
@@ -299,7 +208,7 @@ impl Run<'_> {
     }
 
     /// Computes bodies in flight, and gaps, at the end `t_end` of the current step, after an evaluation there.
-    fn finish_gaps(&mut self, t_end: f64) {
+    pub(super) fn finish_gaps(&mut self, t_end: f64) {
         let touching = ActiveSet::by(self.locates(), &self.state.now.contact_states);
         let end = &mut self.attempt.end;
         put_flights(self.mechanism, &self.state.flights, t_end, &mut end.y);
@@ -310,7 +219,7 @@ impl Run<'_> {
 
     /// Takes a step of a kinematic scene: predict, close the loops, compute the reactions. A failed step is retried with shorter
     /// ones, so that the last good state is close to the failure.
-    fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
+    pub(super) fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
         let t = self.state.now.t;
         let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
         loop {
@@ -329,14 +238,14 @@ impl Run<'_> {
     }
 
     /// Accepts the attempted step: projection, guard, contact state, peaks.
-    fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
+    pub(super) fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
         let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
         let mean_rates = self.stepper.has_mean_rates();
         if mean_rates {
             // Forces at the end of the step belong to a contact that may end long before the next step does: the mean over the
             // step is more informative.
             let (mechanism, now) = (&mut self.mechanism, &self.state.now);
-            let Instant { y, k, .. } = &mut self.attempt.end;
+            let StepEnd { y, k, .. } = &mut self.attempt.end;
             mechanism.measure(t_end, y);
             mechanism.position_rate(y, k);
             for i in mechanism.positions()..y.len() {
@@ -388,7 +297,7 @@ impl Run<'_> {
         // if the method does not.
         if again {
             let Self { mechanism, state, scratch_k, .. } = self;
-            let Instant { t, y, k, contact_states, .. } = &mut state.now;
+            let StepEnd { t, y, k, contact_states, .. } = &mut state.now;
             let rate: &mut [f64] = if mean_rates { scratch_k } else { k };
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, contact_states));
             evaluator.derivative(*t, y, rate);
@@ -403,12 +312,12 @@ impl Run<'_> {
         Ok(())
     }
 
-    fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {
+    pub(super) fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {
         let dependent = self.mechanism.has_dependent_rows();
         Stopped { time: self.state.now.t, fault, advice: if dependent { StopAdvice::Dependent } else { advice } }
     }
 
-    /// As [`Simulation::not_unique`](super::Simulation::not_unique).
+    /// As [`Simulation::not_unique`](crate::simulate::Simulation::not_unique).
     pub(super) fn not_unique(&mut self) -> Indeterminate {
         self.sample(self.state.now.t, &mut Frame::default());
         let mechanism = &mut self.mechanism;
@@ -419,7 +328,7 @@ impl Run<'_> {
     }
 }
 
-/// As [`Simulation::is_cut_by`](super::Simulation::is_cut_by).
+/// As [`Simulation::is_cut_by`](crate::simulate::Simulation::is_cut_by).
 pub(super) fn is_cut_by(state: &State, mechanism: &Mechanism, end: f64) -> bool {
     let (t, control, solver) = (state.now.t, &state.control, &state.conditions.solver);
     let (t_end, h) = if mechanism.is_kinematic() {
@@ -433,14 +342,4 @@ pub(super) fn is_cut_by(state: &State, mechanism: &Mechanism, end: f64) -> bool 
         (control.grid_origin + next * solver.step, solver.step)
     };
     t_end >= end - NEARLY * h
-}
-
-fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
-    for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
-        *out = Approach {
-            penetration: gap.separation.penetration,
-            rate: gap.separation.rate,
-            speed: gap.eccentricity_rate.norm(),
-        };
-    }
 }

@@ -2,42 +2,10 @@
 
 use std::sync::Arc;
 
-use super::ideal::{IdealSource, ProbeFault};
-use super::run::Run;
-use super::state::{State, StateMismatch};
-use super::workspace::Workspace;
-use super::{Doubt, Frame, StartError, Stopped};
+use super::{IdealSource, Model, ProbeFault, Run, State, StateMismatch, Workspace, doubts};
 use crate::machine::Machine;
 use crate::mechanism::{self, Mechanism};
-
-/// A machine compiled for simulation. It is constant, and threads may share it; what changes is a [`State`], which is stepped in a
-/// [`Workspace`].
-///
-/// ```
-/// # use jointplay_physics::{machine::*, simulate::*};
-/// # let mut machine = Machine { gravity: Vec3::new(0.0, 0.0, -9.81), ..Machine::default() };
-/// # let bob = machine.add_body(Body::new("bob", 0.4, Mat3::identity() * 1e-3), Joint::free(0));
-/// # let joint = BallJoint::new("S1", Attachment::world(Vec3::zeros()), Attachment::on(bob, Vec3::zeros()));
-/// # machine.ball_joints.push(joint.with_clearance(0.2e-3));
-/// let model = Model::new(&machine)?;
-/// let mut state = model.start();
-/// let mut workspace = model.workspace(&state);
-/// while state.time() < 0.01 {
-///     model.step(&mut state, &mut workspace)?;
-/// }
-/// // A copy continues with the same bits, in this workspace or another one.
-/// let mut copy = state.clone();
-/// model.step(&mut state, &mut workspace)?;
-/// model.step(&mut copy, &mut workspace)?;
-/// assert_eq!(copy, state);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub struct Model {
-    machine: Machine,
-    compiled: Arc<mechanism::Model>,
-    ideal: IdealSource,
-    start: State,
-}
+use crate::simulate::{Doubt, Frame, StartError, Stopped};
 
 impl Model {
     /// Compiles `machine` and computes its start.
@@ -138,7 +106,7 @@ impl Model {
     /// Reasons not to trust the results since the start; empty if there are none. Begins with [`Machine::doubts`] of the machine
     /// under the state's conditions.
     pub fn doubts(&self, state: &State) -> Vec<Doubt> {
-        super::doubts::doubts(self, state)
+        doubts::doubts(self, state)
     }
 
     /// Why the probe has no ideal motion to be compared with: the ideal mechanism cannot start, or could not continue.

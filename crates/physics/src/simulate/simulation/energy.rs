@@ -1,9 +1,8 @@
 //! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
-use super::Run;
+use super::{Record, Run, State};
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
 use crate::simulate::ledger::{Account, Energies, weights};
-use crate::simulate::state::{Record, State};
 use crate::simulate::{Frame, Ledger};
 
 /// Past step ends used to integrate the works of a kinematic scene: its powers are smooth, and its steps short compared with

@@ -1,8 +1,7 @@
 //! Perturbations of the state, for a twin run and its renormalisation.
 
-use super::{Attempt, Run};
+use super::{Attempt, Control, Run};
 use crate::contact::ContactState;
-use crate::simulate::state::Control;
 
 impl Run<'_> {
     /// As [`Simulation::displace`](crate::simulate::Simulation::displace).

@@ -1,11 +1,10 @@
 //! Sampling of an instant within the latest step.
 
-use super::Run;
 use super::flights::put_flights;
+use super::{IdealSource, Run};
 use crate::integrate::hermite;
 use crate::machine::Vec3;
 use crate::mechanism::ActiveSet;
-use crate::simulate::ideal::IdealSource;
 use crate::simulate::{Frame, report};
 
 impl Run<'_> {

@@ -1,7 +1,8 @@
 //! Parameters changed while the simulation runs.
 
 use super::automatic::{SchemeSelector, controller_of, prepare_implicit};
-use super::{CLEARANCE_SPEED, Run, sync_parameters};
+use super::workspace::sync_parameters;
+use super::{CLEARANCE_SPEED, Run};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::machine::{Machine, Vec3};

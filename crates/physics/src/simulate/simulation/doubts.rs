@@ -1,9 +1,10 @@
 //! Reasons to doubt a result, from the scene's settings and from the course of the run.
 
-use super::{Doubt, Joints, Ledger, LedgerTerm, Model, State};
+use super::{Model, State};
 use crate::contact::{Coefficients, FrictionVelocity, settled_penetration};
 use crate::integrate::Method;
 use crate::machine::{BallJoint, Machine, least_impact_steps};
+use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
 const MOST_FLOORED: f64 = 0.5;

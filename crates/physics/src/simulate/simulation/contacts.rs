@@ -1,4 +1,4 @@
-//! Contact contact_state and continuous-time peaks of the step just accepted.
+//! Contact states and continuous-time peaks of the step just accepted.
 
 use super::search::NEAR_PEAK;
 use super::{Run, State};
@@ -23,7 +23,7 @@ pub(super) struct Switched {
 
 impl State {
     /// Records that contact `j` begins at `time` with penetration rate `rate` (m/s), which was changing at `push` (m/s^2), and
-    /// restitution setting `asked`; returns its contact_state.
+    /// restitution setting `asked`; returns its contact state.
     fn begin(
         &mut self,
         j: usize,

@@ -1,39 +1,14 @@
-//! Scratch contact_state in which a state is stepped.
+//! Scratch memory in which a state is stepped.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::ideal::IdealWorkspace;
-use super::run::{Attempt, prepare_implicit};
-use super::state::{Instant, State};
-use super::stepper::AnyStepper;
-use super::{Model, StartError};
+use super::automatic::prepare_implicit;
+use super::{Attempt, Follows, Model, State, StepEnd, Workspace};
 use crate::contact::ContactState;
 use crate::integrate::Method;
 use crate::mechanism::Mechanism;
-
-/// What stepping needs besides [`Model`] and [`State`]: matrices, stages, the latest step for samples within it, and forces of the
-/// latest evaluation. It follows one state at a time; given another, it is first brought to that state, which evaluates nothing.
-/// Steps then allocate nothing.
-pub struct Workspace {
-    pub(super) mechanism: Mechanism,
-    pub(super) stepper: AnyStepper,
-    /// Method for which the two are prepared.
-    method: Method,
-    /// Start of the latest step: samples lie between it and the state.
-    pub(super) before: Instant,
-    pub(super) attempt: Attempt,
-    pub(super) scratch_y: Vec<f64>,
-    pub(super) scratch_k: Vec<f64>,
-    pub(super) scratch_contacts: Vec<ContactState>,
-    /// For the ideal motion alongside.
-    pub(super) ideal: Option<Box<IdealWorkspace>>,
-    follows: Follows,
-}
-
-/// Ties a state to the workspace that follows it: both hold the same number, drawn anew whenever a workspace turns to a state. A
-/// clone of a state, and a state that was read, are followed by none. The numbers do not enter any computation.
-#[derive(Debug, Default)]
-pub(super) struct Follows(u64);
+use crate::simulate::StartError;
+use crate::simulate::stepper::AnyStepper;
 
 impl Follows {
     fn next() -> Self {
@@ -69,7 +44,7 @@ impl Workspace {
         let mut workspace = Self {
             stepper: AnyStepper::new(method, n),
             method,
-            before: Instant::new(vec![0.0; n], joints),
+            before: StepEnd::new(vec![0.0; n], joints),
             attempt: Attempt::new(model.machine(), n, joints),
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],

@@ -3,10 +3,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::run::Run;
-use super::{Frame, Model, StartError, State, StateMismatch, Stopped, Workspace};
+use super::{IdealModel, IdealSource, IdealState, IdealWorkspace, Model, Run, StateMismatch};
 use crate::integrate::Method;
 use crate::machine::{Formulation, Machine, StartRule, Vec3};
+use crate::simulate::{Frame, StartError, Stopped};
 
 /// Tolerance of the ideal motion: without impacts, accuracy is cheap.
 const TOLERANCE: f64 = 1e-10;
@@ -26,38 +26,6 @@ pub enum ProbeFault {
     Stopped(Stopped),
 }
 
-/// Source of the ideal tip of a model.
-pub(super) enum IdealSource {
-    /// There is no probe, or the drives' closed form gives it.
-    ClosedForm,
-    /// Every ball joint is ideal: the motion is its own reference.
-    SelfReference,
-    /// A simulation alongside.
-    Simulated(Box<IdealModel>),
-    /// The ideal mechanism cannot start.
-    None(StartError),
-}
-
-/// The ideal machine, and the point on its output body that is followed.
-pub(super) struct IdealModel {
-    pub(super) model: Model,
-    body: usize,
-    probe: Vec3,
-}
-
-/// State of the ideal motion, and past positions of its tip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct IdealState {
-    state: State,
-    tips: TipHistory,
-}
-
-/// Workspace of the ideal motion.
-pub(super) struct IdealWorkspace {
-    workspace: Workspace,
-    frame: Frame,
-}
-
 /// Tip at the end of a step: position, velocity and acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Mark {
@@ -67,7 +35,7 @@ struct Mark {
 
 /// Tip at the latest step ends, and why the motion stopped, if it did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct TipHistory {
+pub(super) struct TipHistory {
     /// Ring buffer.
     ring: Vec<Mark>,
     count: usize,
@@ -173,7 +141,7 @@ impl IdealModel {
 }
 
 impl IdealState {
-    /// As [`State::bytes`].
+    /// As [`State::bytes`](super::State::bytes).
     pub(super) fn bytes(&self) -> usize {
         self.state.bytes() + std::mem::size_of_val(&self.tips.ring[..])
     }

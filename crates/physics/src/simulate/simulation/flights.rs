@@ -1,7 +1,7 @@
 //! Bodies in free flight: while nothing touches a free body, its motion is known in advance, and the steps that resolve impacts
 //! elsewhere exclude it.
 
-use super::{Instant, LONGEST_STEP, Run};
+use super::{LONGEST_STEP, Run, StepEnd};
 use crate::integrate::{Method, System as _};
 use crate::mechanism::{ActiveSet, Flight, Mechanism};
 
@@ -47,7 +47,7 @@ impl Run<'_> {
             // The derivative of a body that landed is still that of its flight.
             let located = self.locates();
             let Self { mechanism, state, .. } = self;
-            let Instant { t, y, k, contact_states, .. } = &mut state.now;
+            let StepEnd { t, y, k, contact_states, .. } = &mut state.now;
             let mut evaluator = mechanism.evaluator(ActiveSet::by(located, contact_states));
             evaluator.derivative(*t, y, k);
             let counts = evaluator.counts;
