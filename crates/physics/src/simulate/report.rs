@@ -1,6 +1,5 @@
 //! Fills a [`Frame`] from the latest evaluation of the equations.
 
-use super::Model;
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactMode, Frame, JointReport};
 use crate::contact::ContactState;
@@ -11,12 +10,11 @@ use crate::mechanism::Mechanism;
 /// contact states `contact_states`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
-    model: &Model,
+    machine: &Machine,
     contact_states: &[ContactState],
     (time, y): (f64, &[f64]),
     out: &mut Frame,
 ) {
-    let machine = model.machine();
     out.time = time;
     out.bodies.clear();
     for (b, m) in mechanism.motion()[..machine.bodies.len()].iter().enumerate() {

@@ -321,8 +321,9 @@ impl Simulation {
     }
 
     /// Continues from `state`, a state of `model`.
-    pub fn of(model: Arc<Model>, state: State) -> Self {
-        let workspace = model.workspace(&state);
+    pub fn of(model: Arc<Model>, mut state: State) -> Self {
+        let mut workspace = model.workspace(&state);
+        workspace.follow(&model, &mut state);
         Self { model, state, workspace }
     }
 

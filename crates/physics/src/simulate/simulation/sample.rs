@@ -13,7 +13,7 @@ impl Run<'_> {
         let time = time.clamp(self.before.t, self.state.now.t);
         self.look(time);
         let (contact_state, at) = (&*self.scratch_contacts, (time, &*self.scratch_y));
-        report::fill(self.mechanism, self.model, contact_state, at, out);
+        report::fill(self.mechanism, self.machine, contact_state, at, out);
         for (sampled, report) in self.state.sampled.iter_mut().zip(&out.joints) {
             let force = report.normal_force.norm();
             if force > sampled.0 {
