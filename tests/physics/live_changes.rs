@@ -263,6 +263,21 @@ fn drives_and_equations_wait_for_the_reset() {
 }
 
 #[test]
+fn an_earlier_state_goes_on_with_the_method_that_it_had() {
+    let mut simulation = live("spcmm", &[]);
+    simulation.advance_to(0.03).unwrap();
+    let state = simulation.snapshot();
+    simulation.advance_to(0.04).unwrap();
+    let expected = simulation.state_hash();
+    for method in ["radau5", "dopri5", "rk4"] {
+        simulation.set("solver.method", method).unwrap();
+        simulation.restore(&state);
+        simulation.advance_to(0.04).unwrap();
+        assert_eq!(simulation.state_hash(), expected, "after {method}");
+    }
+}
+
+#[test]
 fn refused_values_change_nothing() {
     let mut simulation = live("spcmm", &[]);
     simulation.advance_to(0.011).unwrap();

@@ -33,7 +33,7 @@ use super::{
     Doubt, Effect, Frame, Impact, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped, Wear,
 };
 use crate::contact::ContactState;
-use crate::integrate::{Controller, Method, Polynomial};
+use crate::integrate::{Controller, Polynomial};
 use crate::machine::{Conditions, Machine, Vec3};
 use crate::mechanism::{self, Counts, ElementReport, Flight, Mechanism, Pull, Ramp};
 use adaptive::Whole;
@@ -191,8 +191,6 @@ pub struct StateMismatch;
 pub struct Workspace {
     mechanism: Mechanism,
     stepper: AnyStepper,
-    /// Method for which the two are prepared.
-    method: Method,
     /// Start of the latest step: samples lie between it and the state.
     before: StepEnd,
     attempt: Attempt,

@@ -54,6 +54,19 @@ impl AnyStepper {
         }
     }
 
+    /// The method that it steps by.
+    pub(super) fn method(&self) -> Method {
+        match self {
+            Self::SemiImplicitEuler(_) => Method::SemiImplicitEuler,
+            Self::ImexEuler(_) => Method::ImexEuler,
+            Self::RungeKutta4(_) => Method::RungeKutta4,
+            Self::DormandPrince(_) => Method::DormandPrince5,
+            Self::Rosenbrock(_) => Method::Rosenbrock,
+            Self::Radau(_) => Method::Radau5,
+            Self::Automatic { .. } => Method::Automatic,
+        }
+    }
+
     /// Activates a scheme of the automatic method.
     pub(super) fn choose(&mut self, chosen: ActiveScheme) {
         if let Self::Automatic { member, .. } = self {

@@ -43,7 +43,6 @@ impl Workspace {
         let (n, joints) = (mechanism.dimension(), mechanism.contacts.len());
         let mut workspace = Self {
             stepper: AnyStepper::new(method, n),
-            method,
             before: StepEnd::new(vec![0.0; n], joints),
             attempt: Attempt::new(model.machine(), n, joints),
             scratch_y: vec![0.0; n],
@@ -72,10 +71,9 @@ impl Workspace {
         state.follows = Follows(number.0);
         self.follows = number;
         let method = state.conditions.solver.method;
-        if method != self.method {
+        if method != self.stepper.method() {
             prepare_implicit(&mut self.mechanism, method).expect("checked when the state adopted the method");
             self.stepper = AnyStepper::new(method, state.now.y.len());
-            self.method = method;
         }
         self.stepper.invalidate();
         self.stepper.choose(state.control.member);
@@ -99,6 +97,36 @@ pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &
         if contact.clearance > 0.0 {
             mechanism.contacts.set_ramp(j, state.ramps[j]);
             mechanism.contacts.set_parameters(j, contact, state.clearances[j]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::simulate::Simulation;
+
+    #[test]
+    fn states_stepped_in_turn_in_one_workspace_have_the_bits_of_states_with_their_own() {
+        for method in Method::ALL {
+            let changes = [("solver.method", method.word()), ("solver.step", "20 us")];
+            let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            let scene = Scene::load("pendulum", &changes).expect("loads");
+            let mut alone = Simulation::new(&scene.machine).expect("starts");
+            let model = alone.model().clone();
+            let mut states = [model.start(), model.start()];
+            let mut workspace = model.workspace(&states[0]);
+            while alone.time() < 0.015 {
+                alone.step().expect("runs");
+                for state in &mut states {
+                    model.step(state, &mut workspace).expect("runs");
+                }
+            }
+            assert!(alone.statistics().impacts.iter().sum::<u64>() > 0, "{method}");
+            for state in &states {
+                assert!(state == alone.state(), "{method}");
+            }
         }
     }
 }
