@@ -582,7 +582,7 @@ fn an_rccc_loop_keeps_angles_and_distances_of_its_axes() {
 
 fn start_error(text: &str) -> String {
     let scene = parse(text, &[]);
-    let error = Simulation::new(&scene.machine).err().expect("does not start");
+    let error = Simulation::new(&scene.machine).expect_err("does not start");
     scene.locate(&error).to_string()
 }
 

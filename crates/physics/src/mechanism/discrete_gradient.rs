@@ -536,8 +536,8 @@ impl Mechanism {
             let motion = self.equations.motion();
             let world = self.model.bodies.len();
             let fixed = Anchor { body: world, offset: Vec3::zeros() };
-            let ends = |element: &Box<dyn SceneElement>| element.ends(motion).unwrap_or([fixed; 2]);
-            let elements: Vec<[Anchor; 2]> = self.elements.iter().map(ends).collect();
+            let ends = |element: &dyn SceneElement| element.ends(motion).unwrap_or([fixed; 2]);
+            let elements: Vec<[Anchor; 2]> = self.elements.iter().map(|element| ends(&**element)).collect();
             let discrete = DiscreteGradient::new(&self.model, dimension, positions, within, &elements)?;
             self.discrete = Some(Box::new(discrete));
         }
