@@ -12,7 +12,7 @@ use crate::planar_loops::{Extras, GRASHOF, PLAIN};
 use crate::{loop_joints, two_degrees};
 use jointplay::machine::Quat;
 use jointplay::scene::{LiveScene, Scene, built_in_text};
-use jointplay::simulate::{Frame, Ledger, Simulation};
+use jointplay::simulate::{Frame, Ledger, Model, Simulation};
 
 /// Steps before the instant at which a run without contacts is kept, and after it.
 const BEFORE: u32 = 10;
@@ -268,4 +268,20 @@ fn what_waits_in_a_snapshot_takes_effect_at_the_reset_of_a_copy() {
     assert_eq!(fresh.pending().machine.spcmm.unwrap().frequency, 1.0);
     assert_eq!(fresh.running().machine.spcmm.unwrap().frequency, 1.0);
     assert_eq!(frame_now(&mut fresh).joints[0].clearance, 0.1e-3);
+}
+
+#[test]
+fn threads_share_a_model_and_step_states_of_their_own() {
+    let model = Model::new(&crate::common::scene("pendulum", &[]).machine).unwrap();
+    let run = || {
+        let mut state = model.start();
+        let mut workspace = model.workspace(&state);
+        while state.time() < 0.015 {
+            model.step(&mut state, &mut workspace).unwrap();
+        }
+        state
+    };
+    let [one, other] =
+        std::thread::scope(|scope| [scope.spawn(run), scope.spawn(run)].map(|thread| thread.join().unwrap()));
+    assert_eq!(one, other);
 }
