@@ -9,9 +9,9 @@
 //! No event is located. The eccentricity at the end is that of the guessed motion, plus h W times the change of V.
 
 use super::band::Band;
-use super::bounds::{Advice, Cost, CostOf};
 use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
 use super::contacts::Contacts;
+use super::coupled::{CoupledRows, mobility_between, weigh};
 use super::elements::{ActiveSet, At, Counts, Powers, SceneElement};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
@@ -19,8 +19,9 @@ use super::model::{Anchor, Model};
 use super::systems::Evaluator;
 use super::{Mechanism, MechanismError};
 use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
-use crate::integrate::{Method, System as _};
+use crate::integrate::System as _;
 use crate::machine::{Mat3, Vec3};
+use std::ops::Range;
 
 /// Maximum number of iterations, and of successive cuts of one of them.
 const ITERATIONS: u32 = 15;
@@ -106,10 +107,7 @@ pub struct DiscreteGradient {
     joints: usize,
     /// Upper bounds on the effect of a force and a torque of each element on its relative motion, 1/kg and 1/(kg m^2).
     ease: Vec<[f64; 2]>,
-    /// Velocity coordinates that a force at each row may accelerate.
-    ranges: Vec<(usize, usize)>,
-    /// Bandwidth: rows further apart are not coupled.
-    reach: usize,
+    coupled: CoupledRows,
     band: Band,
     touches: Vec<Touch>,
     columns: Vec<Vec<Column>>,
@@ -177,45 +175,18 @@ impl DiscreteGradient {
     ) -> Result<Self, MechanismError> {
         let n = dimension - positions;
         let joints = model.joints.len();
-        let block_of =
-            |body: usize| (body < model.bodies.len() && !model.bodies[body].driven_only).then(|| model.block_of[body]);
         let of_joints = model.joints.iter().map(|joint| [joint.ball.body, joint.socket.body]);
         let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
-        // Blocks of the mass matrix that a force at each row may accelerate.
-        let blocks: Vec<[Option<usize>; 2]> = of_joints.chain(of_elements).map(|of| of.map(block_of)).collect();
-        let rows = blocks.len();
-        let range = |row: usize| {
-            if !within {
-                return (0, n);
-            }
-            let of = |b: usize| (model.blocks[b].v, model.blocks[b].v + model.blocks[b].n);
-            let mut range = (n, 0);
-            for (first, end) in blocks[row].into_iter().flatten().map(of) {
-                range = (range.0.min(first), range.1.max(end));
-            }
-            (range.0.min(range.1), range.1)
-        };
-        // Rows that act on the same block are coupled.
-        let mut first_on = vec![usize::MAX; model.blocks.len()];
-        let mut reach = if within { 0 } else { rows.saturating_sub(1) };
-        for (row, blocks) in blocks.iter().enumerate() {
-            for &block in blocks.iter().flatten() {
-                first_on[block] = first_on[block].min(row);
-                reach = reach.max(row - first_on[block]);
-            }
-        }
-        let ranges: Vec<_> = (0..rows).map(range).collect();
-        let width = |&(first, end): &(usize, usize)| end - first;
-        let cost = Cost::of_implicit_contacts(rows, reach, ranges.iter().map(width).sum());
-        cost.check(CostOf::ImplicitContacts, Advice::Method(Method::Automatic))?;
+        let coupled = CoupledRows::new(model, n, within, of_joints.chain(of_elements))?;
+        let (rows, reach) = (coupled.ranges.len(), coupled.reach);
+        let width = |range: &Range<usize>| range.len();
         Ok(Self {
             joints,
             ease: elements.iter().map(|ends| ease(model, ends)).collect(),
-            reach,
             band: Band::with_room(rows, reach),
             touches: Vec::with_capacity(rows),
-            columns: ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
-            weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
+            columns: coupled.ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
+            weighted: coupled.ranges.iter().map(|range| vec![0.0; 3 * width(range)]).collect(),
             blocks: vec![Mat3::zeros(); Band::places(rows, reach)],
             right: Vec::with_capacity(rows),
             mobility: vec![[Mat3::zeros(); 2]; Band::places(rows, reach)],
@@ -228,7 +199,7 @@ impl DiscreteGradient {
             scratch: vec![0.0; n],
             starts: vec![JointStart::default(); joints],
             powers: Powers::default(),
-            ranges,
+            coupled,
         })
     }
 
@@ -343,55 +314,20 @@ impl DiscreteGradient {
 
     /// M^-1 S^T of every touch, and the mobility that couples the touches.
     fn couple(&mut self, model: &Model, equations: &mut dyn Equations) {
-        let within = equations.is_block_diagonal();
         for touch in &self.touches {
-            let j = touch.row;
-            let (first, end) = self.ranges[j];
-            for i in 0..3 {
-                self.scratch[first..end].fill(0.0);
-                for column in &self.columns[j] {
-                    self.scratch[column.coordinate] = column.surface[i];
-                }
-                if within {
-                    equations.apply_inverse_mass_within(model, (first, end), &mut self.scratch);
-                } else {
-                    equations.apply_inverse_mass(model, &mut self.scratch);
-                }
-                for k in first..end {
-                    self.weighted[j][3 * (k - first) + i] = self.scratch[k];
-                }
-            }
+            let (row, range) = (touch.row, &self.coupled.ranges[touch.row]);
+            weigh(model, equations, range, &self.columns[row], &mut self.scratch, &mut self.weighted[row]);
         }
-        let Self { band, touches, ranges, .. } = self;
-        let range = |i: usize| ranges[touches[i].row];
-        band.arrange(touches.len(), self.reach, |i, j| {
-            let [(first, end), (from, to)] = [i, j].map(range);
-            first < to && from < end
-        });
+        let Self { band, touches, coupled, .. } = self;
+        band.arrange(touches.len(), coupled.reach, |i, j| coupled.meet(touches[i].row, touches[j].row));
         let band = &self.band;
         for i in 0..band.size() {
             let touch = &self.touches[i];
-            let joints = |j: usize| self.touches[j].row;
-            let columns = &self.columns[touch.row];
-            let surface = touch.follows_surfaces();
+            let (columns, surface) = (&self.columns[touch.row], touch.follows_surfaces());
             for j in band.row(i) {
-                let other = joints(j);
-                let (first, end) = self.ranges[other];
-                let mut mobility = [Mat3::zeros(); 2];
-                for c in columns {
-                    if (first..end).contains(&c.coordinate) {
-                        let x = &self.weighted[other][3 * (c.coordinate - first)..][..3];
-                        let x = Vec3::new(x[0], x[1], x[2]).transpose();
-                        mobility[0] += c.centre * x;
-                        if surface {
-                            mobility[1] += c.surface * x;
-                        }
-                    }
-                }
-                if !surface {
-                    mobility[1] = mobility[0];
-                }
-                self.mobility[band.at(i, j)] = mobility;
+                let other = self.touches[j].row;
+                let (weighted, range) = (&self.weighted[other], &self.coupled.ranges[other]);
+                self.mobility[band.at(i, j)] = mobility_between(columns, weighted, range, surface);
             }
             let touch = &mut self.touches[i];
             touch.step.mobility = touch.normal.dot(&(self.mobility[band.at(i, i)][0] * touch.normal));
@@ -489,9 +425,9 @@ impl DiscreteGradient {
     /// Adds to the mean velocity what the contact forces add, over half a step `half`, s.
     fn push(&mut self, half: f64) {
         for touch in &self.touches {
-            let (first, end) = self.ranges[touch.row];
+            let range = self.coupled.ranges[touch.row].clone();
             let weighted = self.weighted[touch.row].chunks_exact(3);
-            for (v, w) in self.mean[first..end].iter_mut().zip(weighted) {
+            for (v, w) in self.mean[range].iter_mut().zip(weighted) {
                 *v += half * (w[0] * touch.force[0] + w[1] * touch.force[1] + w[2] * touch.force[2]);
             }
         }

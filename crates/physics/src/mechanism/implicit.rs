@@ -8,15 +8,15 @@
 
 use super::MechanismError;
 use super::band::Band;
-use super::bounds::{Advice, Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
 use super::contacts::Contacts;
+use super::coupled::{CoupledRows, mobility_between, weigh};
 use super::elements::{ActiveSet, Counts};
 use super::equations::Equations;
 use super::model::Model;
 use crate::contact::{ApproachBranch, Coefficients, ContactState, Slope};
-use crate::integrate::Method;
 use crate::machine::{Mat3, Vec3};
+use std::ops::Range;
 
 /// Maximum number of Newton iterations, and the force change relative to the largest force at which they stop.
 const ITERATIONS: usize = 24;
@@ -82,11 +82,8 @@ impl Touch {
 
 /// Workspace of the implicit part, allocated once.
 pub struct ImplicitContacts {
-    n: usize,
-    /// Velocity coordinates that a force at each joint may accelerate.
-    ranges: Vec<(usize, usize)>,
-    /// Bandwidth: joints further apart in their order are not coupled.
-    reach: usize,
+    /// Joint by joint.
+    coupled: CoupledRows,
     band: Band,
     touches: Vec<Touch>,
     columns: Vec<Vec<Column>>,
@@ -108,49 +105,20 @@ impl ImplicitContacts {
     /// The contacts are coupled too widely.
     pub fn new(model: &Model, n: usize, blocks: bool) -> Result<Self, MechanismError> {
         let joints = model.joints.len();
-        let block_of =
-            |body: usize| (body < model.bodies.len() && !model.bodies[body].driven_only).then(|| model.block_of[body]);
-        let of_joint = |j: usize| {
-            let joint = &model.joints[j];
-            [block_of(joint.ball.body), block_of(joint.socket.body)]
-        };
-        let range = |j: usize| {
-            if !blocks {
-                return (0, n);
-            }
-            let of = |b: usize| (model.blocks[b].v, model.blocks[b].v + model.blocks[b].n);
-            let mut range = (n, 0);
-            for (first, end) in of_joint(j).into_iter().flatten().map(of) {
-                range = (range.0.min(first), range.1.max(end));
-            }
-            (range.0.min(range.1), range.1)
-        };
-        // Joints that act on the same tree are coupled.
-        let mut first_on = vec![usize::MAX; model.blocks.len()];
-        let mut reach = if blocks { 0 } else { joints.saturating_sub(1) };
-        for j in 0..joints {
-            for block in of_joint(j).into_iter().flatten() {
-                first_on[block] = first_on[block].min(j);
-                reach = reach.max(j - first_on[block]);
-            }
-        }
-        let ranges: Vec<_> = (0..joints).map(range).collect();
-        let width = |&(first, end): &(usize, usize)| end - first;
-        let cost = Cost::of_implicit_contacts(joints, reach, ranges.iter().map(width).sum());
-        cost.check(CostOf::ImplicitContacts, Advice::Method(Method::Automatic))?;
+        let bodies = model.joints.iter().map(|joint| [joint.ball.body, joint.socket.body]);
+        let coupled = CoupledRows::new(model, n, blocks, bodies)?;
+        let (reach, width) = (coupled.reach, |range: &Range<usize>| range.len());
         Ok(Self {
-            n,
-            reach,
             band: Band::with_room(joints, reach),
             touches: Vec::with_capacity(joints),
-            columns: ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
-            weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
+            columns: coupled.ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
+            weighted: coupled.ranges.iter().map(|range| vec![0.0; 3 * width(range)]).collect(),
             blocks: vec![Mat3::zeros(); Band::places(joints, reach)],
             right: Vec::with_capacity(joints),
             before: Vec::with_capacity(joints),
             mobility: vec![[Mat3::zeros(); 2]; Band::places(joints, reach)],
             scratch: vec![0.0; n],
-            ranges,
+            coupled,
         })
     }
 
@@ -213,25 +181,9 @@ impl ImplicitContacts {
     /// Computes the forces at the end of a step of size `h`, s. Returns whether a normal turned so far that its arms need an
     /// update.
     pub fn solve(&mut self, model: &Model, h: f64, equations: &mut dyn Equations, counts: &mut Counts) -> bool {
-        let within = equations.is_block_diagonal();
         for touch in &self.touches {
-            let j = touch.joint;
-            let (first, end) = self.ranges[j];
-            for i in 0..3 {
-                self.scratch[first..end].fill(0.0);
-                for column in &self.columns[j] {
-                    self.scratch[column.coordinate] = column.surface[i];
-                }
-                let x = &mut self.scratch[..self.n];
-                if within {
-                    equations.apply_inverse_mass_within(model, (first, end), x);
-                } else {
-                    equations.apply_inverse_mass(model, x);
-                }
-                for k in first..end {
-                    self.weighted[j][3 * (k - first) + i] = self.scratch[k];
-                }
-            }
+            let (j, range) = (touch.joint, &self.coupled.ranges[touch.joint]);
+            weigh(model, equations, range, &self.columns[j], &mut self.scratch, &mut self.weighted[j]);
         }
         self.couple();
         // Start from the forces found with the previous arms, if any.
@@ -277,9 +229,9 @@ impl ImplicitContacts {
     /// Adds to `v` the velocity change due to the latest forces over a step of size `h`.
     pub fn push(&self, h: f64, v: &mut [f64]) {
         for (touch, force) in self.touches.iter().zip(&self.right) {
-            let (first, end) = self.ranges[touch.joint];
+            let range = self.coupled.ranges[touch.joint].clone();
             let weighted = self.weighted[touch.joint].chunks_exact(3);
-            for (v, w) in v[first..end].iter_mut().zip(weighted) {
+            for (v, w) in v[range].iter_mut().zip(weighted) {
                 *v += h * (w[0] * force[0] + w[1] * force[1] + w[2] * force[2]);
             }
         }
@@ -287,12 +239,8 @@ impl ImplicitContacts {
 
     /// Computes the mobility matrix that couples the contacts.
     fn couple(&mut self) {
-        let Self { band, touches, ranges, .. } = self;
-        let range = |i: usize| ranges[touches[i].joint];
-        band.arrange(touches.len(), self.reach, |i, j| {
-            let [(first, end), (from, to)] = [i, j].map(range);
-            first < to && from < end
-        });
+        let Self { band, touches, coupled, .. } = self;
+        band.arrange(touches.len(), coupled.reach, |i, j| coupled.meet(touches[i].joint, touches[j].joint));
         let band = &self.band;
         for i in 0..band.size() {
             let touch = &self.touches[i];
@@ -300,22 +248,8 @@ impl ImplicitContacts {
             let surface = touch.law.uses_surface_velocity() && touch.law.friction > 0.0;
             for j in band.row(i) {
                 let other = self.touches[j].joint;
-                let (first, end) = self.ranges[other];
-                let mut mobility = [Mat3::zeros(); 2];
-                for c in columns {
-                    if (first..end).contains(&c.coordinate) {
-                        let x = &self.weighted[other][3 * (c.coordinate - first)..][..3];
-                        let x = Vec3::new(x[0], x[1], x[2]).transpose();
-                        mobility[0] += c.centre * x;
-                        if surface {
-                            mobility[1] += c.surface * x;
-                        }
-                    }
-                }
-                if !surface {
-                    mobility[1] = mobility[0];
-                }
-                self.mobility[band.at(i, j)] = mobility;
+                let (weighted, range) = (&self.weighted[other], &self.coupled.ranges[other]);
+                self.mobility[band.at(i, j)] = mobility_between(columns, weighted, range, surface);
             }
         }
     }

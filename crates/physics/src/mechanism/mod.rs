@@ -11,6 +11,7 @@ mod closed_form;
 mod columns;
 mod constraints;
 mod contacts;
+mod coupled;
 mod discrete_gradient;
 mod drives;
 mod elements;
