@@ -9,6 +9,7 @@ use super::{theme, value};
 use crate::analysis::presets::{self, Measured};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
+use crate::integrate::StepControl;
 use crate::machine::Preset;
 use crate::simulate::Impact;
 
@@ -231,7 +232,11 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     let is = |preset: &Preset| {
         let (method, step, tolerance) = preset.point();
         method == solver.method
-            && if method.is_adaptive() { tolerance == solver.tolerance } else { step == solver.step }
+            && match method.control() {
+                StepControl::Fixed => step == solver.step,
+                StepControl::Error => tolerance == solver.tolerance,
+                StepControl::PerImpact => false,
+            }
     };
     let chosen = solver.preset.filter(|preset| is(preset));
     chosen.or_else(|| Preset::ALL.into_iter().find(is))

@@ -10,7 +10,7 @@ use super::{Failure, load, print, start};
 use crate::analysis::beginning::Beginning;
 use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
-use crate::integrate::Method;
+use crate::integrate::{Method, StepControl};
 use crate::machine::{BallJoint, Body, Element, Formulation, Joint, JointKind};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
@@ -269,21 +269,23 @@ fn method(scene: &Scene, contents: &Summary) -> String {
     let explicit = method == Method::Automatic
         && contents.solves_differential_equation
         && contents.velocity_coordinates > contents.largest_implicit;
-    if method.is_adaptive() {
-        let alone = if explicit {
+    match method.control() {
+        StepControl::Fixed => format!("{method}, step {step} us"),
+        StepControl::PerImpact => format!("{method}, {} steps per impact", scene.machine.solver.steps_per_impact),
+        StepControl::Error => {
+            let alone = if explicit {
+                format!(
+                    "; explicit steps only: the implicit methods allow at most {} velocity coordinates",
+                    contents.largest_implicit
+                )
+            } else {
+                String::new()
+            };
             format!(
-                "; explicit steps only: the implicit methods allow at most {} velocity coordinates",
-                contents.largest_implicit
+                "{method}, relative tolerance {}, first step {step} us{alone}",
+                significant(scene.machine.solver.tolerance, 3)
             )
-        } else {
-            String::new()
-        };
-        format!(
-            "{method}, relative tolerance {}, first step {step} us{alone}",
-            significant(scene.machine.solver.tolerance, 3)
-        )
-    } else {
-        format!("{method}, step {step} us")
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use serde_json::{Map, Value as Json, json};
 #[cfg(feature = "gui")]
 use super::Failure;
 use crate::files::PROGRAM;
+use crate::integrate::StepControl;
 use crate::scene::{Scene, file_bytes};
 
 /// The common part of every output's `meta`.
@@ -23,8 +24,14 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
     meta.insert("formulation".into(), json!(scene.machine.formulation));
     meta.insert("method".into(), json!(scene.machine.solver.method));
     meta.insert("step_s".into(), json!(scene.machine.solver.step));
-    if scene.machine.solver.method.is_adaptive() {
-        meta.insert("tolerance".into(), json!(scene.machine.solver.tolerance));
+    match scene.machine.solver.method.control() {
+        StepControl::Fixed => {}
+        StepControl::Error => {
+            meta.insert("tolerance".into(), json!(scene.machine.solver.tolerance));
+        }
+        StepControl::PerImpact => {
+            meta.insert("steps_per_impact".into(), json!(scene.machine.solver.steps_per_impact));
+        }
     }
     meta
 }

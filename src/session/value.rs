@@ -1,5 +1,6 @@
 //! Values as text on the screen: words as in files and on the command line, typeset units.
 
+use crate::integrate::StepControl;
 use crate::scene::{Kind, Scene, Value};
 use crate::simulate::ContactMode;
 use crate::units::{format_quantity, format_quantity_digits};
@@ -88,13 +89,14 @@ fn is_solver_or_view_key(key: &str) -> bool {
     key.starts_with("solver.") || key.starts_with("view.")
 }
 
-/// Method with its tolerance, or its fixed step.
+/// Method with its fixed step, its tolerance, or its steps per impact.
 pub fn solver(scene: &Scene) -> String {
-    let method = scene.machine.solver.method;
-    if scene.machine.solver.method.is_adaptive() {
-        format!("{method} {}", power_of_ten(scene.machine.solver.tolerance))
-    } else {
-        format!("{method} {}", quantity(scene.machine.solver.step, "us", 6))
+    let solver = &scene.machine.solver;
+    let method = solver.method;
+    match method.control() {
+        StepControl::Fixed => format!("{method} {}", quantity(solver.step, "us", 6)),
+        StepControl::Error => format!("{method} {}", power_of_ten(solver.tolerance)),
+        StepControl::PerImpact => format!("{method} {} steps per impact", solver.steps_per_impact),
     }
 }
 

@@ -28,20 +28,20 @@ impl Way {
     }
 
     /// The same for smooth motion against a closed solution: with steps that suit the method's order.
-    pub fn close(self) -> [(&'static str, &'static str); 4] {
+    pub fn close(self) -> [(&'static str, &'static str); 5] {
         let step = match self.method {
-            "semi-implicit-euler" | "imex-euler" => "1 us",
+            "semi-implicit-euler" => "1 us",
             "rk4" => "100 us",
             _ => "10 us",
         };
         let [method, formulation] = self.changes();
-        [method, ("solver.step", step), ("solver.tolerance", "1e-10"), formulation]
+        [method, ("solver.step", step), ("solver.tolerance", "1e-10"), ("solver.steps_per_impact", "256"), formulation]
     }
 
     /// How close that comes, m.
     pub fn bound(self) -> f64 {
         match self.method {
-            "semi-implicit-euler" | "imex-euler" => 2e-6,
+            "semi-implicit-euler" | "discrete-gradient" => 2e-6,
             "rk4" => 1e-9,
             _ => 1e-8,
         }

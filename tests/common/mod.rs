@@ -29,7 +29,7 @@ pub const SCENES: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-cran
 pub const MACHINES: [&str; 5] = ["hexapod", "delta", "four-bar", "suspension", "press"];
 /// Words of `solver.method`.
 pub const METHODS: [&str; 7] =
-    ["semi-implicit-euler", "imex-euler", "rk4", "dopri5", "rosenbrock", "radau5", "automatic"];
+    ["semi-implicit-euler", "discrete-gradient", "rk4", "dopri5", "rosenbrock", "radau5", "automatic"];
 
 /// Keys and values as a user writes them.
 pub type Changes<'a> = [(&'a str, &'a str)];

@@ -1,46 +1,48 @@
-//! A method with its step size or tolerance.
+//! A method with the setting that decides its steps.
 
 use serde::Serialize;
 
 use super::AnalysisError;
-use jointplay_physics::integrate::Method;
-use jointplay_physics::machine::{Machine, Preset};
+use jointplay_physics::integrate::{Method, StepControl};
+use jointplay_physics::machine::{Machine, Preset, Solver};
 use jointplay_physics::simulate::Simulation;
 use jointplay_scene::Scene;
 
-/// A method with its step size or tolerance.
+/// A method with its step size, tolerance or steps per impact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Setting {
     /// Method.
     pub method: Method,
-    /// Whether `tolerance` applies rather than `step_s`.
-    pub adaptive: bool,
-    /// Fixed step size, or initial step size of an adaptive method, s.
+    /// Fixed step size, or initial step size of another method, s.
     pub step_s: f64,
     /// Relative tolerance of an adaptive method.
     pub tolerance: f64,
+    /// Steps per impact of the discrete-gradient method.
+    pub steps_per_impact: u32,
 }
 
-/// Initial step size of an adaptive method, and tolerance of a fixed-step one, which ignores it.
-const FIRST_STEP: f64 = 10e-6;
-const UNUSED_TOLERANCE: f64 = 1e-6;
-
 impl Setting {
-    /// `method` at `value`: a step size in s if its step is fixed, otherwise a tolerance.
+    /// `method` at `value`: a step size in s, a tolerance, or a number of steps per impact, as it needs.
     pub fn new(method: Method, value: f64) -> Self {
-        let adaptive = method.is_adaptive();
-        Self {
-            method,
-            adaptive,
-            step_s: if adaptive { FIRST_STEP } else { value },
-            tolerance: if adaptive { value } else { UNUSED_TOLERANCE },
+        let mut setting = Self::of(&Solver { method, ..Solver::default() });
+        match method.control() {
+            StepControl::Fixed => setting.step_s = value,
+            StepControl::Error => setting.tolerance = value,
+            StepControl::PerImpact => setting.steps_per_impact = value as u32,
         }
+        setting
+    }
+
+    /// That of a machine.
+    fn of(solver: &Solver) -> Self {
+        let Solver { method, step: step_s, tolerance, steps_per_impact, .. } = *solver;
+        Self { method, step_s, tolerance, steps_per_impact }
     }
 
     /// The setting of a preset.
     pub fn of_preset(preset: Preset) -> Self {
         let (method, step_s, tolerance) = preset.point();
-        Self { method, adaptive: method.is_adaptive(), step_s, tolerance }
+        Self { method, step_s, tolerance, ..Self::of(&Solver::default()) }
     }
 
     /// Runge-Kutta 4 at 10 microseconds, the baseline of speed ratios.
@@ -58,30 +60,35 @@ impl Setting {
         Self::new(Method::Automatic, tolerance)
     }
 
-    /// The step size of a fixed-step method, s, or the tolerance of an adaptive one.
+    /// What decides the steps of the method: a step size in s, a tolerance, or a number of steps per impact.
     pub fn value(&self) -> f64 {
-        if self.adaptive { self.tolerance } else { self.step_s }
+        match self.method.control() {
+            StepControl::Fixed => self.step_s,
+            StepControl::Error => self.tolerance,
+            StepControl::PerImpact => f64::from(self.steps_per_impact),
+        }
     }
 
     /// Starts `scene` with this setting.
     pub(super) fn start(&self, scene: &Scene) -> Result<Simulation, AnalysisError> {
-        Ok(Simulation::new(&self.of(&scene.machine))?)
+        Ok(Simulation::new(&self.in_machine(&scene.machine))?)
     }
 
     /// Continues from the state of `start` with this setting in place of its own.
     pub(super) fn resume(&self, start: &Simulation) -> Result<Simulation, AnalysisError> {
         let mut simulation = start.clone();
-        let machine = self.of(&simulation.changed_machine());
+        let machine = self.in_machine(&simulation.changed_machine());
         simulation.adopt(&machine)?;
         Ok(simulation)
     }
 
     /// `machine` with this setting.
-    fn of(&self, machine: &Machine) -> Machine {
+    fn in_machine(&self, machine: &Machine) -> Machine {
         let mut machine = machine.clone();
         machine.solver.method = self.method;
         machine.solver.step = self.step_s;
         machine.solver.tolerance = self.tolerance;
+        machine.solver.steps_per_impact = self.steps_per_impact;
         machine
     }
 }

@@ -29,6 +29,8 @@ pub struct WorkBudget {
     pub steps: &'static [f64],
     /// Tolerances of the adaptive methods.
     pub tolerances: &'static [f64],
+    /// Steps per impact of the discrete-gradient method.
+    pub steps_per_impact: &'static [f64],
 }
 
 impl WorkBudget {
@@ -39,6 +41,7 @@ impl WorkBudget {
         measured: 0.02,
         steps: &[50e-6, 20e-6, 10e-6, 5e-6, 2e-6],
         tolerances: &[1e-3, 1e-4, 1e-6, 1e-8],
+        steps_per_impact: &[4.0, 8.0, 16.0],
     };
     /// The whole grid, which takes minutes.
     pub const FULL: Self = Self {
@@ -47,11 +50,12 @@ impl WorkBudget {
         measured: 0.1,
         steps: &[1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6],
         tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
+        steps_per_impact: &[2.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 64.0],
     };
     /// Runs with more loose joints than this are long.
     const MANY: usize = 8;
 
-    /// Budget for `scene`: runs of many loose joints are capped earlier, at the same steps and tolerances.
+    /// Budget for `scene`: runs of many loose joints are capped earlier, at the same settings.
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
         let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::reference_solution::PhaseCost;
 use super::timing::time_to;
 use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
-use jointplay_physics::integrate::Method;
+use jointplay_physics::integrate::{Method, StepControl};
 use jointplay_physics::machine::Preset;
 use jointplay_scene::Scene;
 
@@ -145,8 +145,11 @@ fn grid(budget: &WorkBudget) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisE
     }
     let mut settings = Vec::new();
     for method in Method::ALL {
-        let probe = Setting::new(method, budget.tolerances[0]);
-        let mut values = if probe.adaptive { budget.tolerances.to_vec() } else { budget.steps.to_vec() };
+        let mut values = match method.control() {
+            StepControl::Fixed => budget.steps.to_vec(),
+            StepControl::Error => budget.tolerances.to_vec(),
+            StepControl::PerImpact => budget.steps_per_impact.to_vec(),
+        };
         let own = presets.iter().filter(|(setting, _)| setting.method == method);
         values.extend(own.map(|(setting, _)| setting.value()));
         values.sort_by(|a, b| b.total_cmp(a));

@@ -51,6 +51,19 @@ impl FieldValue for f64 {
     }
 }
 
+impl FieldValue for u32 {
+    fn to_value(self) -> Value {
+        Value::Count(u64::from(self))
+    }
+
+    fn of_value(value: &Value) -> Self {
+        match value {
+            Value::Count(count) => u32::try_from(*count).expect("the table has checked the range"),
+            _ => unreachable!("the table has checked the kind"),
+        }
+    }
+}
+
 /// Words for `true` and `false`.
 pub(super) const SWITCH: [&str; 2] = ["on", "off"];
 

@@ -106,4 +106,4 @@ pub struct ViewSettings {
 pub const MOST_PLOTS: usize = 4;
 
 /// Keys set by a preset, in the order of [`jointplay_physics::machine::Preset::point`].
-pub const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
+pub const SOLVER_KEYS: [&str; 4] = ["solver.method", "solver.step", "solver.tolerance", "solver.steps_per_impact"];

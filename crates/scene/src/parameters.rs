@@ -134,6 +134,9 @@ pub enum ValueFault {
     WrongKind,
 }
 
+/// Words of older files, and those to use in their place.
+const REPLACED: [(&str, &str); 1] = [("imex-euler", "discrete-gradient")];
+
 impl Parameter {
     /// Unit in which values are shown; "" for pure numbers, counts and choices.
     pub fn display_unit(&self) -> &'static str {
@@ -215,7 +218,9 @@ impl Parameter {
                 let found =
                     words.iter().find(|choice| **choice == word || choice.strip_prefix('+') == Some(word.as_str()));
                 let Some(choice) = found else {
-                    let nearest = nearest_name(text, words.iter().copied());
+                    let replaced = REPLACED.iter().find(|(old, new)| *old == word && words.contains(new));
+                    let near = || nearest_name(text, words.iter().copied());
+                    let nearest = replaced.map(|(_, new)| *new).or_else(near);
                     return Err(self.refuse(ValueFault::NoChoice { nearest }));
                 };
                 Value::Choice(choice)

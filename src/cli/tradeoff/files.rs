@@ -8,6 +8,7 @@ use crate::analysis::{Phase, Point, WorkPrecision};
 use crate::cli::tables::{Table, number};
 use crate::cli::{Failure, machine, provenance};
 use crate::files::Folder;
+use crate::integrate::StepControl;
 use crate::scene::Scene;
 
 /// PNG pixels per diagram pixel.
@@ -76,12 +77,14 @@ fn points(found: &WorkPrecision) -> Table {
     let [impacts, settled] =
         ["impacts", "settled"].map(|phase| OF_PHASE.map(|name| format!("{phase}_{name}")).join(" | "));
     let heads = format!(
-        "method | step_s | tolerance | preset | {impacts} | peak_error | position_error_m | energy_error | {settled} | settled_error"
+        "method | step_s | tolerance | steps_per_impact | preset | {impacts} | peak_error | position_error_m | energy_error | {settled} | settled_error"
     );
     let row = |point: &Point| {
         let (setting, errors) = (&point.setting, &point.errors);
         let mut row = vec![setting.method.word().to_owned(), number(setting.step_s)];
-        row.push(number(setting.adaptive.then_some(setting.tolerance)));
+        let control = setting.method.control();
+        row.push(number((control == StepControl::Error).then_some(setting.tolerance)));
+        row.push(number((control == StepControl::PerImpact).then_some(f64::from(setting.steps_per_impact))));
         row.push(point.preset.map_or("", |preset| preset.word()).to_owned());
         row.extend(cells(&point.impacts));
         row.extend([errors.peak, errors.position_m, errors.energy].map(number));

@@ -4,6 +4,7 @@ use crate::analysis::{CaseCost, End, Phase, Point, ReferenceSolution, Setting, W
 use crate::cli::machine;
 use crate::cli::output::significant;
 use crate::cli::tables::{self, Table};
+use crate::integrate::StepControl;
 use crate::units::format_quantity;
 
 /// A factor with three digits, `-` if there is none.
@@ -16,9 +17,13 @@ pub fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{} %", significant(100.0 * value, 2)))
 }
 
-/// A step with its unit, or a tolerance.
+/// A step with its unit, a tolerance, or a number of steps per impact.
 pub fn value(setting: &Setting) -> String {
-    if setting.adaptive { format!("{:e}", setting.tolerance) } else { format_quantity(setting.step_s, "us") }
+    match setting.method.control() {
+        StepControl::Fixed => format_quantity(setting.step_s, "us"),
+        StepControl::Error => format!("{:e}", setting.tolerance),
+        StepControl::PerImpact => setting.steps_per_impact.to_string(),
+    }
 }
 
 /// An error with two digits; one below `floor` is shown as less than `floor`.

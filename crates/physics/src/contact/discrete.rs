@@ -6,8 +6,6 @@
 
 use super::{Coefficients, FrictionBranch, FrictionVelocity, Mat3, Vec3};
 
-/// h omega beyond which the ringing of a ball at rest on its wall is damped instead of followed.
-const RESOLVED: f64 = 1.5;
 /// Change of penetration, relative to the larger one, below which Simpson's rule replaces the quotient.
 const NEARLY_EQUAL: f64 = 1e-3;
 
@@ -24,10 +22,6 @@ pub struct ContactStep {
     pub slip: Vec3,
     /// Approach speed in the damping term so far, m/s.
     pub approach: f64,
-    /// Whether the contact has lasted beyond its first rebound: ringing that the step does not resolve is then damped.
-    pub lasting: bool,
-    /// n . W M^-1 W^T n, 1/kg.
-    pub mobility: f64,
 }
 
 /// The force of a contact over one step, its derivatives, and what it does.
@@ -75,7 +69,7 @@ impl Coefficients {
         if d0 <= 0.0 && d1 <= 0.0 {
             return StepForce::none(normal);
         }
-        let (elastic, stiffness) = self.elastic_force(step, d0, d1);
+        let (elastic, stiffness) = self.elastic_force(d0, d1);
         let rate = (d1 - d0) / h;
         let rising = self.largest && rate > step.approach;
         let approach = if rising { rate } else { step.approach };
@@ -115,27 +109,18 @@ impl Coefficients {
     }
 
     /// Elastic force over the step between the penetrations `d0` and `d1` (m), N, and its derivative with respect to `d1`, N/m.
-    fn elastic_force(&self, step: &ContactStep, d0: f64, d1: f64) -> (f64, f64) {
+    fn elastic_force(&self, d0: f64, d1: f64) -> (f64, f64) {
         let force = |d: f64| if d > 0.0 { self.stiffness * d * d.sqrt() } else { 0.0 };
         let slope = |d: f64| if d > 0.0 { 1.5 * self.stiffness * d.sqrt() } else { 0.0 };
         let change = d1 - d0;
-        let (mean, by_end) = if change.abs() < NEARLY_EQUAL * d0.abs().max(d1.abs()) {
+        if change.abs() < NEARLY_EQUAL * d0.abs().max(d1.abs()) {
             let middle = 0.5 * (d0 + d1);
             let mean = (force(d0) + 4.0 * force(middle) + force(d1)) / 6.0;
             (mean, (2.0 * slope(middle) + slope(d1)) / 6.0)
         } else {
             let mean = (self.elastic_energy(d1) - self.elastic_energy(d0)) / change;
             (mean, (force(d1) - mean) / change)
-        };
-        if !step.lasting {
-            return (mean, by_end);
         }
-        let turns = step.h * (slope(d0.max(d1)) * step.mobility).sqrt();
-        if turns <= RESOLVED {
-            return (mean, by_end);
-        }
-        let damped = 1.0 - RESOLVED / turns;
-        ((1.0 - damped) * mean + damped * force(d1), (1.0 - damped) * by_end + damped * slope(d1))
     }
 }
 
@@ -156,8 +141,6 @@ mod tests {
             clearances: [3e-4; 2],
             slip: Vec3::new(0.01, 0.03, 0.0),
             approach: 0.05,
-            lasting: false,
-            mobility: 10.0,
         }
     }
 

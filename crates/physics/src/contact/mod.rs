@@ -15,7 +15,7 @@ pub use law::{
     undisturbed_restitution,
 };
 pub use slip::FrictionBranch;
-pub use state::ContactState;
+pub use state::{ContactPhase, ContactState};
 
 use serde::{Deserialize, Serialize};
 

@@ -20,6 +20,29 @@ pub struct ContactState {
     pub approach_branch: ApproachBranch,
 }
 
+/// Phase of a contact, by the sign of its penetration rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ContactPhase {
+    /// The penetration grows for the first time.
+    #[default]
+    Compression,
+    /// It falls for the first time.
+    Restitution,
+    /// It has grown again: the contact lasts.
+    Lasting,
+}
+
+impl ContactPhase {
+    /// The phase after a step that ends at the penetration rate `rate`, m/s.
+    pub fn after(self, rate: f64) -> Self {
+        match self {
+            Self::Compression if rate < 0.0 => Self::Restitution,
+            Self::Restitution if rate > 0.0 => Self::Lasting,
+            other => other,
+        }
+    }
+}
+
 impl ContactState {
     /// State of a contact that begins at the penetration rate `rate` (m/s).
     pub fn at_onset(c: &Coefficients, rate: f64) -> Self {

@@ -1,6 +1,6 @@
 //! Fixed-step methods.
 
-use super::{ContactSystem, Stepper, System, combine};
+use super::{Stepper, System, combine};
 
 /// Semi-implicit Euler, v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1; the energy of oscillations stays bounded.
 pub struct SemiImplicitEuler {
@@ -33,47 +33,6 @@ impl Stepper for SemiImplicitEuler {
         system.position_rate(t, y_end, &mut self.rate);
         for i in 0..positions {
             y_end[i] += h * self.rate[i];
-        }
-        0.0
-    }
-}
-
-/// Implicit-explicit Euler: [`SemiImplicitEuler`] with the contact forces at the end of the step; order 1. It is L-stable in the
-/// contacts like implicit Euler, so steps need not resolve the ringing of a settled contact.
-pub struct ImexEuler {
-    rate: Vec<f64>,
-    push: Vec<f64>,
-}
-
-impl ImexEuler {
-    /// Stepper for `dimension` components.
-    pub fn new(dimension: usize) -> Self {
-        Self { rate: vec![0.0; dimension], push: vec![0.0; dimension] }
-    }
-
-    /// As [`Stepper::attempt`], but neither needs the derivative at the start nor provides that at the end.
-    pub fn attempt<S: ContactSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64], y_end: &mut [f64]) -> f64 {
-        let positions = system.positions();
-        let Self { rate, push } = self;
-        system.derivative_without_contacts(t, y, rate);
-        y_end[..positions].copy_from_slice(&y[..positions]);
-        for i in positions..y.len() {
-            y_end[i] = y[i] + h * rate[i];
-        }
-        system.position_rate(t, y_end, rate);
-        for i in 0..positions {
-            y_end[i] += h * rate[i];
-        }
-        if system.contact_velocity_change(t + h, h, y_end, push) {
-            // Position rates due to the added velocities alone.
-            push[..positions].copy_from_slice(&y_end[..positions]);
-            system.position_rate(t + h, push, rate);
-            for i in 0..positions {
-                y_end[i] += h * rate[i];
-            }
-            for i in positions..y.len() {
-                y_end[i] += push[i];
-            }
         }
         0.0
     }

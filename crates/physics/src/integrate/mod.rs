@@ -14,7 +14,7 @@ mod rosenbrock;
 
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
-pub use fixed::{ImexEuler, RungeKutta4, SemiImplicitEuler};
+pub use fixed::{RungeKutta4, SemiImplicitEuler};
 pub use radau::{Polynomial, Radau};
 pub use root::find_root;
 pub use rosenbrock::Rosenbrock;
@@ -27,8 +27,8 @@ use std::ops::Range;
 pub enum Method {
     /// Semi-implicit Euler, order 1, fixed step.
     SemiImplicitEuler,
-    /// Implicit-explicit Euler, implicit in the contacts alone, order 1, fixed step.
-    ImexEuler,
+    /// Discrete gradient of the contacts' elastic energy, friction at the end of the step; a number of steps per impact.
+    DiscreteGradient,
     /// Classical Runge-Kutta, order 4, fixed step.
     RungeKutta4,
     /// Dormand-Prince 5(4), adaptive.
@@ -43,7 +43,7 @@ pub enum Method {
 
 words!(Method {
     SemiImplicitEuler => "semi-implicit-euler",
-    ImexEuler => "imex-euler",
+    DiscreteGradient => "discrete-gradient",
     RungeKutta4 => "rk4",
     DormandPrince5 => "dopri5",
     Rosenbrock => "rosenbrock",
@@ -51,15 +51,35 @@ words!(Method {
     Automatic => "automatic",
 });
 
+/// What sets the size of a method's steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepControl {
+    /// `solver.step` is the step.
+    Fixed,
+    /// An error estimate is held at `solver.tolerance`.
+    Error,
+    /// `solver.steps_per_impact` steps are taken while a ball strikes its wall.
+    PerImpact,
+}
+
 impl Method {
     /// Whether each step solves a system with the Jacobian.
     pub fn is_implicit(self) -> bool {
         matches!(self, Self::Rosenbrock | Self::Radau5)
     }
 
+    /// What sets the size of its steps.
+    pub fn control(self) -> StepControl {
+        match self {
+            Self::SemiImplicitEuler | Self::RungeKutta4 => StepControl::Fixed,
+            Self::DiscreteGradient => StepControl::PerImpact,
+            Self::DormandPrince5 | Self::Rosenbrock | Self::Radau5 | Self::Automatic => StepControl::Error,
+        }
+    }
+
     /// Whether the step size is controlled by an error estimate.
     pub fn is_adaptive(self) -> bool {
-        !matches!(self, Self::SemiImplicitEuler | Self::ImexEuler | Self::RungeKutta4)
+        self.control() == StepControl::Error
     }
 }
 
@@ -104,16 +124,6 @@ pub trait FrictionSystem: System {
         Self: 'a;
     /// Returns this view.
     fn friction_alone(&mut self) -> Self::Part<'_>;
-}
-
-/// A system whose contacts can be stepped implicitly on their own.
-pub trait ContactSystem: System {
-    /// Writes f(t, y) without contact forces to `dy`.
-    fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
-    /// Takes the state `y` at the end, `t`, of a step of size `h` without contact forces. Projects it onto the constraints, and
-    /// writes its velocity change due to the contact forces at the end of the step to `dv` (zero for positions). Returns false if
-    /// there are none.
-    fn contact_velocity_change(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool;
 }
 
 /// One-step method.

@@ -387,26 +387,15 @@ impl System for Falling {
     }
 }
 
-impl ContactSystem for Falling {
-    fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        self.derivative(t, y, dy);
-    }
-    fn contact_velocity_change(&mut self, _t: f64, _h: f64, _y: &mut [f64], _dv: &mut [f64]) -> bool {
-        false
-    }
-}
-
 #[test]
-fn both_euler_methods_meet_the_conditions_of_order_one_and_no_more() {
+fn semi_implicit_euler_meets_the_conditions_of_order_one_and_no_more() {
     let h = 0.25;
     for (v, a) in [(1.0, 0.0), (0.0, 1.0)] {
         let (y, k) = ([0.0, v], [v, a]);
-        let (mut one, mut other) = ([0.0; 2], [0.0; 2]);
+        let mut end = [0.0; 2];
         let mut system = Falling(a);
-        SemiImplicitEuler::new(2).attempt(&mut system, 0.0, h, &y, &k, &mut one, &mut [0.0; 2]);
-        ImexEuler::new(2).attempt(&mut system, 0.0, h, &y, &mut other);
+        SemiImplicitEuler::new(2).attempt(&mut system, 0.0, h, &y, &k, &mut end, &mut [0.0; 2]);
         // The position uses the velocity at the end: h^2 a, twice the exact contribution.
-        assert_eq!(one, [h * v + h * h * a, v + h * a]);
-        assert_eq!(one, other);
+        assert_eq!(end, [h * v + h * h * a, v + h * a]);
     }
 }

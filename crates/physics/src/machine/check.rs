@@ -6,17 +6,11 @@ use super::{
     BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointSpring, Machine, Spcmm, Spring, Warning,
 };
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
-use crate::integrate::Method;
+use crate::integrate::StepControl;
 use crate::units::{Dimension, format_quantity, unit_names};
 
-/// Fewest fixed steps per impact: with fewer, much of it is lost; twice as many resolve it. Implicit Euler contacts need more:
-/// numerical damping removes about the same fraction of an impact as a step is of its duration.
-pub fn least_impact_steps(method: Method) -> u64 {
-    match method {
-        Method::ImexEuler => 40,
-        _ => 5,
-    }
-}
+/// Fewest fixed steps per impact: with fewer, much of it is lost; twice as many resolve it.
+pub const LEAST_IMPACT_STEPS: u64 = 5;
 
 /// Loosest tolerance at which impacts conserve energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
@@ -277,7 +271,7 @@ impl Machine {
 
     /// Warns of a fixed step too long for the shortest expected impact, and recommends a shorter one.
     fn step_warning(&self) -> Option<Doubt> {
-        if self.solver.method.is_adaptive() {
+        if self.solver.method.control() != StepControl::Fixed {
             return None;
         }
         let clearances = self.ball_joints.iter().filter(|j| j.contact.clearance > 0.0);
@@ -287,7 +281,7 @@ impl Machine {
             .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
         let (impact, friction) = duration;
         let duration = impact / friction;
-        let steps = least_impact_steps(self.solver.method) as f64;
+        let steps = LEAST_IMPACT_STEPS as f64;
         if self.solver.step <= duration / steps {
             return None;
         }
@@ -301,8 +295,6 @@ impl Machine {
             step: self.solver.step,
             duration,
             sliding: friction > 1.0,
-            // Imex Euler integrates force elements explicitly.
-            stable: self.solver.method == Method::ImexEuler && friction <= 1.0 && self.elements.is_empty(),
             recommended,
         })
     }

@@ -38,8 +38,6 @@ pub enum Doubt {
         duration: f64,
         /// Whether `duration` refers to sliding.
         sliding: bool,
-        /// Whether the method stays stable, though it does not resolve the impact.
-        stable: bool,
         /// A step that is short enough, s.
         recommended: f64,
     },
@@ -85,20 +83,15 @@ impl fmt::Display for Doubt {
                  times the velocity of the centres, so friction vanishes at low sliding speeds; surface uses the \
                  sliding velocity of the contact."
             ),
-            Self::Step { joint, step, duration, sliding, stable, recommended } => {
+            Self::Step { joint, step, duration, sliding, recommended } => {
                 let why = if *sliding {
                     format!("friction at ball joint {joint} is estimated to reverse the sliding in")
                 } else {
                     format!("an impact at ball joint {joint} is estimated to last")
                 };
-                let stays = if *stable {
-                    " (imex-euler stays stable, but its peak forces and rebounds are too low)"
-                } else {
-                    ""
-                };
                 write!(
                     f,
-                    "solver.step {}: {why} {}, which a fixed step this long does not resolve{stays}; use {} or less, or \
+                    "solver.step {}: {why} {}, which a fixed step this long does not resolve; use {} or less, or \
                      solver.method = automatic.",
                     format_quantity(*step, "us"),
                     format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),

@@ -15,7 +15,7 @@ mod settings;
 mod solid;
 
 pub use body::*;
-pub use check::{ContactConflict, ContactFault, MachineFault, least_impact_steps};
+pub use check::{ContactConflict, ContactFault, LEAST_IMPACT_STEPS, MachineFault};
 pub use conditions::Conditions;
 pub use doubts::*;
 pub use drive::*;

@@ -70,6 +70,8 @@ pub struct Solver {
     pub step: f64,
     /// Relative tolerance of an adaptive method.
     pub tolerance: f64,
+    /// Steps of the discrete-gradient method while a ball strikes its wall.
+    pub steps_per_impact: u32,
     /// Whether the energy ledger is kept.
     pub energy_ledger: bool,
 }
@@ -77,7 +79,14 @@ pub struct Solver {
 impl Default for Solver {
     /// Automatic selection of the method, at a tolerance of 1e-6.
     fn default() -> Self {
-        Self { preset: None, method: Method::Automatic, step: 10e-6, tolerance: 1e-6, energy_ledger: true }
+        Self {
+            preset: None,
+            method: Method::Automatic,
+            step: 10e-6,
+            tolerance: 1e-6,
+            steps_per_impact: 16,
+            energy_ledger: true,
+        }
     }
 }
 

@@ -29,9 +29,9 @@ pub enum CostOf {
     /// Closing the joints at the start.
     #[error("assembling the start")]
     Assembly,
-    /// The method that steps contacts implicitly.
-    #[error("solver.method imex-euler")]
-    ImplicitContacts,
+    /// Solving for the forces of contacts that act on one another.
+    #[error("solver.method discrete-gradient")]
+    CoupledContacts,
 }
 
 /// The quantity limited.
@@ -198,9 +198,9 @@ impl Cost {
         cost
     }
 
-    /// Cost of stepping contacts implicitly: `joints` contacts, each coupled with `reach` joints before and after it, with
+    /// Cost of solving for the forces of coupled contacts: `joints` contacts, each coupled with `reach` joints before and after it, with
     /// columns of `width` numbers in total.
-    pub fn of_implicit_contacts(joints: usize, reach: usize, width: usize) -> Self {
+    pub fn of_coupled_contacts(joints: usize, reach: usize, width: usize) -> Self {
         let (joints, reach, width) = (joints as u64, reach as u64, width as u64);
         let band = joints * (2 * reach + 1);
         // Entries: three 3 x 3 blocks; three columns, and ten numbers per Jacobian column. Products: one elimination, and the

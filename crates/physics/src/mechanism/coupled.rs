@@ -52,8 +52,8 @@ impl CoupledRows {
                 reach = reach.max(row - first_on[block]);
             }
         }
-        let cost = Cost::of_implicit_contacts(blocks.len(), reach, ranges.iter().map(ExactSizeIterator::len).sum());
-        cost.check(CostOf::ImplicitContacts, Advice::Method(Method::Automatic))?;
+        let cost = Cost::of_coupled_contacts(blocks.len(), reach, ranges.iter().map(ExactSizeIterator::len).sum());
+        cost.check(CostOf::CoupledContacts, Advice::Method(Method::Automatic))?;
         Ok(Self { ranges, reach })
     }
 

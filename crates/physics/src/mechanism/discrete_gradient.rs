@@ -17,7 +17,7 @@ use super::equations::Equations;
 use super::kinematics::Kinematics;
 use super::model::{Anchor, Model};
 use super::systems::Evaluator;
-use super::{Mechanism, MechanismError};
+use super::{Mechanism, MechanismError, elements};
 use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
 use crate::integrate::System as _;
 use crate::machine::{Mat3, Vec3};
@@ -53,6 +53,8 @@ struct Touch {
     step: ContactStep,
     /// Mean normal of the guessed motion, for the lever arms.
     normal: Vec3,
+    /// n . W M^-1 S^T n, 1/kg.
+    mobility: f64,
     /// Mean velocities with the guessed motion: of the centres, used by friction, and of the surfaces, m/s.
     guessed: [Vec3; 3],
     /// The first two without contact forces.
@@ -66,6 +68,9 @@ struct Touch {
     force: Vec3,
     force_before: Vec3,
     full_force: Vec3,
+    /// Mean normal force, N, and power dissipated by friction, W.
+    normal_force: f64,
+    friction_power: f64,
 }
 
 impl Touch {
@@ -76,6 +81,7 @@ impl Touch {
             law,
             step: ContactStep::default(),
             normal: Vec3::zeros(),
+            mobility: 0.0,
             guessed: [Vec3::zeros(); 3],
             free: zero,
             added: zero,
@@ -85,6 +91,8 @@ impl Touch {
             force: Vec3::zeros(),
             force_before: Vec3::zeros(),
             full_force: Vec3::zeros(),
+            normal_force: 0.0,
+            friction_power: 0.0,
         }
     }
 
@@ -141,6 +149,8 @@ struct JointStart {
     slip: Vec3,
     /// Clearances at both ends of the step, m.
     clearances: [f64; 2],
+    /// Elastic energy with the clearance at the start, J.
+    stored: f64,
 }
 
 /// The start of a step.
@@ -156,8 +166,6 @@ pub struct StepStart<'a> {
     pub k: &'a [f64],
     /// Contact states.
     pub contact_states: &'a [ContactState],
-    /// Whether each contact has lasted beyond its first rebound: ringing that the step does not resolve is then damped.
-    pub lasting: &'a [bool],
 }
 
 impl DiscreteGradient {
@@ -212,6 +220,7 @@ impl DiscreteGradient {
                 rate: gap.separation.rate,
                 slip: contacts.slip_velocity(j, &gap.separation.normal, motion),
                 clearances: [contacts.clearance(j); 2],
+                stored: contacts.coefficients(j).elastic_energy(gap.separation.penetration),
             };
         }
     }
@@ -242,8 +251,6 @@ impl DiscreteGradient {
                 } else {
                     law.speed_floor.max(start.rate)
                 },
-                lasting: contact_state.active && from.lasting[j],
-                mobility: 0.0,
             };
             let mean = (end - start.eccentricity) / from.h;
             let normal = step.mean_normal(&mean);
@@ -330,7 +337,7 @@ impl DiscreteGradient {
                 self.mobility[band.at(i, j)] = mobility_between(columns, weighted, range, surface);
             }
             let touch = &mut self.touches[i];
-            touch.step.mobility = touch.normal.dot(&(self.mobility[band.at(i, i)][0] * touch.normal));
+            touch.mobility = touch.normal.dot(&(self.mobility[band.at(i, i)][0] * touch.normal));
         }
     }
 
@@ -490,7 +497,23 @@ impl Mechanism {
     pub fn contact_mobility(&self, j: usize) -> Option<f64> {
         let touches = &self.discrete.as_ref()?.touches;
         let touch = touches.binary_search_by_key(&j, |touch| touch.row).ok()?;
-        Some(touches[touch].step.mobility)
+        Some(touches[touch].mobility)
+    }
+
+    /// Derivative of the velocities without contact forces at the middle of the latest such step.
+    pub fn contact_free_acceleration(&self) -> &[f64] {
+        let positions = self.positions();
+        self.discrete.as_ref().map_or(&[], |discrete| &discrete.rate[positions..])
+    }
+
+    /// The ball joints that touched in the latest such step, with the means over it; directions are those of the latest evaluation.
+    pub fn discrete_touches(&self) -> impl Iterator<Item = (usize, elements::Touch)> {
+        let touches = self.discrete.iter().flat_map(|discrete| &discrete.touches);
+        let contacts = touches.filter_map(|touch| Some((touch.contact()?.0, touch)));
+        contacts.filter(|(_, touch)| touch.normal_force > 0.0).map(|(joint, touch)| {
+            let (normal_force, friction_power) = (touch.normal_force, touch.friction_power);
+            (joint, elements::Touch { direction: self.wall_direction(joint), normal_force, friction_power })
+        })
     }
 
     /// Powers over the latest such step.
@@ -579,18 +602,11 @@ impl Evaluator<'_> {
 
     /// Powers over the step: of the contacts from the work of their forces, of everything else at the middle.
     fn find_discrete_powers(&mut self, discrete: &mut DiscreteGradient, from: &StepStart<'_>) {
-        let mut powers = Powers::default();
-        if self.mechanism.sources.none {
-            discrete.powers = powers;
-            return;
-        }
         let (t, h) = (from.t + 0.5 * from.h, from.h);
         let Mechanism { model, equations, elements, sources, gravity, contacts, .. } = &mut *self.mechanism;
         let positions = equations.positions(model);
-        for element in elements.iter() {
-            element.add_powers(t, equations.motion(), &mut powers);
-        }
-        for touch in &discrete.touches {
+        let mut powers = Powers::default();
+        for touch in &mut discrete.touches {
             let Some((joint, _)) = touch.contact() else {
                 continue;
             };
@@ -602,9 +618,20 @@ impl Evaluator<'_> {
             let start = touch.step.start.norm() - touch.step.clearances[0];
             let law = contacts.coefficients(joint);
             let stored = law.elastic_energy(end) - law.elastic_energy(start);
+            touch.normal_force = normal;
+            touch.friction_power = -(touch.force + n * normal).dot(&s);
             powers.restitution += (normal * (end - start) - stored) / h;
-            powers.friction -= (touch.force + n * normal).dot(&s);
-            powers.clearance -= normal * (touch.step.clearances[1] - touch.step.clearances[0]) / h;
+            powers.friction += touch.friction_power;
+            // A clearance that shrinks also stiffens the contact.
+            let stiffened = law.elastic_energy(start) - discrete.starts[joint].stored;
+            powers.clearance += (stiffened - normal * (touch.step.clearances[1] - touch.step.clearances[0])) / h;
+        }
+        if sources.none {
+            discrete.powers = powers;
+            return;
+        }
+        for element in elements.iter() {
+            element.add_powers(t, equations.motion(), &mut powers);
         }
         if !model.drives.is_empty() {
             let (motion, wrench) = equations.loads();
@@ -621,7 +648,7 @@ impl Evaluator<'_> {
                 socket.force -= touch.force;
                 socket.torque -= (arm_socket + n * (law.ball_radius + law.clearance)).cross(&touch.force);
             }
-            let rates = &mut discrete.rate[positions..];
+            let rates = &mut discrete.end[positions..];
             if equations.rows() > 0 {
                 // The reactions of the ideal joints to the contact forces, too.
                 equations.accelerate(model, gravity, t, &discrete.middle, rates);
@@ -683,15 +710,7 @@ mod tests {
 
         /// Takes a step of size `h`, s; contact states follow the penetrations.
         fn step(&mut self, h: f64) {
-            let lasting = vec![false; self.contact_states.len()];
-            let from = StepStart {
-                t: self.t,
-                h,
-                y: &self.y,
-                k: &self.k,
-                contact_states: &self.contact_states,
-                lasting: &lasting,
-            };
+            let from = StepStart { t: self.t, h, y: &self.y, k: &self.k, contact_states: &self.contact_states };
             let mut end = self.y.clone();
             let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.contact_states));
             assert!(evaluator.discrete_step(&from, false, &mut end), "converges");

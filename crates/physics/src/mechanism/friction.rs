@@ -196,8 +196,8 @@ impl Friction {
         let trees = of.iter().map(|(_, ranges)| ranges.iter().copied());
         let reach = reach_of(trees, &mut friction.first_on);
         let widths = of.iter().flat_map(|(_, ranges)| ranges).map(width).sum();
-        Cost::of_implicit_contacts(of.len(), reach, widths)
-            .check(CostOf::ImplicitContacts, Advice::Method(Method::DormandPrince5))?;
+        Cost::of_coupled_contacts(of.len(), reach, widths)
+            .check(CostOf::CoupledContacts, Advice::Method(Method::DormandPrince5))?;
         let touch = |(joint, ranges): (usize, Vec<(usize, usize)>)| Touch {
             joint,
             law: *contacts.coefficients(joint),

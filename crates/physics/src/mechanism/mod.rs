@@ -20,7 +20,6 @@ mod factor;
 mod flight;
 mod forest;
 mod friction;
-mod implicit;
 mod kinematics;
 mod lagrange;
 mod lu;
@@ -279,7 +278,6 @@ pub struct Mechanism {
     /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once overwritten.
     evaluated: Option<f64>,
     /// Allocated if only the contacts are stepped implicitly.
-    implicit: Option<Box<implicit::ImplicitContacts>>,
     /// Workspace of the discrete-gradient step.
     discrete: Option<Box<discrete_gradient::DiscreteGradient>>,
     /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
@@ -329,7 +327,6 @@ impl Mechanism {
             joint_names: machine.cut_joints().map(str::to_owned).collect(),
             stiff: None,
             friction: None,
-            implicit: None,
             discrete: None,
             free_flight_bodies: Vec::new(),
             moving: ActiveRanges::default(),
@@ -725,20 +722,6 @@ impl Mechanism {
     /// Maximum number of velocity coordinates for which the automatic choice considers implicit steps.
     pub fn largest_implicit(&self) -> usize {
         if self.equations.is_block_diagonal() { LARGEST_DENSE } else { bounds::LARGEST_COUPLED }
-    }
-
-    /// Allocates the workspace of [`ContactSystem`](crate::integrate::ContactSystem), so that steps do not allocate.
-    ///
-    /// # Errors
-    /// The contacts are coupled too widely.
-    pub fn prepare_implicit_contacts(&mut self) -> Result<(), MechanismError> {
-        if self.implicit.is_none() {
-            let velocities = self.dimension() - self.positions();
-            let blocks = self.equations.is_block_diagonal();
-            let contacts = implicit::ImplicitContacts::new(&self.model, velocities, blocks)?;
-            self.implicit = Some(Box::new(contacts));
-        }
-        Ok(())
     }
 
     /// Contents of the scene, and the computations it needs.

@@ -2,10 +2,9 @@
 
 use super::elements::{ActiveSet, Counts};
 use super::elements::{At, Loads};
-use super::implicit::TURNS;
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
-use crate::integrate::{ContactSystem, FrictionSystem, Rosenbrock, StiffSystem, System};
+use crate::integrate::{FrictionSystem, Rosenbrock, StiffSystem, System};
 use std::ops::Range;
 
 /// The equations of motion, with the contacts that may carry a force during a step.
@@ -240,38 +239,5 @@ impl StiffSystem for FrictionJacobian<'_, '_> {
     fn time_derivative(&self) -> &[f64] {
         let friction = self.0.mechanism.friction.as_ref();
         friction.map_or(&[], |friction| &friction.time_derivative)
-    }
-}
-
-impl ContactSystem for Evaluator<'_> {
-    fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        let touching = std::mem::replace(&mut self.touching, ActiveSet::Nothing);
-        self.derivative(t, y, dy);
-        self.touching = touching;
-    }
-
-    fn contact_velocity_change(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool {
-        let positions = self.positions();
-        // Close ideal joints first: contact forces depend on distances smaller than the drift of these joints.
-        self.mechanism.project(t, y);
-        self.mechanism.measure(t, y);
-        // Any error was reported when the method was chosen.
-        let _ = self.mechanism.prepare_implicit_contacts();
-        let Mechanism { model, equations, contacts, implicit, .. } = &mut *self.mechanism;
-        let Some(implicit) = implicit else {
-            return false;
-        };
-        let touches = implicit.gather(model, contacts, self.touching);
-        if touches {
-            for _ in 0..TURNS {
-                implicit.arrange(model, contacts, &**equations);
-                if !implicit.solve(model, h, &mut **equations, &mut self.counts) {
-                    break;
-                }
-            }
-            dv.fill(0.0);
-            implicit.push(h, &mut dv[positions..]);
-        }
-        touches
     }
 }

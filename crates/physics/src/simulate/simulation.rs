@@ -5,6 +5,7 @@ mod adaptive;
 mod automatic;
 mod contacts;
 mod corners;
+mod discrete;
 mod displace;
 mod doubts;
 mod edges;
@@ -32,7 +33,7 @@ use super::stepper::{ActiveScheme, AnyStepper};
 use super::{
     Doubt, Effect, Frame, Impact, Indeterminate, Ledger, LoadPeaks, Peak, StartError, Statistics, Stopped, Wear,
 };
-use crate::contact::ContactState;
+use crate::contact::{ContactPhase, ContactState};
 use crate::integrate::{Controller, Polynomial};
 use crate::machine::{Conditions, Machine, Vec3};
 use crate::mechanism::{self, Counts, ElementReport, Flight, Mechanism, Pull, Ramp};
@@ -158,6 +159,21 @@ struct Control {
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
     grid_origin: f64,
     grid_count: u64,
+    discrete: DiscreteControl,
+}
+
+/// Step control of the discrete-gradient method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct DiscreteControl {
+    /// Effect of a unit normal force at each ball joint on its opening, at its latest contact, 1/kg.
+    mobility: Vec<f64>,
+    /// Phases of the contacts.
+    phases: Vec<ContactPhase>,
+    /// The latest step, s, and the derivative of the velocities without contact forces at its middle; no step yet if 0.
+    h: f64,
+    acceleration: Vec<f64>,
+    /// Longest step for which forces other than contact forces change little enough, s.
+    smooth: f64,
 }
 
 /// Diagnostics of the run so far.

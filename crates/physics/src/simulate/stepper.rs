@@ -3,14 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use crate::integrate::{
-    ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock, RungeKutta4,
-    SemiImplicitEuler, Stepper, StiffSystem, System, hermite,
+    DormandPrince, FrictionSystem, Method, Polynomial, Radau, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper,
+    StiffSystem, System, hermite,
 };
 use std::ops::Range;
 
 pub(super) enum AnyStepper {
     SemiImplicitEuler(SemiImplicitEuler),
-    ImexEuler(ImexEuler),
+    /// The equations take the whole step.
+    DiscreteGradient,
     RungeKutta4(RungeKutta4),
     DormandPrince(DormandPrince),
     Rosenbrock(Box<Rosenbrock>),
@@ -40,7 +41,7 @@ impl AnyStepper {
     pub(super) fn new(method: Method, dimension: usize) -> Self {
         match method {
             Method::SemiImplicitEuler => Self::SemiImplicitEuler(SemiImplicitEuler::new(dimension)),
-            Method::ImexEuler => Self::ImexEuler(ImexEuler::new(dimension)),
+            Method::DiscreteGradient => Self::DiscreteGradient,
             Method::RungeKutta4 => Self::RungeKutta4(RungeKutta4::new(dimension)),
             Method::DormandPrince5 => Self::DormandPrince(DormandPrince::new(dimension)),
             Method::Rosenbrock => Self::Rosenbrock(Box::new(Rosenbrock::new(dimension))),
@@ -58,7 +59,7 @@ impl AnyStepper {
     pub(super) fn method(&self) -> Method {
         match self {
             Self::SemiImplicitEuler(_) => Method::SemiImplicitEuler,
-            Self::ImexEuler(_) => Method::ImexEuler,
+            Self::DiscreteGradient => Method::DiscreteGradient,
             Self::RungeKutta4(_) => Method::RungeKutta4,
             Self::DormandPrince(_) => Method::DormandPrince5,
             Self::Rosenbrock(_) => Method::Rosenbrock,
@@ -118,7 +119,7 @@ impl AnyStepper {
         }
     }
 
-    pub(super) fn attempt<S: StiffSystem + ContactSystem + FrictionSystem>(
+    pub(super) fn attempt<S: StiffSystem + FrictionSystem>(
         &mut self,
         system: &mut S,
         t: f64,
@@ -132,7 +133,7 @@ impl AnyStepper {
     ) -> f64 {
         match self {
             Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::ImexEuler(s) => s.attempt(system, t, h, y, y_end),
+            Self::DiscreteGradient => unreachable!("the equations take this step"),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
                 s.attempt(system, t, h, y, k, y_end, k_end)
@@ -183,12 +184,12 @@ impl AnyStepper {
 
     /// Whether `attempt` provides the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
-        !matches!(self, Self::SemiImplicitEuler(_) | Self::ImexEuler(_) | Self::RungeKutta4(_))
+        !matches!(self, Self::SemiImplicitEuler(_) | Self::DiscreteGradient | Self::RungeKutta4(_))
     }
 
     /// Whether rates are difference quotients over the step: no step needs a derivative at its end.
     pub(super) fn has_mean_rates(&self) -> bool {
-        matches!(self, Self::ImexEuler(_))
+        matches!(self, Self::DiscreteGradient)
     }
 
     /// Interpolates the components `part` of the state at fraction `theta` of the latest attempt into those of `out`.
@@ -206,7 +207,7 @@ impl AnyStepper {
     ) {
         match self {
             Self::SemiImplicitEuler(_)
-            | Self::ImexEuler(_)
+            | Self::DiscreteGradient
             | Self::RungeKutta4(_)
             | Self::Rosenbrock(_)
             | Self::Automatic { member: ActiveScheme::Friction, .. } => {

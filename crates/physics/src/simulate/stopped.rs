@@ -73,6 +73,12 @@ pub enum StopFault {
     /// Accelerations that are not finite.
     #[error("the accelerations are not finite")]
     NotFinite,
+    /// A step over which no contact forces were found.
+    #[error("no contact forces were found that satisfy a step of {shortest:.0e} s")]
+    NoForces {
+        /// Shortest step tried at this time, s.
+        shortest: f64,
+    },
     /// A step size as small as rounding.
     #[error("the step size that the tolerance asks for fell below {shortest:.0e} s")]
     ShortStep {
@@ -99,6 +105,9 @@ pub enum StopAdvice {
         /// Current value, s.
         step: f64,
     },
+    /// The method does not suit the scene.
+    #[error("try solver.method = automatic, or else a softer contact")]
+    OtherMethod,
     /// A tolerance that cannot be met in this scene.
     #[error("try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene")]
     LooserTolerance {

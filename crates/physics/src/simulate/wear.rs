@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::machine::{BallJoint, Machine, Mat3, Vec3};
-use crate::mechanism::Mechanism;
+use crate::mechanism::{Mechanism, Touch};
 
 /// Cells on each socket: about 14 degrees across.
 const CELLS: usize = 200;
@@ -262,16 +262,16 @@ impl Wear {
     pub(super) fn read(&mut self, instant: usize, mechanism: &Mechanism) {
         for joint in 0..self.sockets.len() {
             if let Some(touch) = mechanism.touch(joint) {
-                let cell = self.cell(joint, &touch.direction);
-                self.presses.push(Press {
-                    instant,
-                    joint,
-                    cell,
-                    normal_force: touch.normal_force,
-                    friction_power: touch.friction_power,
-                });
+                self.press(instant, joint, &touch);
             }
         }
+    }
+
+    /// Records the forces of ball joint `joint` at node `instant` of the step.
+    pub(super) fn press(&mut self, instant: usize, joint: usize, touch: &Touch) {
+        let cell = self.cell(joint, &touch.direction);
+        let Touch { normal_force, friction_power, .. } = *touch;
+        self.presses.push(Press { instant, joint, cell, normal_force, friction_power });
     }
 
     /// Records that a contact of `joint` begins in `direction`, in the axes of the socket's body.

@@ -262,8 +262,8 @@ pub(in crate::simulate) fn prepare_implicit(mechanism: &mut Mechanism, method: M
     if mechanism.is_kinematic() {
         return Ok(());
     }
-    if method == Method::ImexEuler {
-        mechanism.prepare_implicit_contacts()?;
+    if method == Method::DiscreteGradient {
+        mechanism.prepare_discrete_gradient()?;
     }
     if method.is_implicit() && velocities > LARGEST_DENSE {
         return Err(MechanismError::TooLarge { velocities, most: LARGEST_DENSE });

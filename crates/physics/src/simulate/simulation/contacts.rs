@@ -3,7 +3,8 @@
 use super::search::NEAR_PEAK;
 use super::{Run, State};
 use crate::contact::{Coefficients, ContactState, Separation};
-use crate::machine::least_impact_steps;
+use crate::integrate::StepControl;
+use crate::machine::LEAST_IMPACT_STEPS;
 use crate::simulate::peaks::PenetrationCubic;
 
 /// Largest penetration, as a fraction of the clearance, of a ball that is at its wall to within rounding.
@@ -116,7 +117,7 @@ impl Run<'_> {
         let fixed = !self.locates();
         let Self { mechanism, state, before, attempt, .. } = self;
         let strongest = &attempt.strongest;
-        let least = least_impact_steps(state.conditions.solver.method);
+        let counts_steps = state.conditions.solver.method.control() == StepControl::Fixed;
         let mut switched = Switched { contacts: false, forces: false };
         for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
@@ -185,7 +186,7 @@ impl Run<'_> {
                         statistics.astray[j] = Some(impact);
                     }
                 }
-                let coarse = fixed && steps < least;
+                let coarse = counts_steps && steps < LEAST_IMPACT_STEPS;
                 state.record.statistics.coarse[j] += u64::from(coarse);
                 state.now.contact_states[j] = ContactState::default();
                 state.record.statistics.last_separation[j] = Some(state.now.t);

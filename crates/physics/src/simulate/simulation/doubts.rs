@@ -3,7 +3,7 @@
 use super::{Model, State};
 use crate::contact::{Coefficients, FrictionVelocity, settled_penetration};
 use crate::integrate::Method;
-use crate::machine::{BallJoint, Machine, least_impact_steps};
+use crate::machine::{BallJoint, LEAST_IMPACT_STEPS, Machine};
 use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
 
 /// Fraction of a joint's contacts that may be slower than the floor.
@@ -58,7 +58,7 @@ impl Examined<'_> {
             joints,
             short: statistics.coarse[j],
             contacts: statistics.impacts[j],
-            steps: least_impact_steps(self.machine.solver.method),
+            steps: LEAST_IMPACT_STEPS,
         }));
         let floored = self.worst(MOST_FLOORED, |j| part(&statistics.floored, j));
         doubts.extend(floored.map(|(joints, j)| Doubt::Floored {

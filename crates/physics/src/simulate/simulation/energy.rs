@@ -1,6 +1,7 @@
 //! Energy ledger of a running simulation, from powers at a few instants of each accepted step.
 
 use super::{Record, Run, State};
+use crate::integrate::Method;
 use crate::mechanism::{ActiveSet, Mechanism, Powers};
 use crate::simulate::ledger::{Account, Energies, weights};
 use crate::simulate::{Frame, Ledger};
@@ -46,7 +47,19 @@ impl Run<'_> {
             mechanism.measure(state.now.t, &state.now.y);
         }
         let energies = energies(mechanism, state);
-        if mechanism.has_powers() {
+        if state.conditions.solver.method == Method::DiscreteGradient && !mechanism.is_kinematic() {
+            let account = &mut state.record.account;
+            account.course.clear();
+            account.course.push(0.5, mechanism.discrete_powers());
+            account.powers = None;
+            self.begin_wear_of_step(false);
+            if let Some(wear) = &mut self.state.record.wear {
+                for (joint, touch) in self.mechanism.discrete_touches() {
+                    wear.press(0, joint, &touch);
+                }
+                wear.book(h, &[1.0]);
+            }
+        } else if mechanism.has_powers() {
             // Powers may jump at an edge at the step's end: use those on the step's side.
             if self.attempt.edge {
                 mechanism.hold_elements(&self.attempt.sides);
@@ -59,7 +72,11 @@ impl Run<'_> {
             if self.state.record.wear.is_some() {
                 let touching = ActiveSet::by(located, &self.before.contact_states);
                 self.mechanism.complete_gaps(touching, &self.state.now.y);
-                self.begin_wear_of_step();
+                let (instants, known) = (self.stepper.quadrature(), self.state.record.account.powers.is_some());
+                self.begin_wear_of_step(instants[0] == 0.0 && known);
+                if let Some(wear) = &mut self.state.record.wear {
+                    wear.read(instants.len() - 1, self.mechanism);
+                }
             }
             self.lay_out_course(h, end);
             self.mechanism.hold_elements(&[]);
@@ -76,22 +93,20 @@ impl Run<'_> {
         }
     }
 
-    /// Starts recording the step just accepted in the wear map: the contacts that began at its end, and the forces there, from
-    /// the latest evaluation.
-    fn begin_wear_of_step(&mut self) {
-        let Self { before, state, mechanism, stepper, .. } = self;
+    /// Starts recording the step just accepted in the wear map, with the contacts that began at its end. If `goes_on`, the forces at the
+    /// end of the previous step are reused.
+    fn begin_wear_of_step(&mut self, goes_on: bool) {
+        let Self { before, state, mechanism, .. } = self;
         let State { now, record, .. } = &mut **state;
         let Some(wear) = &mut record.wear else {
             return;
         };
-        let instants = stepper.quadrature();
-        wear.begin_step(instants[0] == 0.0 && record.account.powers.is_some());
+        wear.begin_step(goes_on);
         for (j, (before, now)) in before.contact_states.iter().zip(&now.contact_states).enumerate() {
             if now.active && !before.active {
                 wear.begin_contact(j, &mechanism.wall_direction(j));
             }
         }
-        wear.read(instants.len() - 1, mechanism);
     }
 
     /// Chooses the quadrature nodes for the works of the step just accepted; `end` are the powers at its end.

@@ -1,7 +1,9 @@
 //! Everything about a run that changes.
 
 use super::automatic::{SchemeSelector, controller_of};
-use super::{Control, FIRST_CONTACT_STEP, Follows, LONGEST_STEP, Model, Record, State, StateMismatch, StepEnd};
+use super::{
+    Control, DiscreteControl, FIRST_CONTACT_STEP, Follows, LONGEST_STEP, Model, Record, State, StateMismatch, StepEnd,
+};
 use crate::contact::ContactState;
 use crate::integrate::Polynomial;
 use crate::machine::Conditions;
@@ -62,6 +64,7 @@ impl State {
                 controller: controller_of(solver.method, ActiveScheme::Explicit),
                 grid_origin: 0.0,
                 grid_count: 0,
+                discrete: DiscreteControl::new(mechanism),
             },
             polynomial: Polynomial::new(AnyStepper::polynomial_size(solver.method, y.len())),
             record: Record {
@@ -214,6 +217,7 @@ impl State {
             && worn.is_none_or(|wear| wear.fits(model.machine()))
             && record.reactions.len() == joints
             && record.contact_steps.len() == joints
+            && self.control.discrete.fits(&own.control.discrete)
             && record.peaks.len() == joints
             && self.sampled.len() == joints
             && self.loads.as_ref().is_none_or(|loads| loads.fits(&LoadPeaks::new(model.machine())));

@@ -1,11 +1,12 @@
 //! Steps of a state: start, fixed and kinematic steps, and what every accepted step does.
 
+use super::discrete::discrete_size;
 use super::flights::{clear_flights, put_flights};
 use super::{
     Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, OTHER_BRANCH, Run, SHORTEST_KINEMATIC_STEP, State, StepEnd,
     Workspace, store_gaps,
 };
-use crate::integrate::System as _;
+use crate::integrate::{Method, StepControl, System as _};
 use crate::machine::Machine;
 use crate::mechanism::{ActiveSet, Counts, Mechanism, MechanismError};
 use crate::simulate::peaks::Recent;
@@ -149,6 +150,8 @@ impl Run<'_> {
                 self.forget_flown();
             }
             step?;
+        } else if self.state.conditions.solver.method == Method::DiscreteGradient {
+            self.discrete_step(follows_drives)?;
         } else {
             self.fixed_step(limit)?;
         }
@@ -264,10 +267,12 @@ impl Run<'_> {
             let solver = &self.state.conditions.solver;
             let advice = if passed || open.is_nan() || open > OPEN_LOOP {
                 StopAdvice::Dependent
-            } else if solver.method.is_adaptive() {
-                StopAdvice::GentlerMotion { tolerance: solver.tolerance }
             } else {
-                StopAdvice::ShorterStep { step: solver.step }
+                match solver.method.control() {
+                    StepControl::Error => StopAdvice::GentlerMotion { tolerance: solver.tolerance },
+                    StepControl::Fixed => StopAdvice::ShorterStep { step: solver.step },
+                    StepControl::PerImpact => StopAdvice::OtherMethod,
+                }
             };
             return Err(self.stopped(fault, advice));
         }
@@ -336,6 +341,9 @@ pub(super) fn is_cut_by(state: &State, mechanism: &Mechanism, end: f64) -> bool 
         (t + h, h)
     } else if solver.method.is_adaptive() {
         let h = control.h_next.min(LONGEST_STEP);
+        (t + h, h)
+    } else if solver.method == Method::DiscreteGradient {
+        let h = discrete_size(state, mechanism);
         (t + h, h)
     } else {
         let next = (control.grid_count + 1) as f64;

@@ -1,0 +1,197 @@
+//! Steps of the discrete-gradient method: a number of them while a ball strikes its wall, longer ones otherwise.
+//!
+//! A step is no longer than
+//! - the Hertz time of an impact over `steps_per_impact`, while a ball strikes faster than [`SLOW`];
+//! - the arrival of such a ball at its wall, or that part of its Hertz time if it arrives sooner;
+//! - a period of the ringing of a ball on its wall ([`RINGING`]), as longer steps alternate instead of following it;
+//! - the step at which forces other than contact forces move the mechanism by [`SMOOTH`] of its scales more or less than the midpoint
+//!   rule says, from their change since the step before;
+//! - [`LONGEST`].
+//!
+//! Beyond [`COARSE`] steps per impact the last three shrink, too, so that the motion converges.
+
+use std::f64::consts::PI;
+
+use super::{DiscreteControl, NEARLY, Run, State, StepEnd, store_gaps};
+use crate::contact::ContactPhase;
+use crate::mechanism::{ActiveSet, Counts, Mechanism, StepStart};
+use crate::simulate::peaks::PenetrationCubic;
+use crate::simulate::{StopAdvice, StopFault, Stopped};
+
+/// Steps per impact beyond which all steps shrink.
+const COARSE: f64 = 16.0;
+/// Longest step, s.
+const LONGEST: f64 = 0.5e-3;
+/// Shortest step, s, unless an iteration does not converge.
+const SHORTEST: f64 = 2e-7;
+/// Largest growth from one step to the next, and largest shrinkage for the sake of other forces.
+const GROWTH: f64 = 4.0;
+const SHRINKAGE: f64 = 0.3;
+/// Attempts of one step.
+const ATTEMPTS: u32 = 12;
+/// Shortest repeated step, relative to the step repeated.
+const LEAST_PART: f64 = 0.05;
+/// Speed of an impact below which it is stepped like ringing, m/s.
+const SLOW: f64 = 5e-3;
+/// Half periods of ringing in a step.
+const RINGING: f64 = 2.0;
+/// Error of a step due to forces other than contact forces, relative to the scales of the positions.
+const SMOOTH: f64 = 1e-7;
+/// Scales of the velocities are those of the positions in this time, s.
+const SCALE_TIME: f64 = 0.1;
+/// Duration of an undamped impact over (5 m v^2 / 4 K)^0.4 / v (Goldsmith, *Impact*, 1960, section 4.2).
+const HERTZ: f64 = 2.943_2;
+
+impl DiscreteControl {
+    /// At the start, where any joint may touch for the first time.
+    pub(super) fn new(mechanism: &Mechanism) -> Self {
+        let joints = mechanism.contacts.len();
+        Self {
+            mobility: (0..joints).map(|j| mechanism.most_contact_mobility(j)).collect(),
+            phases: vec![ContactPhase::default(); joints],
+            h: 0.0,
+            acceleration: vec![0.0; mechanism.dimension() - mechanism.positions()],
+            smooth: f64::INFINITY,
+        }
+    }
+
+    /// Whether it has the dimensions of `own`.
+    pub(super) fn fits(&self, own: &Self) -> bool {
+        let sizes = |control: &Self| [control.mobility.len(), control.phases.len(), control.acceleration.len()];
+        sizes(self) == sizes(own)
+    }
+
+    /// Duration of an impact of joint `j` at `speed`, m/s, in s.
+    fn hertz_time(&self, mechanism: &Mechanism, j: usize, speed: f64) -> f64 {
+        let (mass, stiffness) = (1.0 / self.mobility[j], mechanism.contacts.coefficients(j).stiffness);
+        HERTZ * libm::pow(1.25 * mass * speed * speed / stiffness, 0.4) / speed
+    }
+
+    /// Half a period of the ringing of joint `j` about `penetration`, m, in s.
+    fn half_period(&self, mechanism: &Mechanism, j: usize, penetration: f64) -> f64 {
+        let stiffness = 1.5 * mechanism.contacts.coefficients(j).stiffness * penetration.sqrt();
+        PI / (stiffness * self.mobility[j]).sqrt()
+    }
+
+    /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
+    fn record(&mut self, mechanism: &Mechanism, h: f64, now: &StepEnd, finer: f64) {
+        for (j, phase) in self.phases.iter_mut().enumerate() {
+            let touches = now.contact_states[j].active;
+            *phase = if touches { phase.after(now.gaps[j].rate) } else { ContactPhase::default() };
+            if let Some(found) = mechanism.contact_mobility(j) {
+                self.mobility[j] = found;
+            }
+        }
+        // The midpoint rule errs by h^3 / 12 times the rate at which the acceleration changes.
+        let scale = mechanism.scale()[mechanism.positions()..].iter();
+        let accelerations = self.acceleration.iter_mut().zip(mechanism.contact_free_acceleration());
+        let mut error = 0.0_f64;
+        for ((old, new), scale) in accelerations.zip(scale) {
+            error = error.max((new - *old).abs() / (SCALE_TIME * scale));
+            *old = *new;
+        }
+        error *= h * h * h / (6.0 * (h + self.h));
+        let compares = self.h > 0.0 && error > 0.0;
+        self.smooth = if compares { h * libm::cbrt(SMOOTH / (finer * finer * error)).max(SHRINKAGE) } else { f64::INFINITY };
+        self.h = h;
+    }
+}
+
+/// Steps of a run over those of the coarse ones, at least 1.
+fn finer(state: &State) -> f64 {
+    (f64::from(state.conditions.solver.steps_per_impact) / COARSE).max(1.0)
+}
+
+/// Size of the next step, s.
+pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
+    let control = &state.control.discrete;
+    let parts = f64::from(state.conditions.solver.steps_per_impact);
+    let (longest, periods) = (LONGEST / finer(state), RINGING / finer(state));
+    let mut h = longest.min(control.smooth);
+    for (j, (gap, contact_state)) in state.now.gaps.iter().zip(&state.now.contact_states).enumerate() {
+        if !mechanism.contacts.has_clearance(j) {
+            continue;
+        }
+        if contact_state.active && gap.penetration > 0.0 {
+            if control.phases[j] != ContactPhase::Lasting && contact_state.approach_speed > SLOW {
+                h = h.min(control.hertz_time(mechanism, j, contact_state.approach_speed) / parts);
+            }
+            h = h.min(periods * control.half_period(mechanism, j, gap.penetration));
+        } else if gap.rate > SLOW {
+            let arrival = -gap.penetration / gap.rate;
+            if arrival < h {
+                h = h.min(arrival.max(control.hertz_time(mechanism, j, gap.rate) / parts));
+            }
+        }
+    }
+    h.min(GROWTH * state.control.h_next).max(SHORTEST)
+}
+
+impl Run<'_> {
+    /// Takes a step that ends no later than `limit`, s.
+    pub(super) fn discrete_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        self.attempt.counts = Counts::default();
+        let t = self.state.now.t;
+        let mut h = discrete_size(self.state, self.mechanism);
+        let mut all = false;
+        for attempt in 1.. {
+            let t_end = if t + h >= limit - NEARLY * h { limit } else { t + h };
+            let size = t_end - t;
+            let now = &self.state.now;
+            let from = StepStart { t, h: size, y: &now.y, k: &now.k, contact_states: &now.contact_states };
+            let mut evaluator = self.mechanism.evaluator(ActiveSet::by(false, &now.contact_states));
+            let converged = evaluator.discrete_step(&from, all, &mut self.attempt.end.y);
+            self.attempt.counts += evaluator.counts;
+            let part = if converged { self.part_to_repeat(t_end, size, &mut all) } else { Some(0.5) };
+            match part {
+                Some(part) if attempt < ATTEMPTS => {
+                    h = size * part;
+                    self.state.record.statistics.rejected += 1;
+                }
+                _ if !converged => {
+                    return Err(self.stopped(StopFault::NoForces { shortest: size }, StopAdvice::OtherMethod));
+                }
+                _ => {
+                    self.accept(t_end, size)?;
+                    let finer = finer(self.state);
+                    let State { now, control, .. } = &mut *self.state;
+                    control.h_next = if t_end == limit { h } else { size };
+                    control.discrete.record(self.mechanism, size, now, finer);
+                    return Ok(());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The part of the step of size `h` just attempted that must be taken in its place, if any: an impact began in it that it does not
+    /// resolve. Sets `all` if the step left out a joint that touches.
+    fn part_to_repeat(&mut self, t_end: f64, h: f64, all: &mut bool) -> Option<f64> {
+        let Self { mechanism, state, attempt, .. } = self;
+        let end = &mut attempt.end;
+        mechanism.measure(t_end, &end.y);
+        store_gaps(mechanism, &mut end.gaps);
+        let control = &state.control.discrete;
+        let parts = f64::from(state.conditions.solver.steps_per_impact);
+        let mut part = 1.0_f64;
+        for (j, (start, end)) in state.now.gaps.iter().zip(&end.gaps).enumerate() {
+            if !mechanism.contacts.has_clearance(j) || start.penetration > 0.0 || end.penetration <= 0.0 {
+                continue;
+            }
+            if mechanism.contact_mobility(j).is_none() {
+                *all = true;
+                return Some(1.0);
+            }
+            let course = PenetrationCubic::new(*start, *end, h);
+            let theta = course.crossing();
+            let speed = course.at(theta).1;
+            if speed > SLOW {
+                let longest = control.hertz_time(mechanism, j, speed) / parts;
+                if h - theta * h > longest {
+                    part = part.min((theta * h).max(longest) / h);
+                }
+            }
+        }
+        (part < 1.0).then(|| part.max(LEAST_PART))
+    }
+}

@@ -1,0 +1,203 @@
+//! The discrete-gradient method against the laws, the adaptive methods and its own promises: it creates no energy, settled forces are
+//! right, and peaks and losses come within what its steps per impact promise.
+
+use crate::common::{Changes, MACHINES, SCENES, frame_now, free_ball, live, mean_forces, parse, run_until, simulation};
+use jointplay::contact::{NormalLaw, damping_factor, undisturbed_restitution};
+use jointplay::scene::LiveScene;
+use jointplay::simulate::{Frame, Impact, Ledger, Simulation};
+
+const METHOD: (&str, &str) = ("solver.method", "discrete-gradient");
+
+/// With so many steps per impact.
+fn with<'a>(parts: &'a str, changes: &Changes<'a>) -> Vec<(&'a str, &'a str)> {
+    [&[METHOD, ("solver.steps_per_impact", parts)], changes].concat()
+}
+
+/// A free ball's rebound from the top of its socket: restitution of the law `word` over that of the law.
+fn rebound(word: &str, law: NormalLaw, parts: &str) -> f64 {
+    let contact = format!("normal_law = \"{word}\"\nrestitution = 0.9");
+    let scene = parse(&free_ball(0.0, 0.08, 0.0, &contact), &with(parts, &[]));
+    let mut simulation = Simulation::new(&scene.machine).unwrap();
+    let mut found = Vec::new();
+    while found.is_empty() {
+        simulation.step().unwrap();
+        simulation.take_impacts(&mut found);
+    }
+    found[0].achieved() / undisturbed_restitution(damping_factor(law, 0.9))
+}
+
+#[test]
+fn an_undisturbed_impact_converges_to_its_law_and_an_elastic_one_loses_nothing() {
+    for (parts, bound) in [("4", 1e-2), ("8", 3e-3), ("16", 1e-3), ("64", 1e-4)] {
+        let ratio = rebound("lankarani-nikravesh", NormalLaw::LankaraniNikravesh, parts);
+        assert!((ratio - 1.0).abs() < bound, "{parts}: {ratio}");
+        let ratio = rebound("hertz", NormalLaw::Hertz, parts);
+        assert!((ratio - 1.0).abs() < 1e-4, "{parts}, hertz: {ratio}");
+    }
+}
+
+/// Impacts faster than 20 mm/s of a run over `span`.
+fn hard_impacts(name: &str, changes: &Changes, span: f64) -> Vec<Impact> {
+    let mut simulation = simulation(name, changes);
+    let mut found = Vec::new();
+    while simulation.time() < span {
+        simulation.step().unwrap();
+        simulation.take_impacts(&mut found);
+    }
+    found.retain(|impact| impact.approach_speed > 0.02);
+    found.sort_by(|a, b| a.start.total_cmp(&b.start));
+    found
+}
+
+#[test]
+fn peaks_of_the_first_impacts_are_right_to_a_few_per_cent_and_to_less_with_more_steps() {
+    for (name, span, bounds) in [("hexapod", 0.02, [0.03, 0.01, 6e-3]), ("delta", 0.02, [0.03, 0.02, 7e-3])] {
+        let exact = hard_impacts(name, &[("solver.method", "dopri5"), ("solver.tolerance", "1e-9")], span);
+        assert!(exact.len() >= 6, "{name}: {exact:?}");
+        for (parts, bound) in ["4", "8", "16"].into_iter().zip(bounds) {
+            let found = hard_impacts(name, &with(parts, &[]), span);
+            for impact in &exact[..6] {
+                let near = found.iter().filter(|other| other.joint == impact.joint);
+                let near = near.min_by(|a, b| (a.start - impact.start).abs().total_cmp(&(b.start - impact.start).abs()));
+                let ratio = near.expect("the same impact").peak / impact.peak;
+                assert!((ratio - 1.0).abs() < bound, "{name}, {parts}: {ratio} of {impact:?}");
+            }
+        }
+    }
+}
+
+fn ledger(name: &str, changes: &Changes, span: f64) -> Ledger {
+    let mut simulation = simulation(name, changes);
+    simulation.advance_to(span).unwrap();
+    *simulation.ledger().unwrap()
+}
+
+/// Means over runs that differ in their steps, as every single run is chaotic.
+#[test]
+fn losses_of_many_loose_joints_are_those_of_error_controlled_steps() {
+    let [friction, restitution] = mean(["4", "6", "8", "12", "16", "24"], "hexapod", &[], 1.0);
+    assert!((-0.02..0.08).contains(&(friction / 21.8e-3 - 1.0)), "{friction}");
+    assert!((restitution / 2.67e-3 - 1.0).abs() < 0.05, "{restitution}");
+    let [_, restitution] = mean(["4", "6", "8", "12", "16", "24"], "delta", &[("parameter.rate", "3 Hz")], 0.3);
+    assert!((restitution / 30e-3 - 1.0).abs() < 0.05, "{restitution}");
+}
+
+fn mean<const N: usize>(parts: [&str; N], name: &str, changes: &Changes, span: f64) -> [f64; 2] {
+    let ledgers = parts.map(|parts| ledger(name, &with(parts, changes), span));
+    let mean = |part: fn(&Ledger) -> f64| ledgers.iter().map(part).sum::<f64>() / N as f64;
+    [mean(|ledger| ledger.friction_loss), mean(|ledger| ledger.restitution_loss)]
+}
+
+#[test]
+fn steps_and_iterations_of_many_loose_joints_stay_few() {
+    let mut simulation = simulation("hexapod", &with("8", &[]));
+    simulation.advance_to(1.0).unwrap();
+    let statistics = simulation.statistics();
+    let counts = (statistics.steps, statistics.contact_evaluations);
+    assert!(counts.0 <= 6000 && counts.1 <= 24_000, "{counts:?}");
+}
+
+#[test]
+fn every_scene_balances_its_energy() {
+    for name in SCENES.into_iter().chain(MACHINES) {
+        for formulation in ["tree", "lagrange"] {
+            let ledger = ledger(name, &with("4", &[("formulation", formulation)]), 0.3);
+            let residual = ledger.relative_residual();
+            assert!(residual.abs() < 1e-3, "{name}, {formulation}: {residual:e}");
+        }
+    }
+}
+
+#[test]
+fn settled_forces_are_right_within_a_per_cent() {
+    let ideal = [("joint.S1.clearance", "0")];
+    let surface = [("contact.friction_velocity", "surface")];
+    for (name, formulation, changes) in [
+        ("spcmm", "tree", &[][..]),
+        ("spcmm", "lagrange", &[]),
+        ("spcmm", "tree", &ideal),
+        ("spcmm", "tree", &surface),
+        ("chain", "tree", &[]),
+        ("slider-crank", "tree", &[]),
+        ("slider-crank-driven", "tree", &[]),
+    ] {
+        let base = [&[("formulation", formulation)], changes].concat();
+        let close = [&base[..], &[("solver.tolerance", "1e-8")]].concat();
+        let mut exact = live(name, &close);
+        run_until(&mut exact, 0.3);
+        let start = exact.snapshot();
+        let expected = mean_forces(&mut exact, 0.3, 0.5);
+        let mut coarse = live(name, &base);
+        coarse.restore(&start);
+        coarse.set(METHOD.0, METHOD.1).unwrap();
+        coarse.set("solver.steps_per_impact", "4").unwrap();
+        let got = mean_forces(&mut coarse, 0.3, 0.5);
+        for (j, (got, expected)) in got.iter().zip(&expected).enumerate() {
+            let ratio = got / expected;
+            assert!((ratio - 1.0).abs() < 0.01, "{name}, {base:?}, joint {j}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn the_peak_of_an_ideal_joint_is_that_of_its_rows() {
+    let mut simulation = simulation("slider-crank-driven", &with("16", &[]));
+    let mut frame = Frame::default();
+    let mut rows = 0.0_f64;
+    while simulation.time() < 0.025 {
+        simulation.step().unwrap();
+        let middle = 0.5 * (simulation.step_start() + simulation.time());
+        for time in [middle, simulation.time()] {
+            simulation.sample(time, &mut frame);
+            rows = rows.max(frame.joints[0].normal_force.norm());
+        }
+    }
+    let found = simulation.statistics().peak_normal[0];
+    assert!(rows > 200.0 && (found / rows - 1.0).abs() < 2e-2, "{found} {rows}");
+    assert!(simulation.peak(0).0 >= rows);
+}
+
+#[test]
+fn no_step_creates_energy() {
+    for parts in ["2", "4", "16"] {
+        for (name, friction) in
+            [("pendulum", "0"), ("pendulum", "0.15"), ("pendulum", "10"), ("chain", "0.15"), ("slider-crank", "0.15")]
+        {
+            let mut simulation = simulation(name, &with(parts, &[("contact.friction", friction)]));
+            let start = frame_now(&mut simulation);
+            let energy = start.kinetic + start.potential;
+            let (mut most, mut exchanged) = (0.0_f64, start.kinetic);
+            for _ in 0..4000 {
+                if simulation.time() > 1.0 {
+                    break;
+                }
+                simulation.step().unwrap();
+                let frame = frame_now(&mut simulation);
+                most = most.max(frame.kinetic + frame.potential - energy);
+                exchanged = exchanged.max(frame.kinetic);
+            }
+            assert!(most <= 1e-3 * exchanged, "{name}, friction {friction}, {parts}: {most:e} of {exchanged:e} J");
+        }
+    }
+}
+
+/// A change of a clearance pushes balls inwards while the wall moves; the ledger accounts for that.
+#[test]
+fn a_live_change_keeps_the_balance() {
+    let mut simulation = live("spcmm", &with("8", &[]));
+    simulation.advance_to(0.2).unwrap();
+    simulation.set("contact.clearance", "0.05 mm").unwrap();
+    simulation.advance_to(0.4).unwrap();
+    let ledger = simulation.ledger().unwrap();
+    assert!(ledger.clearance_work.abs() > 1e-7, "{ledger:?}");
+    assert!(ledger.relative_residual().abs() < 1e-3, "{ledger:?}");
+    let again = |start: &LiveScene| {
+        let mut copy = LiveScene::new(start.running()).unwrap();
+        copy.restore(&start.snapshot());
+        copy.advance_to(0.5).unwrap();
+        copy.state_hash()
+    };
+    let hashes = [again(&simulation), again(&simulation)];
+    simulation.advance_to(0.5).unwrap();
+    assert_eq!(hashes, [simulation.state_hash(); 2]);
+}
