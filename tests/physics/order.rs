@@ -1,8 +1,8 @@
 //! Each stepper shows its order on smooth motions of the mechanisms themselves.
 
 use crate::common::{run_until, scene, simulation, slope};
-use jointplay::integrate::{DormandPrince, RungeKutta4, SemiImplicitEuler, Stepper, System};
 use jointplay::contact::ContactState;
+use jointplay::integrate::{DormandPrince, RungeKutta4, SemiImplicitEuler, Stepper, System};
 use jointplay::mechanism::{ActiveSet, Mechanism, StepStart};
 
 /// Largest difference of two states relative to the scales of their components.

@@ -214,6 +214,7 @@ fn struck(method: &str, approach_speed: &str) -> LiveScene {
         ("solver.method", method),
         ("solver.step", "0.2 us"),
         ("solver.tolerance", "1e-9"),
+        ("solver.steps_per_impact", "256"),
     ];
     let mut simulation = LiveScene::new(&parse(&text.replace(start, touching), &changes)).unwrap();
     while !simulation.contact_state(0).active {
@@ -264,6 +265,8 @@ fn damping_of_a_joint_that_is_hit_again_stays_at_chi_by_the_largest_speed() {
             println!("{case}; residual {:.1e}", ledger.relative_residual());
             let bound = match method {
                 "semi-implicit-euler" => 5e-3,
+                // It takes an eighth of the time of such a slow impact in a step.
+                "discrete-gradient" => 2e-2,
                 _ => 1e-5,
             };
             assert!((peak / force - 1.0).abs() < bound, "{case}");

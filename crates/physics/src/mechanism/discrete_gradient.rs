@@ -227,7 +227,6 @@ impl DiscreteGradient {
 
     /// Collects the joints that touch or may, from the gaps just measured at the guessed end; all loose ones if `all`.
     fn gather(&mut self, model: &Model, contacts: &Contacts, from: &StepStart<'_>, all: bool) {
-        self.touches.clear();
         for (j, joint) in model.joints.iter().enumerate() {
             if joint.ideal.is_some() {
                 continue;
@@ -567,7 +566,10 @@ impl Evaluator<'_> {
                 self.mechanism.equations.displace(&self.mechanism.model, at, &discrete.displacement);
             }
             self.mechanism.measure(t + h, &discrete.end);
-            discrete.gather(&self.mechanism.model, &self.mechanism.contacts, from, all);
+            discrete.touches.clear();
+            if !matches!(self.touching, ActiveSet::Nothing) {
+                discrete.gather(&self.mechanism.model, &self.mechanism.contacts, from, all);
+            }
             // Everything but the contacts, at the middle.
             let touching = std::mem::replace(&mut self.touching, ActiveSet::Nothing);
             self.derivative(t + 0.5 * h, &discrete.middle, &mut discrete.rate);

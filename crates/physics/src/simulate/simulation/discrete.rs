@@ -13,7 +13,7 @@
 use std::f64::consts::PI;
 
 use super::{DiscreteControl, NEARLY, Run, State, StepEnd, store_gaps};
-use crate::contact::ContactPhase;
+use crate::contact::{self, ContactPhase};
 use crate::mechanism::{ActiveSet, Counts, Mechanism, StepStart};
 use crate::simulate::peaks::PenetrationCubic;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
@@ -21,7 +21,7 @@ use crate::simulate::{StopAdvice, StopFault, Stopped};
 /// Steps per impact beyond which all steps shrink.
 const COARSE: f64 = 16.0;
 /// Longest step, s.
-const LONGEST: f64 = 0.5e-3;
+const LONGEST: f64 = 0.4e-3;
 /// Shortest step, s, unless an iteration does not converge.
 const SHORTEST: f64 = 2e-7;
 /// Largest growth from one step to the next, and largest shrinkage for the sake of other forces.
@@ -36,11 +36,9 @@ const SLOW: f64 = 5e-3;
 /// Half periods of ringing in a step.
 const RINGING: f64 = 2.0;
 /// Error of a step due to forces other than contact forces, relative to the scales of the positions.
-const SMOOTH: f64 = 1e-7;
+const SMOOTH: f64 = 3e-8;
 /// Scales of the velocities are those of the positions in this time, s.
 const SCALE_TIME: f64 = 0.1;
-/// Duration of an undamped impact over (5 m v^2 / 4 K)^0.4 / v (Goldsmith, *Impact*, 1960, section 4.2).
-const HERTZ: f64 = 2.943_2;
 
 impl DiscreteControl {
     /// At the start, where any joint may touch for the first time.
@@ -51,7 +49,7 @@ impl DiscreteControl {
             phases: vec![ContactPhase::default(); joints],
             h: 0.0,
             acceleration: vec![0.0; mechanism.dimension() - mechanism.positions()],
-            smooth: f64::INFINITY,
+            smooth: LONGEST,
         }
     }
 
@@ -59,18 +57,6 @@ impl DiscreteControl {
     pub(super) fn fits(&self, own: &Self) -> bool {
         let sizes = |control: &Self| [control.mobility.len(), control.phases.len(), control.acceleration.len()];
         sizes(self) == sizes(own)
-    }
-
-    /// Duration of an impact of joint `j` at `speed`, m/s, in s.
-    fn hertz_time(&self, mechanism: &Mechanism, j: usize, speed: f64) -> f64 {
-        let (mass, stiffness) = (1.0 / self.mobility[j], mechanism.contacts.coefficients(j).stiffness);
-        HERTZ * libm::pow(1.25 * mass * speed * speed / stiffness, 0.4) / speed
-    }
-
-    /// Half a period of the ringing of joint `j` about `penetration`, m, in s.
-    fn half_period(&self, mechanism: &Mechanism, j: usize, penetration: f64) -> f64 {
-        let stiffness = 1.5 * mechanism.contacts.coefficients(j).stiffness * penetration.sqrt();
-        PI / (stiffness * self.mobility[j]).sqrt()
     }
 
     /// Records the step just accepted, of size `h`, that ends at `now`; with `finer` times the steps of the coarse ones.
@@ -92,9 +78,26 @@ impl DiscreteControl {
         }
         error *= h * h * h / (6.0 * (h + self.h));
         let compares = self.h > 0.0 && error > 0.0;
-        self.smooth = if compares { h * libm::cbrt(SMOOTH / (finer * finer * error)).max(SHRINKAGE) } else { f64::INFINITY };
+        self.smooth = if compares { h * libm::cbrt(SMOOTH / (finer * finer * error)).max(SHRINKAGE) } else { LONGEST };
         self.h = h;
     }
+}
+
+/// Stiffness K of ball joint `j`, N/m^1.5. Samples leave the mechanism at other instants, so that its own may be another.
+fn stiffness(state: &State, j: usize) -> f64 {
+    contact::hertz_stiffness(&state.conditions.joints[j], state.clearance(j))
+}
+
+/// Longest step in an impact of ball joint `j` at `speed`, m/s, in s: a part of the Hertz time.
+fn step_in_impact(state: &State, j: usize, speed: f64) -> f64 {
+    let mass = 1.0 / state.control.discrete.mobility[j];
+    contact::impact_duration(stiffness(state, j), 0.0, mass, speed)
+        / f64::from(state.conditions.solver.steps_per_impact)
+}
+
+/// Half a period of the ringing of ball joint `j` about `penetration`, m, in s.
+fn half_period(state: &State, j: usize, penetration: f64) -> f64 {
+    PI / (1.5 * stiffness(state, j) * penetration.sqrt() * state.control.discrete.mobility[j]).sqrt()
 }
 
 /// Steps of a run over those of the coarse ones, at least 1.
@@ -105,7 +108,6 @@ fn finer(state: &State) -> f64 {
 /// Size of the next step, s.
 pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
     let control = &state.control.discrete;
-    let parts = f64::from(state.conditions.solver.steps_per_impact);
     let (longest, periods) = (LONGEST / finer(state), RINGING / finer(state));
     let mut h = longest.min(control.smooth);
     for (j, (gap, contact_state)) in state.now.gaps.iter().zip(&state.now.contact_states).enumerate() {
@@ -113,14 +115,17 @@ pub(super) fn discrete_size(state: &State, mechanism: &Mechanism) -> f64 {
             continue;
         }
         if contact_state.active && gap.penetration > 0.0 {
-            if control.phases[j] != ContactPhase::Lasting && contact_state.approach_speed > SLOW {
-                h = h.min(control.hertz_time(mechanism, j, contact_state.approach_speed) / parts);
+            let lasts = control.phases[j] == ContactPhase::Lasting;
+            // A ball at its wall may be struck again.
+            let speed = if lasts { gap.rate.abs() } else { contact_state.approach_speed.max(gap.rate.abs()) };
+            if speed > SLOW {
+                h = h.min(step_in_impact(state, j, speed));
             }
-            h = h.min(periods * control.half_period(mechanism, j, gap.penetration));
+            h = h.min(periods * half_period(state, j, gap.penetration));
         } else if gap.rate > SLOW {
             let arrival = -gap.penetration / gap.rate;
             if arrival < h {
-                h = h.min(arrival.max(control.hertz_time(mechanism, j, gap.rate) / parts));
+                h = h.min(arrival.max(step_in_impact(state, j, gap.rate)));
             }
         }
     }
@@ -171,8 +176,6 @@ impl Run<'_> {
         let end = &mut attempt.end;
         mechanism.measure(t_end, &end.y);
         store_gaps(mechanism, &mut end.gaps);
-        let control = &state.control.discrete;
-        let parts = f64::from(state.conditions.solver.steps_per_impact);
         let mut part = 1.0_f64;
         for (j, (start, end)) in state.now.gaps.iter().zip(&end.gaps).enumerate() {
             if !mechanism.contacts.has_clearance(j) || start.penetration > 0.0 || end.penetration <= 0.0 {
@@ -186,7 +189,7 @@ impl Run<'_> {
             let theta = course.crossing();
             let speed = course.at(theta).1;
             if speed > SLOW {
-                let longest = control.hertz_time(mechanism, j, speed) / parts;
+                let longest = step_in_impact(state, j, speed);
                 if h - theta * h > longest {
                     part = part.min((theta * h).max(longest) / h);
                 }

@@ -1,6 +1,7 @@
 //! The divergence guard: checks that every accepted step must pass.
 
 use super::{OPEN_LOOP, Run};
+use crate::integrate::StepControl;
 use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
@@ -34,7 +35,7 @@ impl Run<'_> {
             if !(penetration <= LEFT_SOCKET * radius) {
                 return Some(StopFault::LeftSocket { joint: self.machine.ball_joints[j].name.clone(), penetration });
             }
-            if !self.state.conditions.solver.method.is_adaptive()
+            if self.state.conditions.solver.method.control() == StepControl::Fixed
                 && let Some(times) = self.energy_of_overshoot(j, h)
             {
                 return Some(StopFault::Overshoot {
