@@ -226,16 +226,17 @@ impl Accuracy {
     }
 }
 
-/// The preset that matches the present method and tolerance (or fixed step), whether or not it was chosen by name.
+/// The preset that matches the present method and its accuracy, whether or not it was chosen by name.
 pub fn preset_of(player: &Player) -> Option<Preset> {
-    let solver = &player.pending().machine.solver;
+    let machine = &player.pending().machine;
+    let solver = &machine.solver;
     let is = |preset: &Preset| {
-        let (method, step, tolerance) = preset.point();
-        method == solver.method
-            && match method.control() {
-                StepControl::Fixed => step == solver.step,
-                StepControl::Error => tolerance == solver.tolerance,
-                StepControl::PerImpact => false,
+        let own = preset.solver(machine.loose_joints());
+        own.method == solver.method
+            && match own.method.control() {
+                StepControl::Fixed => own.step == solver.step,
+                StepControl::Error => own.tolerance == solver.tolerance,
+                StepControl::PerImpact => own.steps_per_impact == solver.steps_per_impact,
             }
     };
     let chosen = solver.preset.filter(|preset| is(preset));

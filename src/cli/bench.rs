@@ -6,7 +6,7 @@ use super::args::BenchArguments;
 use super::tables::{Table, yes};
 use super::tradeoff::{percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
-use crate::analysis::{GROWTH, GoalResult, SPEED_GOALS, Speed, growth, reach, speed};
+use crate::analysis::{GROWTH, GoalResult, LIMITS, LOOSE_MACHINES, LooseSpeed, Timed, growth, loose_speed, reach};
 use crate::scene::Scene;
 use crate::units::format_quantity;
 
@@ -17,21 +17,19 @@ use crate::units::format_quantity;
 pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
     let scene = Scene::load(DEFAULT_SCENE, &arguments.changes)?;
     let (rows, machines, growth) = measuring::measure(arguments.quiet, Some(&scene), |context| {
-        let parts = SPEED_GOALS.len() + 2;
+        let parts = LOOSE_MACHINES.len() + 2;
         let rows = reach(&scene, &mut context.part(0, parts))?;
         let mut machines = Vec::new();
-        for (n, goal) in SPEED_GOALS.into_iter().enumerate() {
-            machines.push(speed(goal, &mut context.part(n + 1, parts))?);
+        for (n, machine) in LOOSE_MACHINES.into_iter().enumerate() {
+            machines.push(loose_speed(machine, &mut context.part(n + 1, parts))?);
         }
-        // Uses the tolerance of the shorter of its two chains.
-        let tolerance = machines[1].tolerance;
-        let growth = growth(tolerance, &mut context.part(parts - 1, parts))?;
+        let growth = growth(&mut context.part(parts - 1, parts))?;
         Ok((rows, machines, growth))
     })?;
     print(&text(&rows, &machines, growth))
 }
 
-fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
+fn text(rows: &[GoalResult], machines: &[LooseSpeed], growth: f64) -> String {
     let reach = rows.iter().map(|row| {
         vec![
             row.goal.label().to_owned(),
@@ -54,19 +52,24 @@ fn text(rows: &[GoalResult], machines: &[Speed], growth: f64) -> String {
     );
     let heads = "span | method | speed | asked | rk4 at 10 us | ratio | error | of | reached";
     out.push_str(&Table::new(heads, reach).text());
-    let _ = writeln!(out, "\nMany loose joints, automatic at the loosest tolerance with good peaks\n");
-    let speeds = machines.iter().map(|row| {
-        vec![
-            row.goal.label.to_owned(),
-            format_quantity(row.goal.span, "s"),
-            format!("{:e}", row.tolerance),
-            percent(row.error),
-            times(Some(row.speed)),
-            format!("{:.0}", row.goal.asked),
-            yes(row.met()),
-        ]
-    });
-    let heads = "machine | span | tolerance | error | speed | asked | reached";
+    out.push_str(
+        "\nLoose joints: the fastest setting of each method whose peaks of the first impacts err by no more than the limit\n\n",
+    );
+    let line = |row: &LooseSpeed, limit: &str, timed: &Timed| {
+        let setting = format!("{} {}", timed.setting.method, value(&timed.setting));
+        let [speed, ratio] = [timed.speed, timed.speed / row.baseline.speed].map(|factor| times(Some(factor)));
+        let span = format_quantity(row.machine.span, "s");
+        vec![row.machine.label.to_owned(), span, limit.to_owned(), setting, percent(timed.error), speed, ratio]
+    };
+    let mut speeds = Vec::new();
+    for row in machines {
+        for (limit, fastest) in LIMITS.iter().zip(&row.fastest) {
+            let limit = percent(Some(*limit));
+            speeds.extend(fastest.iter().map(|timed| line(row, &limit, timed)));
+        }
+        speeds.push(line(row, "-", &row.baseline));
+    }
+    let heads = "machine | span | limit | setting | error | speed | over rk4";
     out.push_str(&Table::new(heads, speeds).text());
     let ([short, long], span, most) = GROWTH;
     let _ = writeln!(

@@ -8,7 +8,7 @@ use std::path::Path;
 use jointplay::analysis::{
     AnalysisError, End, RunContext, Setting, WorkBudget, WorkPrecision, presets, work_precision,
 };
-use jointplay::integrate::Method;
+use jointplay::integrate::{Method, StepControl};
 use jointplay::machine::Preset;
 use jointplay::scene::Scene;
 use serde_json::Value as Json;
@@ -142,14 +142,18 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
         measured: 0.0,
         steps: &[10e-6, 3e-6],
         tolerances: &[1e-4, 1e-8],
+        steps_per_impact: &[4.0, 32.0],
         seconds: f64::INFINITY,
     };
     let found = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
     for method in Method::ALL {
         let own: Vec<_> = found.points.iter().filter(|p| p.setting.method == method).collect();
         assert!(own.len() >= 2, "{method}");
-        let adaptive = own[0].setting.adaptive;
-        let [coarse, fine] = if adaptive { [1e-4, 1e-8] } else { [10e-6, 3e-6] };
+        let [coarse, fine] = match method.control() {
+            StepControl::Fixed => [10e-6, 3e-6],
+            StepControl::Error => [1e-4, 1e-8],
+            StepControl::PerImpact => [4.0, 32.0],
+        };
         let (coarse_error, fine_error) = (error_at(&found, method, coarse), error_at(&found, method, fine));
         println!("{method}: {coarse_error:e} {fine_error:e}");
         assert!(fine_error < 0.6 * coarse_error, "{method}");
@@ -200,15 +204,15 @@ fn presets_can_be_measured_on_any_scene_and_broken_off() {
 fn the_presets_in_the_program_are_those_that_were_measured() {
     let record = presets::record();
     for preset in Preset::ALL {
-        let (method, value) = &record.points[preset.word()];
-        let setting = Setting::of_preset(preset);
-        assert_eq!(
-            (method.as_str(), *value),
-            (setting.method.word(), setting.value()),
-            "{preset:?} has changed: jointplay tradeoff --all --write ."
-        );
         // Whether it has all built-in scenes, `tests/texts/documents.rs` checks.
         for name in presets::record().scenes.keys() {
+            let (method, value) = &record.points[name][preset.word()];
+            let setting = Setting::of_preset(preset, &crate::common::scene(name, &[]).machine);
+            assert_eq!(
+                (method.as_str(), *value),
+                (setting.method.word(), setting.value()),
+                "{name}, {preset:?} has changed: jointplay tradeoff --all --write ."
+            );
             let measured = presets::measured(name, preset).unwrap();
             let error = measured.peak_error.unwrap();
             let limit = presets::limit(preset);

@@ -77,7 +77,7 @@ fn one(part: &CostCase, budget: &WorkBudget, context: &mut RunContext) -> Result
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
     let scene = Scene::load(part.scene, &changes)?;
-    let setting = Setting::of_preset(PRESET);
+    let setting = Setting::of_preset(PRESET, &scene.machine);
     let mut simulation = setting.start(&scene)?;
     // Counts the evaluations up to the end of the span, without a cap; the timed runs below cover the same span.
     while simulation.time() < part.span {

@@ -3,7 +3,7 @@
 //! - Sweeps: [`grid`] defines the values, [`sweep`] runs them, [`point`] records the results; [`sweep_task`] and [`task`] are the
 //!   same as plain data for a thread or a worker.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
-//! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`speed`], [`presets`], [`model_costs`].
+//! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
 //!   known answers ([`validation`]).
 //!
@@ -66,7 +66,7 @@ mod work_precision;
 
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use front::front;
-pub use many_joints::{GROWTH, SPEED_GOALS, Speed, SpeedGoal, growth, speed};
+pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
 pub use reach::{Goal, GoalResult, reach};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};

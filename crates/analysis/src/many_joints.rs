@@ -1,55 +1,55 @@
-//! Speed goals of machines with many loose joints, at the loosest tolerance that reproduces the peaks of the first impacts.
+//! The fastest settings with which machines with loose joints reproduce the peaks of their first impacts.
 
 use super::timing::time_to;
 use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
+use jointplay_physics::integrate::Method;
 use jointplay_scene::Scene;
 
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-9;
-/// Tolerances tried, from the loosest that raises no doubt; and the acceptable relative error of the peaks.
-const TOLERANCES: [f64; 13] = [1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6, 5e-7, 2e-7, 1e-7];
-const ALLOWED: f64 = 0.01;
-const BUDGET: WorkBudget = WorkBudget { measured: 0.1, ..WorkBudget::REFERENCE };
+/// Steps per impact and tolerances tried, from the fastest.
+const STEPS_PER_IMPACT: [f64; 9] = [3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0];
+const TOLERANCES: [f64; 8] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7];
+const BUDGET: WorkBudget = WorkBudget { measured: 0.3, ..WorkBudget::REFERENCE };
+/// Errors of the first peaks allowed.
+pub const LIMITS: [f64; 2] = [0.02, 0.08];
 
-/// A machine and the speed required of it.
+/// A machine whose speed is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpeedGoal {
+pub struct LooseMachine {
     /// Display name.
     pub label: &'static str,
     scene: &'static str,
     changes: &'static [(&'static str, &'static str)],
     /// Simulated time, s.
     pub span: f64,
-    /// Required simulated seconds per clock second.
-    pub asked: f64,
 }
 
-const fn goal(
+const fn machine(
     label: &'static str,
     scene: &'static str,
     changes: &'static [(&'static str, &'static str)],
     span: f64,
-    asked: f64,
-) -> SpeedGoal {
-    SpeedGoal { label, scene, changes, span, asked }
+) -> LooseMachine {
+    LooseMachine { label, scene, changes, span }
 }
 
-/// All speed goals.
-pub const SPEED_GOALS: [SpeedGoal; 7] = [
-    goal("chain of 8", "chain", &[("chain.links", "8")], 0.1, 5.0),
-    goal("chain of 32", "chain", &[("chain.links", "32")], 0.1, 1.0),
-    goal("hexapod, 12 loose", "hexapod", &[], 1.0, 12.0),
-    goal("hexapod, 1 loose", "hexapod", &[("contact.clearance", "0"), ("joint.A6.clearance", "0.1 mm")], 1.0, 40.0),
+/// All of them.
+pub const LOOSE_MACHINES: [LooseMachine; 7] = [
+    machine("chain of 8", "chain", &[("chain.links", "8")], 0.1),
+    machine("chain of 32", "chain", &[("chain.links", "32")], 0.1),
+    machine("hexapod, 12 loose", "hexapod", &[], 1.0),
+    machine("hexapod, 1 loose", "hexapod", &[("contact.clearance", "0"), ("joint.A6.clearance", "0.1 mm")], 1.0),
     // The rods are held by their balls alone.
-    goal("delta, 12 loose", "delta", &[("parameter.grip", "0.001 N")], 0.5, 6.0),
-    goal("four-bar, 2 loose", "four-bar", &[], 1.0, 120.0),
-    goal("suspension, 4 loose", "suspension", &[], 1.0, 40.0),
+    machine("delta, 12 loose", "delta", &[("parameter.grip", "0.001 N")], 0.5),
+    machine("four-bar, 2 loose", "four-bar", &[], 1.0),
+    machine("suspension, 4 loose", "suspension", &[], 1.0),
 ];
 
 /// Numbers of links of two chains whose costs per link and simulated second are compared, the span in s, and the allowed ratio.
 pub const GROWTH: ([u32; 2], f64, f64) = ([32, 256], 10e-3, 1.5);
 
-impl SpeedGoal {
+impl LooseMachine {
     /// Loads the machine.
     ///
     /// # Errors
@@ -61,55 +61,76 @@ impl SpeedGoal {
     }
 }
 
-/// A measured result.
+/// A setting with its error and its speed on a machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Speed {
-    /// The machine.
-    pub goal: SpeedGoal,
-    /// The loosest tolerance with good peaks; the tightest one tried if none has them.
-    pub tolerance: f64,
-    /// Largest relative error of the first peaks at that tolerance; `None` if the run did not get that far.
+pub struct Timed {
+    /// Method and accuracy.
+    pub setting: Setting,
+    /// Largest relative error of the first peaks; `None` if the run did not get that far.
     pub error: Option<f64>,
     /// Simulated seconds per clock second.
     pub speed: f64,
 }
 
-impl Speed {
-    /// Whether the goal is met.
-    pub fn met(&self) -> bool {
-        self.speed >= self.goal.asked && self.error.is_some_and(|error| error <= ALLOWED)
-    }
+/// What a machine costs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LooseSpeed {
+    /// The machine.
+    pub machine: LooseMachine,
+    /// The fastest setting within each of [`LIMITS`], for each method that has one, the faster method first.
+    pub fastest: [Vec<Timed>; LIMITS.len()],
+    /// Runge-Kutta 4 at 10 microseconds, in the same run.
+    pub baseline: Timed,
 }
 
-/// Measures the speed of the automatic selection of methods on one machine.
+/// Measures one machine.
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn speed(goal: SpeedGoal, context: &mut RunContext) -> Result<Speed, AnalysisError> {
-    let scene = goal.load()?;
+pub fn loose_speed(machine: LooseMachine, context: &mut RunContext) -> Result<LooseSpeed, AnalysisError> {
+    let scene = machine.load()?;
     let reference = ReferenceSolution::of_impacts(&scene, REFERENCE, &mut context.part(0, 2))?;
     let mut context = context.part(1, 2);
-    let (mut tolerance, mut error) = (TOLERANCES[0], None);
-    for tried in TOLERANCES {
-        let setting = Setting::automatic(tried);
-        let (_, errors, _) = reference.impacts_of(&setting, &BUDGET, &mut context)?;
-        (tolerance, error) = (tried, errors.peak);
-        if error.is_some_and(|error| error <= ALLOWED) {
-            break;
+    let ways = [(Method::DiscreteGradient, &STEPS_PER_IMPACT[..]), (Method::Automatic, &TOLERANCES[..])];
+    let mut timed: Vec<Timed> = Vec::new();
+    let mut time = |setting: Setting, error: Option<f64>, context: &mut RunContext| {
+        if let Some(known) = timed.iter().find(|known| known.setting == setting) {
+            return Ok::<_, AnalysisError>(*known);
+        }
+        let seconds = time_to(machine.span, &BUDGET, context, |_| setting.start(&scene))?;
+        timed.push(Timed { setting, error, speed: machine.span / seconds });
+        Ok(timed[timed.len() - 1])
+    };
+    let mut fastest = LIMITS.map(|_| Vec::new());
+    for (method, values) in ways {
+        let mut errors = Vec::with_capacity(values.len());
+        for value in values {
+            let setting = Setting::new(method, *value);
+            errors.push((setting, reference.impacts_of(&setting, &BUDGET, &mut context)?.1.peak));
+        }
+        for (limit, fastest) in LIMITS.into_iter().zip(&mut fastest) {
+            let within = errors.iter().find(|(_, error)| error.is_some_and(|error| error <= limit));
+            if let Some((setting, error)) = within {
+                fastest.push(time(*setting, *error, &mut context)?);
+            }
         }
     }
-    let setting = Setting::automatic(tolerance);
-    let seconds = time_to(goal.span, &BUDGET, &mut context, |_| setting.start(&scene))?;
-    Ok(Speed { goal, tolerance, error, speed: goal.span / seconds })
+    let baseline = Setting::baseline();
+    let error = reference.impacts_of(&baseline, &BUDGET, &mut context)?.1.peak;
+    let baseline = time(baseline, error, &mut context)?;
+    for fastest in &mut fastest {
+        fastest.sort_by(|a, b| b.speed.total_cmp(&a.speed));
+    }
+    Ok(LooseSpeed { machine, fastest, baseline })
 }
 
-/// Clock seconds per link and simulated second of the longer chain of [`GROWTH`] over those of the shorter, at `tolerance`.
+/// Clock seconds per link and simulated second of the longer chain of [`GROWTH`] over those of the shorter, with 16 steps per impact.
 ///
 /// # Errors
-/// As [`speed`].
-pub fn growth(tolerance: f64, context: &mut RunContext) -> Result<f64, AnalysisError> {
+/// As [`loose_speed`].
+pub fn growth(context: &mut RunContext) -> Result<f64, AnalysisError> {
     let (links, span, _) = GROWTH;
-    let setting = Setting::automatic(tolerance);
+    let setting = Setting::new(Method::DiscreteGradient, 16.0);
     let mut cost = [0.0; 2];
     for (n, (links, cost)) in links.into_iter().zip(&mut cost).enumerate() {
         let mut scene = Scene::load("chain", &[])?;
@@ -126,7 +147,7 @@ mod tests {
 
     #[test]
     fn each_machine_has_the_loose_joints_that_it_is_named_for() {
-        for goal in SPEED_GOALS {
+        for goal in LOOSE_MACHINES {
             let scene = goal.load().unwrap_or_else(|e| panic!("{}: {e}", goal.label));
             let loose = scene.machine.ball_joints.iter().filter(|joint| joint.contact.clearance > 0.0);
             let count = loose.count().to_string();

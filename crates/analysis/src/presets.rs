@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::timing::time_to;
 use super::work_precision::{Baseline, measure as measure_point};
 use super::{AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision};
-use jointplay_physics::machine::Preset;
+use jointplay_physics::machine::{Preset, Solver};
 use jointplay_scene::Scene;
 
 /// Results of `jointplay tradeoff --all --write`.
@@ -47,8 +47,8 @@ impl Measured {
 pub struct Record {
     /// Machine it was measured on.
     pub machine: String,
-    /// Method and value of each preset when measured.
-    pub points: BTreeMap<String, (String, f64)>,
+    /// By scene: method and value of each preset when measured.
+    pub points: BTreeMap<String, BTreeMap<String, (String, f64)>>,
     /// By scene, then by preset.
     pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
     /// By scene: simulated seconds per clock second of the preset `real-time`, as measured by [`pace`].
@@ -77,10 +77,9 @@ pub struct TooSlow {
 /// Returns the measurement of a built-in `scene` that requests the preset `real-time` but ran slower than real time.
 pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
     let record = record();
-    let (method, _, tolerance) = Preset::RealTime.point();
-    let asks = scene.machine.solver.preset == Some(Preset::RealTime)
-        && (scene.machine.solver.method, scene.machine.solver.tolerance) == (method, tolerance)
-        && scene.source.file.is_none();
+    let own = Preset::RealTime.solver(scene.machine.loose_joints());
+    let settings = |solver: &Solver| (solver.preset, solver.method, solver.tolerance, solver.steps_per_impact);
+    let asks = settings(&scene.machine.solver) == settings(&own) && scene.source.file.is_none();
     let pace = record.pace.get(&scene.name).copied();
     pace.filter(|pace| asks && *pace < 1.0).map(|pace| TooSlow {
         scene: scene.name.clone(),
@@ -94,7 +93,7 @@ pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
 /// # Errors
 /// As [`super::work_precision`].
 pub fn pace(scene: &Scene, budget: &WorkBudget, context: &mut RunContext) -> Result<f64, AnalysisError> {
-    let setting = Setting::of_preset(Preset::RealTime);
+    let setting = Setting::of_preset(Preset::RealTime, &scene.machine);
     let budget = WorkBudget { measured: budget.measured, ..WorkBudget::REFERENCE };
     let seconds = time_to(PACED, &budget, context, |_| setting.start(scene))?;
     Ok(PACED / seconds)
@@ -115,7 +114,7 @@ pub fn measured(scene: &str, preset: Preset) -> Option<Measured> {
 pub fn limit(preset: Preset) -> f64 {
     match preset {
         Preset::Preview => 0.05,
-        Preset::RealTime => 1e-3,
+        Preset::RealTime => 0.02,
         Preset::Accurate => 1e-4,
         Preset::Reference => 1e-7,
     }
@@ -123,7 +122,7 @@ pub fn limit(preset: Preset) -> f64 {
 
 /// The best setting within a limit: among those whose peak-force error is at most `limit` on every scene of `found`, the one with
 /// the largest product of speed ratios over the impacts and the settled motion of every scene.
-pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
+pub fn choose(found: &[&WorkPrecision], limit: f64) -> Option<Setting> {
     let candidates = found.first()?.points.iter().map(|point| point.setting);
     let worth = |setting: &Setting| {
         let mut product = 1.0;
@@ -156,7 +155,7 @@ pub fn measure(scene: &Scene, presets: &[Preset], context: &mut RunContext) -> R
     let baseline = Baseline::new(&reference, &budget, &mut context.part(1, parts))?;
     let mut points = Vec::with_capacity(presets.len());
     for (n, preset) in presets.iter().enumerate() {
-        let setting = Setting::of_preset(*preset);
+        let setting = Setting::of_preset(*preset, &scene.machine);
         let mut point = measure_point(&reference, setting, &budget, &mut context.part(n + 2, parts))?;
         point.preset = Some(*preset);
         baseline.divide(&mut point);

@@ -12,8 +12,10 @@ use jointplay_physics::machine::Vec3;
 use jointplay_physics::simulate::{Frame, Peak, Simulation};
 use jointplay_scene::Scene;
 
-/// Number of impacts compared.
+/// Number of impacts compared; and the scene in which it is smaller, as the next impact overlaps that of a neighbour by 25 us: its peak
+/// depends on which of the two comes first, so that no method comes close to it before it resolves the instants to a microsecond.
 const IMPACTS: usize = 6;
+const OF_OVERLAPPING: (&str, usize) = ("chain", 5);
 /// The impact at which the position is compared.
 const POSITION_AT: usize = 3;
 /// Simulated time within which the impacts must occur, s; and the span compared in a scene without any, s.
@@ -124,6 +126,12 @@ impl Contact {
         let long = self.begin + LONG_CONTACT;
         self.end.filter(|end| *end <= long).or((now >= long).then_some(long))
     }
+}
+
+/// Number of impacts of `scene` that are compared.
+fn impacts_compared(scene: &Scene) -> usize {
+    let (name, fewer) = OF_OVERLAPPING;
+    if scene.name == name { fewer } else { IMPACTS }
 }
 
 impl ReferenceSolution {
@@ -434,7 +442,7 @@ fn first_contacts(
         (0..joints).filter(begun_before).map(|joint| Contact { joint, begin: 0.0, end: None }).collect();
     let mut peaks: Vec<Peak> = Vec::new();
     simulation.take_peaks(&mut peaks);
-    let budget = WorkBudget::REFERENCE;
+    let (budget, most) = (WorkBudget::REFERENCE, impacts_compared(scene));
     let end = advance_capped(&mut simulation, IMPACTS_WITHIN, &budget, context, |simulation| {
         let now = simulation.time();
         simulation.take_peaks(&mut peaks);
@@ -451,7 +459,7 @@ fn first_contacts(
             }
         }
         let over = |contact: &Contact| contact.over(now).is_some_and(|t| now > t + AFTERWARDS);
-        contacts.len() >= IMPACTS && contacts[..IMPACTS].iter().all(over)
+        contacts.len() >= most && contacts[..most].iter().all(over)
     })?;
     match end {
         // A large scene may be capped before its sixth impact: the impacts until then are compared.
@@ -461,7 +469,7 @@ fn first_contacts(
     let last = simulation.time();
     // Only contacts that have ended by then can be compared to their end.
     let over = |contact: &&Contact| contact.over(last).is_some_and(|end| end + AFTERWARDS <= last);
-    let compared = contacts.iter().take(IMPACTS).take_while(over).count();
+    let compared = contacts.iter().take(most).take_while(over).count();
     Ok((contacts, compared))
 }
 

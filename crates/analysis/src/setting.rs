@@ -39,10 +39,9 @@ impl Setting {
         Self { method, step_s, tolerance, steps_per_impact }
     }
 
-    /// The setting of a preset.
-    pub fn of_preset(preset: Preset) -> Self {
-        let (method, step_s, tolerance) = preset.point();
-        Self { method, step_s, tolerance, ..Self::of(&Solver::default()) }
+    /// The setting of a preset on `machine`.
+    pub fn of_preset(preset: Preset, machine: &Machine) -> Self {
+        Self::of(&preset.solver(machine.loose_joints()))
     }
 
     /// Runge-Kutta 4 at 10 microseconds, the baseline of speed ratios.

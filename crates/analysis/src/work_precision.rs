@@ -6,7 +6,7 @@ use super::reference_solution::PhaseCost;
 use super::timing::time_to;
 use super::{AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front};
 use jointplay_physics::integrate::{Method, StepControl};
-use jointplay_physics::machine::Preset;
+use jointplay_physics::machine::{Machine, Preset};
 use jointplay_scene::Scene;
 
 /// A run over the first impacts, or in settled motion.
@@ -117,7 +117,7 @@ pub fn work_precision(
     budget: &WorkBudget,
     context: &mut RunContext,
 ) -> Result<WorkPrecision, AnalysisError> {
-    let settings = grid(budget)?;
+    let settings = grid(&scene.machine, budget)?;
     let parts = settings.len() + 3;
     let reference = ReferenceSolution::new(scene, &mut context.part(0, parts))?;
     let mut points = Vec::with_capacity(settings.len());
@@ -138,10 +138,10 @@ pub fn work_precision(
 }
 
 /// Every method at its values, including those of the presets.
-fn grid(budget: &WorkBudget) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
+fn grid(machine: &Machine, budget: &WorkBudget) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
     let mut presets = Vec::new();
     for preset in Preset::ALL {
-        presets.push((Setting::of_preset(preset), preset));
+        presets.push((Setting::of_preset(preset, machine), preset));
     }
     let mut settings = Vec::new();
     for method in Method::ALL {

@@ -145,6 +145,7 @@ impl Scene {
         if is_of_text(key) {
             next = next.rebuilt()?;
         }
+        next.apply_preset();
         next.machine.check_contacts().map_err(|conflict| next.blame_change(&conflict, key))?;
         *self = next;
         Ok(parameter)
@@ -213,6 +214,29 @@ impl Scene {
         }
         self.changes.push((key.to_owned(), text.to_owned()));
         Ok(parameter)
+    }
+
+    /// Gives the solver what its preset stands for on this machine, but for what the text or a change sets by name.
+    pub(super) fn apply_preset(&mut self) {
+        let Some(preset) = self.machine.solver.preset else {
+            return;
+        };
+        let own = preset.solver(self.machine.loose_joints());
+        let given = |key: &str| self.source.places.contains_key(key) || self.changes.iter().any(|(own, _)| own == key);
+        let [method, step, tolerance, steps_per_impact] = SOLVER_KEYS.map(given);
+        let solver = &mut self.machine.solver;
+        if !method {
+            solver.method = own.method;
+        }
+        if !step {
+            solver.step = own.step;
+        }
+        if !tolerance {
+            solver.tolerance = own.tolerance;
+        }
+        if !steps_per_impact {
+            solver.steps_per_impact = own.steps_per_impact;
+        }
     }
 
     /// Writes a value already checked against the table; a contact value also applies to joints that do not override it.

@@ -105,5 +105,5 @@ pub struct ViewSettings {
 /// Maximum number of initial plots.
 pub const MOST_PLOTS: usize = 4;
 
-/// Keys set by a preset, in the order of [`jointplay_physics::machine::Preset::point`].
+/// Keys set by a preset.
 pub const SOLVER_KEYS: [&str; 4] = ["solver.method", "solver.step", "solver.tolerance", "solver.steps_per_impact"];

@@ -121,6 +121,7 @@ impl Scene {
                 scene.change(key, value)?;
             }
         }
+        scene.apply_preset();
         scene.machine.check_contacts().map_err(|conflict| {
             let message = conflict.fault.to_string();
             let keys = scene.keys_of(&conflict);
@@ -230,13 +231,10 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         },
         None => top.get(key),
     };
-    // The preset first: other settings in the file take precedence over it.
-    let preset = table().iter().filter(|parameter| parameter.key == "solver.preset");
-    let others = || table().iter().filter(|parameter| parameter.key != "solver.preset");
-    for parameter in others() {
+    for parameter in table().iter().filter(|parameter| parameter.default != Value::Unset) {
         scene.write(parameter, &default_of(parameter, &sections));
     }
-    for parameter in preset.chain(others()) {
+    for parameter in table() {
         let Some(node) = find_node(parameter.key) else {
             continue;
         };

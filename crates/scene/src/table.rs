@@ -372,21 +372,17 @@ static TABLE: [Parameter; 29] = [
         "solver.preset",
         Access::Scene(Field {
             get: |scene| scene.machine.solver.preset.map_or(Value::Unset, |preset| Value::Choice(preset.word())),
-            set: |scene, value| {
-                let preset: Preset = word_of(value);
-                let solver = &mut scene.machine.solver;
-                (solver.method, solver.step, solver.tolerance) = preset.point();
-                solver.preset = Some(preset);
-            },
+            // The settings that it stands for depend on the machine: `Scene::apply_preset`.
+            set: |scene, value| scene.machine.solver.preset = Some(word_of(value)),
         }),
         "Preset",
         "Solver",
         Kind::Choice(Preset::WORDS),
         Value::Unset,
         Scope::Every,
-        "Method, step and tolerance by name: preview (automatic, 1e-4), real-time (automatic, 1e-6), \
-         accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step or tolerance that is set as well \
-         overrides the preset.",
+        "Method and accuracy by name: preview (automatic, 1e-4; discrete-gradient, 4, where 8 or more balls are loose), real-time \
+         (automatic, 1e-6; discrete-gradient, 16), accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step, tolerance or \
+         number of steps per impact that is set as well overrides the preset.",
         "Solves paper eqs. (55), (58) in time",
     ),
     at_reset(row(

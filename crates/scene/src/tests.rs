@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::*;
+use jointplay_physics::integrate::StepControl;
 use jointplay_physics::machine::ElementKind;
 
 /// World poses of all bodies at the file's start; slider coordinates of the spcmm law as derived by `physics`.
@@ -183,7 +184,14 @@ fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
 fn presets_say_in_their_help_what_they_are() {
     let help = table().iter().find(|p| p.key == "solver.preset").unwrap().help;
     for preset in Preset::ALL {
-        assert!(help.contains(&format!("{:e}", preset.point().2)), "{preset:?}");
+        for loose in [1, Preset::MANY_LOOSE] {
+            let solver = preset.solver(loose);
+            let value = match solver.method.control() {
+                StepControl::PerImpact => format!("{}, {}", solver.method, solver.steps_per_impact),
+                _ => format!("{}, {:e}", solver.method, solver.tolerance),
+            };
+            assert!(help.contains(&value), "{preset:?}: {value}");
+        }
     }
 }
 

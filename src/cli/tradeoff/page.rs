@@ -55,11 +55,12 @@ fn record(found: &[WorkPrecision], paces: &[(&str, f64)], machine: &str) -> Reco
     let pace = paces.iter().map(|(scene, pace)| ((*scene).to_owned(), *pace)).collect();
     let mut record = Record { machine: machine.to_owned(), pace, ..Record::default() };
     for found in found {
-        let measured = record.scenes.entry(found.reference.scene().name.clone()).or_default();
+        let scene = &found.reference.scene().name;
         for (preset, point) in presets(found) {
-            measured.insert(preset.word().to_owned(), Measured::of(point));
+            let preset = preset.word().to_owned();
             let setting = (point.setting.method.word().to_owned(), point.setting.value());
-            record.points.insert(preset.word().to_owned(), setting);
+            record.scenes.entry(scene.clone()).or_default().insert(preset.clone(), Measured::of(point));
+            record.points.entry(scene.clone()).or_default().insert(preset, setting);
         }
     }
     record
@@ -76,11 +77,17 @@ pub fn skeleton(scenes: &[&str]) -> String {
 
 fn page(machine: &str, found: &[WorkPrecision], paces: &[(&str, f64)], scenes: String, costs: &[CaseCost]) -> String {
     let choices = Preset::ALL.map(|preset| {
-        let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
-        let own = found.first().and_then(|found| found.preset(preset)).map(|point| words(&point.setting));
-        let chosen = choose(found, limit(preset)).map(|setting| words(&setting));
-        let [own, chosen] = [own, chosen].map(|setting| setting.unwrap_or_else(|| "-".to_owned()));
-        vec![preset.word().to_owned(), own, format!("{:e}", limit(preset)), chosen]
+        [false, true].map(|many| {
+            let is_of =
+                |found: &&WorkPrecision| many == (found.reference.scene().machine.loose_joints() >= Preset::MANY_LOOSE);
+            let found: Vec<&WorkPrecision> = found.iter().filter(is_of).collect();
+            let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
+            let own = found.first().and_then(|found| found.preset(preset)).map(|point| words(&point.setting));
+            let chosen = choose(&found, limit(preset)).map(|setting| words(&setting));
+            let [own, chosen] = [own, chosen].map(|setting| setting.unwrap_or_else(|| "-".to_owned()));
+            let balls = if many { "8 or more" } else { "fewer than 8" };
+            vec![preset.word().to_owned(), balls.to_owned(), own, format!("{:e}", limit(preset)), chosen]
+        })
     });
     let held = found.iter().flat_map(|found| {
         presets(found).map(move |(preset, point)| {
@@ -89,7 +96,10 @@ fn page(machine: &str, found: &[WorkPrecision], paces: &[(&str, f64)], scenes: S
         })
     });
     let paces = paces.iter().map(|(scene, pace)| vec![(*scene).to_owned(), times(Some(*pace)), yes(*pace >= 1.0)]);
-    let choices = Table::new("Preset | Setting | Limit of peak errors | Chosen by this run", choices);
+    let choices = Table::new(
+        "Preset | Loose balls | Setting | Limit of peak errors | Chosen by this run",
+        choices.into_iter().flatten(),
+    );
     let gaps = [
         ("machine", machine.to_owned()),
         ("choices", choices.markdown()),

@@ -826,7 +826,7 @@ fn a_preset_chosen_here_replaces_what_was_set_by_name() {
     let mut player = player("spcmm");
     player.set("solver.tolerance", "1e-9").expect("in range");
     player.set("solver.preset", "accurate").expect("a preset");
-    let (_, _, tolerance) = crate::machine::Preset::Accurate.point();
+    let tolerance = crate::machine::Preset::Accurate.solver(3).tolerance;
     assert_eq!(player.pending().machine.solver.tolerance, tolerance);
     assert_eq!(player.running().machine.solver.tolerance, tolerance);
     player.set("solver.tolerance", "1e-9").expect("in range");

@@ -299,6 +299,11 @@ impl Machine {
         })
     }
 
+    /// Number of ball joints with clearance.
+    pub fn loose_joints(&self) -> usize {
+        self.ball_joints.iter().filter(|joint| joint.contact.clearance > 0.0).count()
+    }
+
     /// Sum of the magnitudes of the element forces on each body, N, without the stretch of springs, which needs the start poses.
     fn pushes(&self) -> Vec<f64> {
         let mut pushes = vec![0.0; self.bodies.len()];

@@ -44,7 +44,7 @@ words!(Formulation {
 pub enum Preset {
     /// Fast, rough.
     Preview,
-    /// The fastest that resolves impacts.
+    /// Fast enough to follow the clock.
     RealTime,
     /// For figures.
     Accurate,
@@ -91,13 +91,21 @@ impl Default for Solver {
 }
 
 impl Preset {
-    /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
-    pub fn point(self) -> (Method, f64, f64) {
-        match self {
-            Self::Preview => (Method::Automatic, 10e-6, 1e-4),
-            Self::RealTime => (Method::Automatic, 10e-6, 1e-6),
-            Self::Accurate => (Method::Automatic, 10e-6, 1e-7),
-            Self::Reference => (Method::DormandPrince5, 10e-6, 1e-11),
-        }
+    /// Loose ball joints from which on the fast presets take steps per impact in place of error-controlled ones.
+    pub const MANY_LOOSE: usize = 8;
+
+    /// Stepper settings of the preset for a machine with `loose` ball joints with clearance, chosen by measurement
+    /// (`docs/tradeoff.md`).
+    pub fn solver(self, loose: usize) -> Solver {
+        let many = loose >= Self::MANY_LOOSE;
+        let (method, tolerance, steps_per_impact) = match self {
+            Self::Preview if many => (Method::DiscreteGradient, Solver::default().tolerance, 4),
+            Self::RealTime if many => (Method::DiscreteGradient, Solver::default().tolerance, 16),
+            Self::Preview => (Method::Automatic, 1e-4, 16),
+            Self::RealTime => (Method::Automatic, 1e-6, 16),
+            Self::Accurate => (Method::Automatic, 1e-7, 16),
+            Self::Reference => (Method::DormandPrince5, 1e-11, 16),
+        };
+        Solver { preset: Some(self), method, tolerance, steps_per_impact, ..Solver::default() }
     }
 }
