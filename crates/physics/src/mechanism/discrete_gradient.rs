@@ -104,6 +104,11 @@ impl Touch {
         }
     }
 
+    /// Whether the force found is zero, with its derivatives.
+    fn is_open(&self) -> bool {
+        self.found.force == Vec3::zeros() && self.contact().is_some()
+    }
+
     /// Whether friction acts on the surfaces.
     fn follows_surfaces(&self) -> bool {
         matches!(&self.law, Law::Contact(law) if law.friction > 0.0 && law.uses_surface_velocity())
@@ -362,11 +367,12 @@ impl DiscreteGradient {
                 };
             }
             if iteration > 0 {
-                // Work of the missing forces on the velocities that they would cause.
-                self.right.clear();
-                self.right.extend(self.touches.iter().map(|touch| touch.found.force - touch.force));
-                let missing = |i: usize| self.right[i].dot(&self.velocities(i)[1]);
-                let now: f64 = (0..self.touches.len()).map(missing).sum();
+                // Work of each missing force on the velocity that it would cause.
+                let missing = |(i, touch): (usize, &Touch)| {
+                    let force = touch.found.force - touch.force;
+                    force.dot(&(self.mobility[self.band.at(i, i)][1] * force))
+                };
+                let now: f64 = self.touches.iter().enumerate().map(missing).sum();
                 if !(now <= merit) && cuts < CUTS {
                     cuts += 1;
                     part *= CUT;
@@ -404,6 +410,9 @@ impl DiscreteGradient {
         let band = &self.band;
         let mut sum = [Vec3::zeros(); 2];
         for j in band.row(i) {
+            if self.right[j] == Vec3::zeros() {
+                continue;
+            }
             let mobility = &self.mobility[band.at(i, j)];
             sum[0] += mobility[0] * self.right[j];
             sum[1] += mobility[1] * self.right[j];
@@ -417,6 +426,10 @@ impl DiscreteGradient {
         self.right.clear();
         for (i, touch) in self.touches.iter().enumerate() {
             let StepForce { by_velocity, by_slip, force, .. } = &touch.found;
+            if touch.is_open() {
+                self.right.push(Vec3::zeros());
+                continue;
+            }
             for j in band.row(i) {
                 let unit = if i == j { Mat3::identity() } else { Mat3::zeros() };
                 let [centre, slip] = &self.mobility[band.at(i, j)];
@@ -424,8 +437,10 @@ impl DiscreteGradient {
             }
             self.right.push(force - by_velocity * touch.added[0] - by_slip * touch.added[1]);
         }
-        band.factor(&mut self.blocks);
-        band.solve(&self.blocks, &mut self.right);
+        let touches = &self.touches;
+        let is_open = |i: usize| touches[i].is_open();
+        band.factor(&mut self.blocks, is_open);
+        band.solve(&self.blocks, &mut self.right, is_open);
     }
 
     /// Adds to the mean velocity what the contact forces add, over half a step `half`, s.

@@ -321,7 +321,7 @@ impl Friction {
                 self.blocks[band.at(i, j)] = block;
             }
         }
-        band.factor(&mut self.blocks);
+        band.factor(&mut self.blocks, |_| false);
     }
 
     /// Bound on the rates at which friction damps sliding, 1/s, in the latest factorisation: the largest row sum of norms of H B
@@ -360,7 +360,7 @@ impl Friction {
         for (&slot, right) in self.active.iter().zip(&mut self.right) {
             *right = self.touches[slot].reading(b_v);
         }
-        self.band.solve(&self.blocks, &mut self.right);
+        self.band.solve(&self.blocks, &mut self.right, |_| false);
         for (&slot, w) in self.active.iter().zip(&self.right) {
             let touch = &self.touches[slot];
             touch.push(&(touch.resistance * w), b_v);
