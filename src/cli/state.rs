@@ -15,7 +15,7 @@ use crate::scene::{Scene, visible_line};
 use crate::simulate::State;
 
 /// Version of the file layout.
-const FORMAT: u64 = 4;
+const FORMAT: u64 = 5;
 /// Size limit of a state file, bytes.
 const LARGEST: u64 = 1 << 30;
 

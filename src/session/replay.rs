@@ -155,7 +155,7 @@ mod tests {
             original.step_back();
             original.step_back();
             original.set("solver.preset", "real-time").expect("a preset");
-            original.set("solver.method", "rosenbrock").expect("a method");
+            original.set("solver.method", "radau5").expect("a method");
             original.set("gravity.y", "2 m/s^2").expect("in range");
             original.set_playing(true);
             play(&mut original, 3);

@@ -57,7 +57,7 @@ fn built_in_scenes_go_on_with_the_same_bits() {
         ("pendulum", "rk4"),
         ("slider-crank", "radau5"),
         ("slider-crank-driven", "discrete-gradient"),
-        ("chain", "rosenbrock"),
+        ("chain", "radau5"),
     ] {
         check(scene, &format!("--set solver.method={method}"));
     }
@@ -182,7 +182,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
         refused(same, 2, &["--from-state s: "]);
     }
     for (text, words) in [
-        (good.replace("\"state_format\":4", "\"state_format\":5"), "format 4"),
+        (good.replace("\"state_format\":5", "\"state_format\":6"), "format 5"),
         ("{}".to_owned(), "not a state"),
         ("[1, 2]".to_owned(), "not a state"),
         ("\u{0}\u{1b}[31m".to_owned(), "not a state"),

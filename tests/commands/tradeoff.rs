@@ -65,7 +65,7 @@ fn the_command_writes_all_files_or_none() {
     let png = fs::read(found.join("tradeoff.png")).unwrap();
     assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
     let svg = fs::read_to_string(found.join("tradeoff.svg")).unwrap();
-    assert!(svg.contains("rosenbrock") && svg.contains("Time for a simulated second"));
+    assert!(svg.contains("radau5") && svg.contains("Time for a simulated second"));
 
     // Refused before anything is measured, and left as it was.
     let said = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 1);
@@ -142,7 +142,7 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
         measured: 0.0,
         steps: &[10e-6, 3e-6],
         tolerances: &[1e-4, 1e-8],
-        steps_per_impact: &[4.0, 32.0],
+        steps_per_impact: &[4.0, 64.0],
         seconds: f64::INFINITY,
     };
     let found = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
@@ -152,7 +152,7 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
         let [coarse, fine] = match method.control() {
             StepControl::Fixed => [10e-6, 3e-6],
             StepControl::Error => [1e-4, 1e-8],
-            StepControl::PerImpact => [4.0, 32.0],
+            StepControl::PerImpact => [4.0, 64.0],
         };
         let (coarse_error, fine_error) = (error_at(&found, method, coarse), error_at(&found, method, fine));
         println!("{method}: {coarse_error:e} {fine_error:e}");

@@ -69,7 +69,7 @@ fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
         axes = { axis = [0, 0, 1], angle = \"30 deg\" }\nrotation = { axis = [1, 0, 0], angle = \"20 deg\" }\n";
     let start = "position = \"100 200 300 mm\", rotation = { axis = [1, 0, 0], angle = \"20 deg\" }";
     for formulation in FORMULATIONS {
-        for method in ["radau5", "rosenbrock", "dopri5"] {
+        for method in ["radau5", "dopri5"] {
             for axis in 0..3 {
                 let direction = axes.column(axis).into_owned();
                 let list = |size: f64, unit: &str| {
@@ -122,7 +122,7 @@ fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
         let ways = [
             ("dopri5", "tree"),
             ("radau5", "tree"),
-            ("rosenbrock", "lagrange"),
+            ("radau5", "lagrange"),
             ("automatic", "tree"),
             ("dopri5", "lagrange"),
         ];

@@ -92,12 +92,9 @@ fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
     };
     let (reference, corners) = run("dopri5", "1e-11", "tree");
     assert!(corners >= 6, "{corners}");
-    for (method, tolerance, formulation, bound) in [
-        ("dopri5", "1e-10", "lagrange", 1e-7),
-        ("radau5", "1e-9", "tree", 1e-7),
-        ("automatic", "1e-8", "tree", 1e-7),
-        ("rosenbrock", "1e-8", "tree", 1e-6),
-    ] {
+    for (method, tolerance, formulation, bound) in
+        [("dopri5", "1e-10", "lagrange", 1e-7), ("radau5", "1e-9", "tree", 1e-7), ("automatic", "1e-8", "tree", 1e-7)]
+    {
         let (position, _) = run(method, tolerance, formulation);
         let off = (position - reference).norm();
         println!("{method} {tolerance} {formulation}: {off:e} m, {corners} corners");

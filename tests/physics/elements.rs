@@ -1,7 +1,7 @@
 //! Force elements against closed solutions, in every method and both formulations.
 
 use crate::common::matrix::every_way;
-use crate::common::{FOUR_WAYS, parse};
+use crate::common::{THREE_WAYS, parse};
 use jointplay::machine::Vec3;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -60,7 +60,7 @@ fn a_damper_takes_what_the_closed_solution_says() {
     let (k, c): (f64, f64) = (200.0, 4.0);
     let d = c / (2.0 * MASS);
     let w = (k / MASS - d * d).sqrt();
-    for method in ["dopri5", "radau5", "rosenbrock", "automatic", "rk4"] {
+    for method in ["dopri5", "radau5", "automatic", "rk4"] {
         for formulation in ["tree", "lagrange"] {
             let mut simulation = floating(
                 &format!("{SPRING}damping = \"4 N s/m\"\n"),
@@ -125,7 +125,7 @@ fn loads_move_a_body_as_newton_and_euler_say() {
     };
     let (spin_up, time) = (0.02 / 4e-4, 0.1);
     for formulation in ["tree", "lagrange"] {
-        for method in ["dopri5", "radau5", "rosenbrock", "rk4"] {
+        for method in ["dopri5", "radau5", "rk4"] {
             let changes = [
                 ("solver.method", method),
                 ("solver.tolerance", "1e-10"),
@@ -320,7 +320,7 @@ length = \"100 mm\"
 stiffness = \"2 kN/m\"
 side = \"push\"
 ";
-    for (method, formulation) in FOUR_WAYS {
+    for (method, formulation) in THREE_WAYS {
         let changes = [("solver.method", method), ("solver.tolerance", "1e-9"), ("formulation", formulation)];
         let mut simulation = Simulation::new(&parse(text, &changes).machine).unwrap();
         // Where it leaves the spring: half k 0.04^2 - m g 0.04 = half m v^2.

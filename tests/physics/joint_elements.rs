@@ -131,7 +131,7 @@ fn damping_and_preload_of_a_joint_spring_are_those_of_the_closed_solution() {
         let m = on.inertia();
         let (k, c, preload) = (400.0 * m, 8.0 * m, 2.0 * m);
         let spring = on.spring(k, c) + &format!("preload = \"{preload:e} {}\"\n", on.units()[2]);
-        for method in ["dopri5", "radau5", "rosenbrock", "automatic", "rk4"] {
+        for method in ["dopri5", "radau5", "automatic", "rk4"] {
             for formulation in FORMULATIONS {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
                 let mut simulation = on.starts([0.13, 0.0], &spring, &changes);
@@ -172,7 +172,7 @@ fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
             let found = (coarse / fine).log2();
             assert!((found - order).abs() < 0.2, "{method} {formulation}: {found}");
         }
-        for method in ["dopri5", "rosenbrock", "radau5", "automatic"] {
+        for method in ["dopri5", "radau5", "automatic"] {
             let [loose, tight] =
                 [1e-4, 1e-8].map(|tolerance| error(method, formulation, "solver.tolerance", tolerance));
             let label = format!("{method} {formulation}: {loose:e} {tight:e}");
@@ -196,7 +196,7 @@ fn stiff_elements_on_joints_do_not_hold_implicit_methods_back() {
                 simulation.statistics().evaluations
             };
             let explicit = evaluations("dopri5");
-            for method in ["radau5", "rosenbrock", "automatic"] {
+            for method in ["radau5", "automatic"] {
                 let implicit = evaluations(method);
                 println!("{on:?} {formulation} {method} {implicit}, dopri5 {explicit}");
                 assert!(4 * implicit < explicit, "{on:?} {method}: {implicit} {explicit}");
@@ -247,7 +247,7 @@ fn what_acts_on_joints_keeps_momentum_and_its_energy_balance_closes() {
         let springs = springs.replace("DT", turning).replace("DS", sliding);
         let text = TUMBLING.to_owned() + &springs.replace('R', restitution);
         let mut ends = Vec::new();
-        let ways = [("tree", "dopri5"), ("lagrange", "rosenbrock"), ("lagrange", "dopri5"), ("tree", "radau5")];
+        let ways = [("tree", "dopri5"), ("lagrange", "radau5"), ("lagrange", "dopri5"), ("tree", "radau5")];
         // What damps has no part in how they differ: there two are enough.
         for (formulation, method) in ways.into_iter().skip(if damped { 2 } else { 0 }) {
             let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
@@ -466,7 +466,7 @@ fn a_motor_gives_no_more_than_its_limit() {
         );
         // At full force until 0.2 from the target, then free to swing about it.
         let leaves = (2.0 * 0.8 / 20.0_f64).sqrt();
-        for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
+        for method in ["dopri5", "radau5", "automatic"] {
             for formulation in FORMULATIONS {
                 let changes = [("solver.method", method), ("solver.tolerance", "1e-10"), ("formulation", formulation)];
                 let label = format!("{on:?} {method} {formulation}");
@@ -509,7 +509,7 @@ fn a_motor_does_not_sleep_through_a_pulse_of_its_target() {
     };
     let expected = end("rk4");
     assert!(expected.abs() > 1e-4, "{expected:e}");
-    for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
+    for method in ["dopri5", "radau5", "automatic"] {
         let found = end(method);
         assert!((found - expected).abs() < 1e-7, "{method}: {found:e} {expected:e}");
     }

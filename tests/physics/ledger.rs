@@ -160,7 +160,7 @@ fn every_method_keeps_a_ledger() {
             // At 10 us a fixed step resolves an impact to a per cent, its energy to some parts in a thousand.
             let bound = match method {
                 "semi-implicit-euler" => 5e-3,
-                "rk4" | "rosenbrock" => 5e-4,
+                "rk4" => 5e-4,
                 _ => PROMISE,
             };
             let ledger = after(name, &[("solver.method", method)], 0.1);

@@ -14,12 +14,11 @@ fn impacts_of(text: &str, changes: &[(&str, &str)], duration: f64) -> (Simulatio
     (simulation, impacts)
 }
 
-const METHODS: [(&str, &[(&str, &str)]); 6] = [
+const METHODS: [(&str, &[(&str, &str)]); 5] = [
     ("automatic", &[]),
     ("preview", &[("solver.preset", "preview")]),
     ("dopri5", &[("solver.method", "dopri5")]),
     ("radau5", &[("solver.method", "radau5")]),
-    ("rosenbrock", &[("solver.method", "rosenbrock")]),
     ("rk4", &[("solver.method", "rk4"), ("solver.step", "2 us")]),
 ];
 

@@ -362,6 +362,8 @@ fn changes_are_refused_with_key_value_and_range() {
         ("pendulum", "spcmm.frequency", "1 Hz", &["has no such key", "inverse kinematics"]),
         ("spcmm", "spcmm.frequency", "51 Hz", &["allowed 0 Hz to 50 Hz"]),
         ("spcmm", "solver.method", "rk5", &["did you mean `rk4`", "dopri5"]),
+        ("spcmm", "solver.method", "imex-euler", &["did you mean `discrete-gradient`"]),
+        ("spcmm", "solver.method", "rosenbrock", &["did you mean `radau5`"]),
         ("spcmm", "solver.preset", "", &["preview"]),
         ("spcmm", "joint.S2.ball_radius", "0.3 mm", &["joint.S2.ball_radius = 0.3 mm", "below the ball radius"]),
     ];

@@ -135,7 +135,7 @@ pub enum ValueFault {
 }
 
 /// Words of older files, and those to use in their place.
-const REPLACED: [(&str, &str); 1] = [("imex-euler", "discrete-gradient")];
+const REPLACED: [(&str, &str); 2] = [("imex-euler", "discrete-gradient"), ("rosenbrock", "radau5")];
 
 impl Parameter {
     /// Unit in which values are shown; "" for pure numbers, counts and choices.

@@ -325,9 +325,8 @@ static TABLE: [Parameter; 29] = [
         "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; discrete-gradient takes a number of steps \
          per impact, solves each for the contact forces, and stays stable whatever its step: the fastest where many balls are \
          loose, to a few per cent; dopri5 (Dormand-Prince, order 5) chooses its steps by the tolerance and finds the instants at \
-         which contacts begin and end; rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and takes longer steps where \
-         contacts have settled; radau5 (Radau IIA, implicit, order 5) takes the longest there; automatic changes between dopri5, \
-         radau5 and, while friction limits the step, a rosenbrock whose Jacobian contains friction only.",
+         which contacts begin and end; radau5 (Radau IIA, implicit, order 5) does so too and takes longer steps where contacts have \
+         settled; automatic changes between dopri5 and radau5.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(

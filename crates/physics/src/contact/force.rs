@@ -27,15 +27,6 @@ pub struct Force {
     pub slip_speed: f64,
 }
 
-/// Linearisation of full friction; the ramp always uses its tangent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Slope {
-    /// Tangent of the law.
-    Tangent,
-    /// F_T / v_t, which can stop sliding within a step but cannot reverse it.
-    Secant,
-}
-
 /// Derivatives of a contact's force on the ball, and of its normal.
 #[derive(Clone, Copy, Debug)]
 pub struct Stiffness {
@@ -45,8 +36,6 @@ pub struct Stiffness {
     pub by_rate: Mat3,
     /// Derivative with respect to the velocity [`Coefficients::slip_velocity`], N s/m.
     pub by_slip: Mat3,
-    /// dF/dt at fixed eccentricity, due to a ramping clearance, N/s.
-    pub by_clearance: Vec3,
     /// dn/de, 1/m.
     pub normal: Mat3,
 }
@@ -59,7 +48,7 @@ impl Stiffness {
 
     /// Derivatives of a force between two points.
     pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
-        Self { by_displacement, by_rate, by_slip: Mat3::zeros(), by_clearance: Vec3::zeros(), normal: Mat3::zeros() }
+        Self { by_displacement, by_rate, by_slip: Mat3::zeros(), normal: Mat3::zeros() }
     }
 }
 
@@ -159,7 +148,6 @@ impl Coefficients {
         velocity: &Vec3,
         read: &Vec3,
         force: &Force,
-        slope: Slope,
     ) -> Stiffness {
         let Separation { distance, normal: n, penetration, rate } = *gap;
         let approach = contact_state.approach(self, rate);
@@ -176,7 +164,6 @@ impl Coefficients {
         let mut along = -n;
         let mut by_displacement = turning * -force.normal;
         let mut by_slip = Mat3::zeros();
-        let mut by_clearance = Vec3::zeros();
         if self.friction > 0.0 {
             let speed = force.slip_speed;
             let per_speed = self.friction_per_speed(contact_state.friction_branch, speed);
@@ -184,7 +171,7 @@ impl Coefficients {
             along -= sliding * per_speed;
             // dF/dv_t
             let mut resistance = Mat3::identity() * (-per_speed * force.normal);
-            if speed > 0.0 && !(slope == Slope::Secant && speed >= self.slip_high) {
+            if speed > 0.0 {
                 let slope = self.friction_per_speed_slope(contact_state.friction_branch, speed) / speed;
                 resistance -= sliding * sliding.transpose() * (slope * force.normal);
             }
@@ -197,19 +184,11 @@ impl Coefficients {
                 // s = 1 - c/|e|.
                 let swept = resistance * (tangent * read) / distance;
                 by_displacement += swept * n.transpose() * (self.clearance / distance);
-                by_clearance -= swept * self.clearance_rate;
             }
         }
-        by_clearance -= along * (by_penetration * self.clearance_rate);
         // d(delta_dot)/de = (1 - n n') e_dot / |e|.
         by_displacement += along * (n * by_penetration + turning * velocity * by_rate).transpose();
-        Stiffness {
-            by_displacement,
-            by_rate: along * (n * by_rate).transpose(),
-            by_slip,
-            by_clearance,
-            normal: turning,
-        }
+        Stiffness { by_displacement, by_rate: along * (n * by_rate).transpose(), by_slip, normal: turning }
     }
 
     /// Whether a contact may have left its frozen branches of the laws: the step is then searched for corners.
@@ -308,7 +287,7 @@ mod tests {
                     let read = c.slip_velocity(&at.normal, &v, &BALL, &SOCKET);
                     let force = c.force(&contact_state, &at, || read);
                     assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
-                    let mut s = c.linearise(&contact_state, &at, &v, &read, &force, Slope::Tangent);
+                    let mut s = c.linearise(&contact_state, &at, &v, &read, &force);
                     s.add_normal_rotation(&c.slip_velocity_by_normal(&BALL, &SOCKET));
                     let by_velocity = s.by_rate + s.by_slip;
                     for k in 0..3 {
@@ -351,16 +330,5 @@ mod tests {
             let force = c.force(&contact_state(FrictionBranch::Unfrozen, ApproachBranch::Unfrozen), &at, || slow);
             assert_eq!(force.friction == Vec3::zeros(), vanishes, "{part}");
         }
-    }
-
-    #[test]
-    fn the_secant_of_full_friction_cannot_reverse_sliding() {
-        let (c, e, v) = pressed(FrictionVelocity::Centres, 0.04);
-        let contact_state = contact_state(FrictionBranch::Unfrozen, ApproachBranch::Unfrozen);
-        let at = c.separation(&e, &v);
-        let force = c.force(&contact_state, &at, || v);
-        let s = c.linearise(&contact_state, &at, &v, &v, &force, Slope::Secant);
-        let sliding = c.sliding(&at, &v);
-        assert!((s.by_slip * sliding - force.friction).norm() < 1e-12 * force.friction.norm());
     }
 }

@@ -9,7 +9,7 @@ mod state;
 
 pub use approach::ApproachBranch;
 pub use discrete::{ContactStep, StepForce};
-pub use force::{Force, Separation, Slope, Stiffness};
+pub use force::{Force, Separation, Stiffness};
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, settled_half_period, settled_penetration,
     undisturbed_restitution,

@@ -10,14 +10,12 @@ mod fixed;
 mod order_conditions;
 mod radau;
 mod root;
-mod rosenbrock;
 
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
 pub use fixed::{RungeKutta4, SemiImplicitEuler};
 pub use radau::{Polynomial, Radau};
 pub use root::find_root;
-pub use rosenbrock::Rosenbrock;
 
 use crate::words::words;
 use std::ops::Range;
@@ -33,11 +31,9 @@ pub enum Method {
     RungeKutta4,
     /// Dormand-Prince 5(4), adaptive.
     DormandPrince5,
-    /// ROS34PW2, linearly implicit, order 3, adaptive.
-    Rosenbrock,
     /// Radau IIA(5), implicit, order 5, adaptive.
     Radau5,
-    /// Dormand-Prince while accuracy limits the step, ROS34PW2 while friction does, Radau IIA(5) in settled contact.
+    /// Dormand-Prince while accuracy limits the step, Radau IIA(5) in settled contact.
     Automatic,
 }
 
@@ -46,7 +42,6 @@ words!(Method {
     DiscreteGradient => "discrete-gradient",
     RungeKutta4 => "rk4",
     DormandPrince5 => "dopri5",
-    Rosenbrock => "rosenbrock",
     Radau5 => "radau5",
     Automatic => "automatic",
 });
@@ -65,7 +60,7 @@ pub enum StepControl {
 impl Method {
     /// Whether each step solves a system with the Jacobian.
     pub fn is_implicit(self) -> bool {
-        matches!(self, Self::Rosenbrock | Self::Radau5)
+        self == Self::Radau5
     }
 
     /// What sets the size of its steps.
@@ -73,7 +68,7 @@ impl Method {
         match self {
             Self::SemiImplicitEuler | Self::RungeKutta4 => StepControl::Fixed,
             Self::DiscreteGradient => StepControl::PerImpact,
-            Self::DormandPrince5 | Self::Rosenbrock | Self::Radau5 | Self::Automatic => StepControl::Error,
+            Self::DormandPrince5 | Self::Radau5 | Self::Automatic => StepControl::Error,
         }
     }
 
@@ -100,9 +95,9 @@ pub trait System {
     fn scale(&self) -> &[f64];
 }
 
-/// A system for linearly implicit methods: it provides an approximation of its Jacobian J = df/dy that is good in the stiff part.
+/// A system for implicit methods: it provides an approximation of its Jacobian J = df/dy that is good in the stiff part.
 pub trait StiffSystem: System {
-    /// Evaluates J and df/dt at (t, y) and stores them.
+    /// Evaluates J at (t, y) and stores it.
     fn linearise(&mut self, t: f64, y: &[f64]);
     /// Factors `shift` I - J.
     fn factor_shifted(&mut self, shift: f64);
@@ -112,18 +107,6 @@ pub trait StiffSystem: System {
     fn factor_shifted_pair(&mut self, real: f64, imaginary: f64);
     /// Solves with this complex matrix in place for `b_real` + i `b_imaginary`.
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]);
-    /// df/dt at the point where J was evaluated.
-    fn time_derivative(&self) -> &[f64];
-}
-
-/// A system whose friction can be linearised alone.
-pub trait FrictionSystem: System {
-    /// View of the system whose Jacobian contains friction alone.
-    type Part<'a>: StiffSystem
-    where
-        Self: 'a;
-    /// Returns this view.
-    fn friction_alone(&mut self) -> Self::Part<'_>;
 }
 
 /// One-step method.

@@ -517,9 +517,6 @@ mod tests {
                 (re[i], im[i]) = (x[i].re, x[i].im);
             }
         }
-        fn time_derivative(&self) -> &[f64] {
-            &[]
-        }
     }
 
     fn end(epsilon: f64, steps: u32) -> [f64; 2] {

@@ -239,9 +239,6 @@ pub fn implicit_time(coordinates: usize, products: usize) -> f64 {
     800.0 * coordinates as f64 + 6.0 * products as f64
 }
 
-/// Approximate time per ball in contact of a step with only friction implicit, ns.
-pub const FRICTION_TIME: f64 = 1200.0;
-
 /// Maximum number of velocity coordinates of the implicit methods, which hold dense matrices.
 pub const LARGEST_DENSE: usize = 1024;
 /// If all coordinates are coupled, an implicit step with more of them than this costs more than many explicit steps, and the

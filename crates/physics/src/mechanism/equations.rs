@@ -97,9 +97,6 @@ pub(super) trait Equations: Send {
     /// Whether a force accelerates only the coordinates of the trees it acts on.
     fn is_block_diagonal(&self) -> bool;
 
-    /// Motion of the active bodies at (t, y), if bodies can move even with all velocities in `y` zero.
-    fn prescribed_motion(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]>;
-
     /// Constraint rows.
     fn rows(&self) -> usize;
 

@@ -176,11 +176,6 @@ impl Equations for Forest {
         self.constraints.is_none()
     }
 
-    fn prescribed_motion(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]> {
-        self.tree.update_awake(model, t, y);
-        Some(&self.tree.motion)
-    }
-
     fn rows(&self) -> usize {
         self.constraints.as_ref().map_or(0, Constraints::rows)
     }

@@ -512,10 +512,6 @@ impl Equations for Lagrange {
         false
     }
 
-    fn prescribed_motion(&mut self, _: &Model, _: f64, _: &[f64]) -> Option<&[Kinematics]> {
-        None
-    }
-
     fn rows(&self) -> usize {
         self.rows.len()
     }

@@ -19,7 +19,6 @@ mod equations;
 mod factor;
 mod flight;
 mod forest;
-mod friction;
 mod kinematics;
 mod lagrange;
 mod lu;
@@ -272,8 +271,6 @@ pub struct Mechanism {
     joint_names: Vec<String>,
     /// Linearisation, allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
-    /// Linearisation of friction alone.
-    friction: Option<Box<friction::Friction>>,
     sources: power::Sources,
     /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once overwritten.
     evaluated: Option<f64>,
@@ -326,7 +323,6 @@ impl Mechanism {
             gravity: machine.gravity,
             joint_names: machine.cut_joints().map(str::to_owned).collect(),
             stiff: None,
-            friction: None,
             discrete: None,
             free_flight_bodies: Vec::new(),
             moving: ActiveRanges::default(),
@@ -665,45 +661,13 @@ impl Mechanism {
     pub fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
-            let couplings = self.contacts.len() + self.elements.len();
             self.stiff = Some(Box::new(stiff::Stiff::new(
                 &self.model,
                 dimension - positions,
                 dimension,
-                couplings,
                 self.equations.is_block_diagonal(),
             )));
         }
-    }
-
-    /// Allocates the linearisation of friction alone.
-    ///
-    /// # Errors
-    /// The contacts are coupled too widely.
-    pub fn prepare_friction(&mut self) -> Result<(), MechanismError> {
-        if self.friction.is_none() {
-            let (dimension, positions) = (self.dimension(), self.positions());
-            let (contacts, within) = (&self.contacts, self.equations.is_block_diagonal());
-            let velocities = dimension - positions;
-            let friction = friction::Friction::new(&self.model, contacts, velocities, dimension, within)?;
-            self.friction = Some(Box::new(friction));
-        }
-        Ok(())
-    }
-
-    /// Whether the linearisation of friction alone is prepared.
-    pub fn has_friction_alone(&self) -> bool {
-        self.friction.is_some()
-    }
-
-    /// Largest rate at which friction damps the sliding of a contact, 1/s, in its latest linearisation.
-    pub fn friction_rate(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, |f| f.fastest())
-    }
-
-    /// Largest angular frequency of a ball vibrating on its wall, rad/s, in that linearisation.
-    pub fn friction_ringing(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, |f| f.ringing())
     }
 
     /// Approximate cost of linear algebra in the latest implicit step, in evaluations.
@@ -711,12 +675,6 @@ impl Mechanism {
         let stiff = self.stiff.as_ref();
         let [coordinates, products] = stiff.map_or([0; 2], |stiff| stiff.size());
         bounds::implicit_time(coordinates, products) / self.evaluation_time
-    }
-
-    /// The same for the latest step with only friction implicit.
-    pub fn friction_algebra(&self) -> f64 {
-        let touching = self.friction.as_ref().map_or(0, |f| f.touching());
-        bounds::FRICTION_TIME * touching as f64 / self.evaluation_time
     }
 
     /// Maximum number of velocity coordinates for which the automatic choice considers implicit steps.

@@ -1,7 +1,7 @@
 //! The stiff part of the equations of motion, linearised analytically: derivatives of the forces of contacts and force
 //! elements with respect to displacement and velocity.
 //!
-//! A W-method keeps its order with any approximation of the Jacobian, so non-stiff terms (gravity, gyroscopic terms, rotation of
+//! An iteration that solves with an approximate Jacobian still converges, so non-stiff terms (gravity, gyroscopic terms, rotation of
 //! lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
 //! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s, x_q = (b_q + T x_v) / s,
 //! where T maps velocities to position rates.
@@ -11,23 +11,11 @@ use super::contacts::Contacts;
 use super::elements::{ActiveSet, At, Coupling, ForceElement, SceneElement, Turning};
 use super::equations::Equations;
 use super::flight::ActiveRanges;
-use super::kinematics::Kinematics;
 use super::lu::Lu;
-use super::model::{BallJoint, Model};
+use super::model::Model;
 use crate::integrate::{add_scaled, copy, divide};
-use crate::machine::Vec3;
 use nalgebra::Complex;
 use std::ops::Range;
-
-/// Partial time derivatives, at fixed coordinates, of the relative motion of two points and of their bodies.
-#[derive(Clone, Copy, Default)]
-struct Drift {
-    eccentricity: Vec3,
-    rate: Vec3,
-    /// Relative angular velocity and its rate.
-    turn: Vec3,
-    spin: Vec3,
-}
 
 /// The linearisation and its factors.
 pub struct Stiff {
@@ -52,12 +40,8 @@ pub struct Stiff {
     lu: Lu<f64>,
     lu_pair: Lu<Complex<f64>>,
     columns: Vec<Column>,
-    /// df/dt of positions and velocities: the stiff part, from the same matrices as J, because the two nearly cancel.
-    pub time_derivative: Vec<f64>,
     /// Scratch for the derivative at the point of linearisation.
     pub derivative: Vec<f64>,
-    /// Explicit time dependence of the points of each contact and element.
-    drift: Vec<Drift>,
     /// Positions at the linearisation.
     y: Vec<f64>,
     shift: f64,
@@ -74,9 +58,9 @@ pub struct Stiff {
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`, with `couplings` ball joints and elements. With
-    /// `separate`, a force accelerates only the trees it acts on.
-    pub fn new(model: &Model, velocities: usize, dimension: usize, couplings: usize, separate: bool) -> Self {
+    /// For `velocities` velocity coordinates in a state of `dimension`. With `separate`, a force accelerates only the trees it acts
+    /// on.
+    pub fn new(model: &Model, velocities: usize, dimension: usize, separate: bool) -> Self {
         let n = velocities;
         let trees = if separate { trees_of(model) } else { std::iter::once(0..n).collect() };
         let mut tree_of = vec![0; n];
@@ -97,8 +81,6 @@ impl Stiff {
             lu: Lu::new(n),
             lu_pair: Lu::new(n),
             columns: Vec::with_capacity(n),
-            time_derivative: vec![0.0; dimension],
-            drift: vec![Drift::default(); couplings],
             derivative: vec![0.0; dimension],
             y: vec![0.0; dimension],
             shift: 1.0,
@@ -130,26 +112,21 @@ impl Stiff {
         for [.., at] in self.entries.iter().map(|entry| entry.map(|x| x as usize)) {
             (self.by_position[at], self.by_velocity[at]) = (0.0, 0.0);
         }
-        self.time_derivative.fill(0.0);
         self.linked.fill(false);
         self.empty = true;
         let at = At { t, motion, touching };
         let of_contacts = contacts.loose().map(|contact| contact.coupling(&at));
         let of_elements = elements.iter().map(|element| element.coupling(&at));
-        for (i, coupling) in of_contacts.chain(of_elements).enumerate() {
-            let Some(coupling) = coupling else {
-                continue;
-            };
+        for coupling in of_contacts.chain(of_elements).flatten() {
             self.empty = false;
             let (sides, n) = (&coupling.sides, &coupling.normal);
             if let Some(turning) = &coupling.turning {
                 collect_relative_columns(&mut self.columns, model, equations, sides);
-                self.add_turning(turning, i);
+                self.add_turning(turning);
             } else {
                 collect_columns(&mut self.columns, model, equations, sides, n);
             }
             self.add(&coupling);
-            self.add_drift(&coupling, i);
             self.link();
         }
         self.coordinates.clear();
@@ -182,46 +159,8 @@ impl Stiff {
         }
     }
 
-    /// Records the explicit time dependence of contact and element points, from a motion with all coordinates at rest.
-    pub fn observe_drift(
-        &mut self,
-        contacts: &Contacts,
-        elements: &[Box<dyn SceneElement>],
-        touching: ActiveSet<'_>,
-        motion: &[Kinematics],
-    ) {
-        let of_contacts = contacts.loose().map(|contact| {
-            let ends = contact.ends(motion);
-            ends.filter(|_| contact.may_press(touching))
-        });
-        let of_elements = elements.iter().map(|element| element.ends(motion));
-        for (drift, ends) in self.drift.iter_mut().zip(of_contacts.chain(of_elements)) {
-            *drift = ends.map_or_else(Drift::default, |[socket, ball]| {
-                let joint = BallJoint { socket, ball, ideal: None };
-                let (b, s) = (&motion[ball.body], &motion[socket.body]);
-                Drift {
-                    eccentricity: joint.opening_rate(motion),
-                    rate: joint.opening_acceleration(motion),
-                    turn: b.angular_velocity - s.angular_velocity,
-                    spin: b.angular_acceleration - s.angular_acceleration,
-                }
-            });
-        }
-    }
-
-    /// dQ_k/dt of one coupling. Sliding due to the rotation of driven bodies is not stiff and is left out.
-    fn add_drift(&mut self, coupling: &Coupling, i: usize) {
-        let (s, drift) = (&coupling.stiffness, self.drift[i]);
-        let force = s.by_displacement * drift.eccentricity + (s.by_rate + s.by_slip) * drift.rate + s.by_clearance;
-        let lever = (s.normal * drift.eccentricity).cross(&coupling.force);
-        let positions = self.time_derivative.len() - self.n;
-        for k in &self.columns {
-            self.time_derivative[positions + k.coordinate] += k.surface.dot(&force) + k.turn.dot(&lever);
-        }
-    }
-
-    /// Adds the torque of one coupling: dQ_k = turn_k . dT, and dQ_k/dt.
-    fn add_turning(&mut self, turning: &Turning, i: usize) {
+    /// Adds the torque of one coupling: dQ_k = turn_k . dT.
+    fn add_turning(&mut self, turning: &Turning) {
         let n = self.n;
         for l in &self.columns {
             let torque_q = turning.by_turn * l.turn;
@@ -231,12 +170,6 @@ impl Stiff {
                 self.by_position[at] += k.turn.dot(&torque_q);
                 self.by_velocity[at] += k.turn.dot(&torque_v);
             }
-        }
-        let drift = self.drift[i];
-        let torque = turning.by_turn * drift.turn + turning.by_spin * drift.spin + turning.by_time;
-        let positions = self.time_derivative.len() - n;
-        for k in &self.columns {
-            self.time_derivative[positions + k.coordinate] += k.turn.dot(&torque);
         }
     }
 
@@ -297,8 +230,6 @@ impl Stiff {
                 }
             }
         }
-        let positions = self.time_derivative.len() - n;
-        equations.apply_inverse_mass(model, &mut self.time_derivative[positions..]);
     }
 
     /// Number of coupled coordinates, and of products in their latest elimination with a real shift; 0 without couplings.
@@ -485,7 +416,7 @@ mod tests {
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
-            // Rounding of the differences and terms that a W-method may omit stay below 1e-3 of the stiffest entry.
+            // Rounding of the differences and terms that are left out stay below 1e-3 of the stiffest entry.
             let compare = |name: &str, got: &[f64], plus: &[f64], minus: &[f64], scale: f64, width: f64| {
                 for k in 0..n {
                     let want = (plus[nq + k] - minus[nq + k]) / (2.0 * width);
@@ -519,10 +450,6 @@ mod tests {
                 faster(-1.0, &mut minus);
                 compare(&format!("D{l}"), &stiff.by_velocity[l * n..][..n], &plus, &minus, dampest, 1e-8);
             }
-            let mut evaluator = m.evaluator(touching);
-            evaluator.derivative(t + 1e-9, &y, &mut plus);
-            evaluator.derivative(t - 1e-9, &y, &mut minus);
-            compare("ft", &stiff.time_derivative[nq..], &plus, &minus, 1e-2 * stiffest, 1e-9);
         }
     }
 
@@ -614,11 +541,6 @@ mod tests {
                     let column = &stiff.by_velocity[l * n..][..n];
                     check(format!("D{l}"), column, &plus, &minus, dampest);
                 }
-                m.evaluator(ActiveSet::Nothing).derivative(t + 1e-6, &y, &mut plus);
-                m.evaluator(ActiveSet::Nothing).derivative(t - 1e-6, &y, &mut minus);
-                // Speeds are a few mm/s.
-                let rates = 1e-2 * stiffest;
-                check("ft".to_owned(), &stiff.time_derivative[nq..], &plus, &minus, rates);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::elements::{ActiveSet, Counts};
 use super::elements::{At, Loads};
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
-use crate::integrate::{FrictionSystem, Rosenbrock, StiffSystem, System};
+use crate::integrate::{StiffSystem, System};
 use std::ops::Range;
 
 /// The equations of motion, with the contacts that may carry a force during a step.
@@ -108,19 +108,11 @@ impl System for Evaluator<'_> {
 
 impl StiffSystem for Evaluator<'_> {
     fn linearise(&mut self, t: f64, y: &[f64]) {
-        let positions = self.positions();
         self.mechanism.prepare_linearisation();
         let Some(mut stiff) = self.mechanism.stiff.take() else {
             return;
         };
         let mut scratch = std::mem::take(&mut stiff.derivative);
-        // Only prescribed motion gives contacts an explicit time dependence; other bodies are taken at rest.
-        scratch[..positions].copy_from_slice(&y[..positions]);
-        scratch[positions..].fill(0.0);
-        let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
-        if let Some(motion) = equations.prescribed_motion(model, t, &scratch) {
-            stiff.observe_drift(contacts, elements, self.touching, motion);
-        }
         self.derivative(t, y, &mut scratch);
         stiff.derivative = scratch;
         let Mechanism { model, equations, contacts, elements, .. } = &mut *self.mechanism;
@@ -154,90 +146,5 @@ impl StiffSystem for Evaluator<'_> {
         if let Some(stiff) = stiff {
             stiff.solve_pair(b_real, b_imaginary, moving, &**equations, model);
         }
-    }
-
-    fn time_derivative(&self) -> &[f64] {
-        self.mechanism.stiff.as_ref().map_or(&[], |stiff| &stiff.time_derivative)
-    }
-}
-
-/// The equations of motion with only friction linearised.
-pub struct FrictionJacobian<'e, 'a>(&'e mut Evaluator<'a>);
-
-impl<'a> FrictionSystem for Evaluator<'a> {
-    type Part<'e>
-        = FrictionJacobian<'e, 'a>
-    where
-        Self: 'e;
-
-    fn friction_alone(&mut self) -> FrictionJacobian<'_, 'a> {
-        FrictionJacobian(self)
-    }
-}
-
-impl System for FrictionJacobian<'_, '_> {
-    fn dimension(&self) -> usize {
-        self.0.dimension()
-    }
-
-    fn positions(&self) -> usize {
-        self.0.positions()
-    }
-
-    fn moving(&self) -> &[Range<usize>] {
-        self.0.moving()
-    }
-
-    fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        self.0.derivative(t, y, dy);
-    }
-
-    fn position_rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        System::position_rate(self.0, t, y, dy);
-    }
-
-    fn scale(&self) -> &[f64] {
-        self.0.scale()
-    }
-}
-
-impl StiffSystem for FrictionJacobian<'_, '_> {
-    fn linearise(&mut self, t: f64, y: &[f64]) {
-        let Some(mut friction) = self.0.mechanism.friction.take() else {
-            return;
-        };
-        let mut scratch = std::mem::take(&mut friction.derivative);
-        self.0.derivative(t, y, &mut scratch);
-        friction.derivative = scratch;
-        let touching = self.0.touching;
-        let Mechanism { model, equations, contacts, .. } = &mut *self.0.mechanism;
-        friction.gather(model, contacts, touching, &mut **equations, y);
-        self.0.mechanism.friction = Some(friction);
-    }
-
-    fn factor_shifted(&mut self, shift: f64) {
-        if let Some(friction) = &mut self.0.mechanism.friction {
-            friction.factor(shift, Rosenbrock::step_of(shift));
-        }
-    }
-
-    fn solve_shifted(&mut self, b: &mut [f64]) {
-        let Mechanism { model, equations, friction, moving, .. } = &mut *self.0.mechanism;
-        if let Some(friction) = friction {
-            friction.solve(b, moving, &**equations, model);
-        }
-    }
-
-    fn factor_shifted_pair(&mut self, _: f64, _: f64) {
-        unreachable!("no method with complex shifts steps friction alone");
-    }
-
-    fn solve_shifted_pair(&mut self, _: &mut [f64], _: &mut [f64]) {
-        unreachable!("no method with complex shifts steps friction alone");
-    }
-
-    fn time_derivative(&self) -> &[f64] {
-        let friction = self.0.mechanism.friction.as_ref();
-        friction.map_or(&[], |friction| &friction.time_derivative)
     }
 }

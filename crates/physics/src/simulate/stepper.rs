@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::integrate::{
-    DormandPrince, FrictionSystem, Method, Polynomial, Radau, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper,
-    StiffSystem, System, hermite,
+    DormandPrince, Method, Polynomial, Radau, RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, System, hermite,
 };
 use std::ops::Range;
 
@@ -14,12 +13,10 @@ pub(super) enum AnyStepper {
     DiscreteGradient,
     RungeKutta4(RungeKutta4),
     DormandPrince(DormandPrince),
-    Rosenbrock(Box<Rosenbrock>),
     Radau(Box<Radau>),
     /// One scheme at a time.
     Automatic {
         explicit: DormandPrince,
-        friction: Box<Rosenbrock>,
         stiff: Box<Radau>,
         member: ActiveScheme,
     },
@@ -31,8 +28,6 @@ pub(super) enum ActiveScheme {
     /// Dormand-Prince.
     #[default]
     Explicit,
-    /// ROS34PW2 with only friction in its Jacobian.
-    Friction,
     /// Radau IIA.
     Implicit,
 }
@@ -44,11 +39,9 @@ impl AnyStepper {
             Method::DiscreteGradient => Self::DiscreteGradient,
             Method::RungeKutta4 => Self::RungeKutta4(RungeKutta4::new(dimension)),
             Method::DormandPrince5 => Self::DormandPrince(DormandPrince::new(dimension)),
-            Method::Rosenbrock => Self::Rosenbrock(Box::new(Rosenbrock::new(dimension))),
             Method::Radau5 => Self::Radau(Box::new(Radau::new(dimension))),
             Method::Automatic => Self::Automatic {
                 explicit: DormandPrince::new(dimension),
-                friction: Box::new(Rosenbrock::new(dimension)),
                 stiff: Box::new(Radau::new(dimension)),
                 member: ActiveScheme::Explicit,
             },
@@ -62,7 +55,6 @@ impl AnyStepper {
             Self::DiscreteGradient => Method::DiscreteGradient,
             Self::RungeKutta4(_) => Method::RungeKutta4,
             Self::DormandPrince(_) => Method::DormandPrince5,
-            Self::Rosenbrock(_) => Method::Rosenbrock,
             Self::Radau(_) => Method::Radau5,
             Self::Automatic { .. } => Method::Automatic,
         }
@@ -78,12 +70,7 @@ impl AnyStepper {
     /// Discards data computed at a state that is no longer current.
     pub(super) fn invalidate(&mut self) {
         match self {
-            Self::Rosenbrock(stiff) => stiff.invalidate(),
-            Self::Radau(stiff) => stiff.invalidate(),
-            Self::Automatic { friction, stiff, .. } => {
-                friction.invalidate();
-                stiff.invalidate();
-            }
+            Self::Radau(stiff) | Self::Automatic { stiff, .. } => stiff.invalidate(),
             _ => {}
         }
     }
@@ -119,7 +106,7 @@ impl AnyStepper {
         }
     }
 
-    pub(super) fn attempt<S: StiffSystem + FrictionSystem>(
+    pub(super) fn attempt<S: StiffSystem>(
         &mut self,
         system: &mut S,
         t: f64,
@@ -137,10 +124,6 @@ impl AnyStepper {
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DormandPrince(s) | Self::Automatic { explicit: s, member: ActiveScheme::Explicit, .. } => {
                 s.attempt(system, t, h, y, k, y_end, k_end)
-            }
-            Self::Rosenbrock(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::Automatic { friction: s, member: ActiveScheme::Friction, .. } => {
-                s.attempt(&mut system.friction_alone(), t, h, y, k, y_end, k_end)
             }
             Self::Radau(s) | Self::Automatic { stiff: s, .. } => {
                 s.attempt(system, t, h, y, k, y_end, k_end, tolerance, polynomial)
@@ -206,11 +189,7 @@ impl AnyStepper {
         out: &mut [f64],
     ) {
         match self {
-            Self::SemiImplicitEuler(_)
-            | Self::DiscreteGradient
-            | Self::RungeKutta4(_)
-            | Self::Rosenbrock(_)
-            | Self::Automatic { member: ActiveScheme::Friction, .. } => {
+            Self::SemiImplicitEuler(_) | Self::DiscreteGradient | Self::RungeKutta4(_) => {
                 let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
                 hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
             }

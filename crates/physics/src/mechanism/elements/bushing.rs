@@ -134,11 +134,10 @@ impl ForceElement for Bushing {
         let turning = Turning {
             by_turn: world(to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose()),
             by_spin: across(&self.turning_damping),
-            by_time: Vec3::zeros(),
         };
         let along = [across(&self.stiffness), across(&self.damping)];
         let ends = self.ends_in(&s, at.motion);
-        Some(Coupling::at_one_point(ends, along, Vec3::zeros(), turning))
+        Some(Coupling::at_one_point(ends, along, turning))
     }
 
     fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {

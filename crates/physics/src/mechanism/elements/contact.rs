@@ -1,7 +1,7 @@
 //! Ball joint with clearance: contact between a ball and the wall of its socket, by the laws in `contact`.
 
 use super::{ActiveSet, At, Coupling, ForceElement, Loads};
-use crate::contact::{Coefficients, Force, Separation, Slope};
+use crate::contact::{Coefficients, Force, Separation};
 use crate::machine::Vec3;
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
@@ -176,8 +176,7 @@ impl ForceElement for Contact {
         let n = gap.separation.normal;
         let read = self.slip_velocity(&n, at.motion);
         let force = Force { normal: gap.normal_force, friction: gap.friction, slip_speed: gap.slip_speed };
-        let mut stiffness =
-            self.law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force, Slope::Tangent);
+        let mut stiffness = self.law.linearise(contact_state, &gap.separation, &gap.eccentricity_rate, &read, &force);
         let [ball, socket] = self.spins(at.motion);
         stiffness.add_normal_rotation(&self.law.slip_velocity_by_normal(ball, socket));
         Some(Coupling {

@@ -38,11 +38,10 @@ pub(super) struct Place {
     arms: [Vec3; 2],
 }
 
-/// Derivatives of a force along a coordinate with respect to the coordinate, its rate and time.
+/// Derivatives of a force along a coordinate with respect to the coordinate and its rate.
 pub(super) struct Slopes {
     pub by_position: f64,
     pub by_rate: f64,
-    pub by_time: f64,
 }
 
 impl Coordinate {
@@ -120,13 +119,12 @@ impl Coordinate {
     pub fn coupling(&self, place: &Place, slopes: &Slopes, motion: &[Kinematics]) -> Coupling {
         let along = place.along * place.along.transpose();
         let (stiffness, damping) = (along * slopes.by_position, along * slopes.by_rate);
-        let by_time = place.along * slopes.by_time;
         let ends = self.ends(motion);
         if self.turns {
-            let turning = Turning { by_turn: stiffness, by_spin: damping, by_time };
-            return Coupling::at_one_point(ends, [Mat3::zeros(); 2], Vec3::zeros(), turning);
+            let turning = Turning { by_turn: stiffness, by_spin: damping };
+            return Coupling::at_one_point(ends, [Mat3::zeros(); 2], turning);
         }
-        Coupling::at_one_point(ends, [stiffness, damping], by_time, Turning::default())
+        Coupling::at_one_point(ends, [stiffness, damping], Turning::default())
     }
 
     /// Report of a force along the axis.

@@ -46,7 +46,7 @@ impl ForceElement for JointSpring {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let (place, _) = self.at(at.motion);
-        let slopes = Slopes { by_position: -self.elastic.stiffness(place.off), by_rate: -self.damping, by_time: 0.0 };
+        let slopes = Slopes { by_position: -self.elastic.stiffness(place.off), by_rate: -self.damping };
         Some(self.on.coupling(&place, &slopes, at.motion))
     }
 

@@ -116,8 +116,6 @@ pub(super) struct Turning {
     /// Derivatives with respect to relative rotation, N m/rad, and to relative angular velocity, N m s/rad.
     pub by_turn: Mat3,
     pub by_spin: Mat3,
-    /// Time derivative at fixed motion, N m/s.
-    pub by_time: Vec3,
 }
 
 impl Coupling {
@@ -133,15 +131,9 @@ impl Coupling {
         }
     }
 
-    /// For a force at the second of two coincident points, N/m, N s/m and N/s, and a torque on its body.
-    fn at_one_point(
-        [from, to]: [Anchor; 2],
-        [by_displacement, by_rate]: [Mat3; 2],
-        by_time: Vec3,
-        turning: Turning,
-    ) -> Self {
+    /// For a force at the second of two coincident points, N/m and N s/m, and a torque on its body.
+    fn at_one_point([from, to]: [Anchor; 2], [by_displacement, by_rate]: [Mat3; 2], turning: Turning) -> Self {
         let mut coupling = Self::between_points([from, to], by_displacement, by_rate);
-        coupling.stiffness.by_clearance = by_time;
         // With these distances, `Column::turn` is the relative angular velocity itself.
         coupling.sides = [(to, 1.0), (from, 1.0)];
         coupling.turning = Some(turning);

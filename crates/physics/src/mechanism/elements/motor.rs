@@ -69,12 +69,7 @@ impl ForceElement for Motor {
         if force.abs() > self.limit || (self.stiffness == 0.0 && self.damping == 0.0) {
             return None;
         }
-        let target = self.target(at.t);
-        let slopes = Slopes {
-            by_position: -self.stiffness,
-            by_rate: -self.damping,
-            by_time: self.stiffness * target.rate + self.damping * target.acceleration,
-        };
+        let slopes = Slopes { by_position: -self.stiffness, by_rate: -self.damping };
         Some(self.on.coupling(&place, &slopes, at.motion))
     }
 

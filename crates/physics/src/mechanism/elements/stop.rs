@@ -101,7 +101,6 @@ impl ForceElement for Stop {
         let slopes = Slopes {
             by_position: -1.5 * self.stiffness * press.depth.abs().sqrt() * (1.0 + self.damping * press.rate),
             by_rate: -press.elastic * self.damping,
-            by_time: 0.0,
         };
         Some(self.on.coupling(&place, &slopes, at.motion))
     }

@@ -87,10 +87,7 @@ impl ForceElement for Tyre {
         let along = self.up * self.up.transpose();
         let ends = self.ends(at.motion)?;
         let by_height: [Mat3; 2] = [along * -self.stiffness, along * -self.damping];
-        let mut coupling = Coupling::between_points(ends, by_height[0], by_height[1]);
-        let ground = self.stiffness * s.ground.rate + self.damping * s.ground.acceleration;
-        coupling.stiffness.by_clearance = self.up * ground;
-        Some(coupling)
+        Some(Coupling::between_points(ends, by_height[0], by_height[1]))
     }
 
     fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {

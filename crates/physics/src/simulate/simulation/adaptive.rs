@@ -23,8 +23,6 @@ const OF_IMPACTS: f64 = 1e-5;
 const WHILE_PRESSED: f64 = 0.001;
 /// Smallest and largest step-size factor after an attempt whose iteration failed.
 const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
-/// Ratio of error to allowed error beyond which the step was unstable, not merely inaccurate.
-const BLOWN_UP: f64 = 100.0;
 
 /// A step as it was before an event truncated it.
 #[derive(Clone, Copy)]
@@ -125,9 +123,6 @@ impl Run<'_> {
                 growth.clamp(AFTER_FAILURE.0, AFTER_FAILURE.1)
             };
             state.control.h_next = h * factor;
-            if error > BLOWN_UP && self.try_friction_scheme() {
-                self.state.control.h_next = h;
-            }
             return None;
         }
         let factor = state.control.controller.after_accept(error);

@@ -11,11 +11,9 @@ use crate::simulate::stepper::ActiveScheme;
 pub(super) const STABILITY_LIMIT: f64 = 3.0;
 /// Stability-limited steps before the implicit scheme is tried.
 const LIMITED_STEPS: u32 = 8;
-/// Stability-limited steps before friction is tried as the cause.
-const LIMITED_BEFORE_FRICTION: u32 = 2;
 /// Steps since the latest contact began before the implicit scheme is tried.
 const SETTLED_STEPS: u32 = 60;
-/// A scheme passes its trial if its progress per cost is at least `WORTH_IT` times that of the steps before. Otherwise it waits
+/// The implicit scheme passes its trial if its progress per cost is at least `WORTH_IT` times that of the steps before. Otherwise it waits
 /// for explicit steps that cost `EXPLICIT_TURN` times as much as the trial; each consecutive failure doubles the wait, up to
 /// `MOST_DOUBLINGS` times.
 const WORTH_IT: f64 = 0.7;
@@ -25,20 +23,13 @@ const MOST_DOUBLINGS: u32 = 3;
 const TRIAL_STEPS: u32 = 24;
 /// Initial trial steps that do not count once they are complete, because the step size is still growing.
 const GROWING_STEPS: u32 = 4;
-/// Steps in a trial of the friction scheme, unless friction stops limiting the step size before.
-const FRICTION_STEPS: u32 = 8;
-/// Tolerance below which the friction scheme is on trial: its lower order may make its steps shorter than explicit ones.
-const TRIED_BELOW: f64 = 2e-6;
-/// Longest step of the friction scheme times the angular frequency at which a ball rings on its wall: the normal force is
-/// explicit, and at loose tolerances longer steps sustain the ringing.
-const RINGING: f64 = 1.5;
-/// Decay per step of the recorded progress and cost of the explicit schemes.
+/// Decay per step of the recorded progress and cost of the explicit scheme.
 const KEPT: f64 = 0.95;
 /// Cost of a step besides evaluations and algebra (events, peaks, energies), and total cost of an explicit step, in evaluations.
 const STEP_COST: f64 = 6.0;
 const EXPLICIT_COST: f64 = STEP_COST + 6.0;
 
-/// Steps of a scheme on trial, and the outcome of earlier trials.
+/// Steps of the implicit scheme on trial, and the outcome of earlier trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Trial {
     /// Time, s, cost, in evaluations, and number of its steps.
@@ -80,21 +71,19 @@ impl Trial {
 /// State of the automatic choice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(in crate::simulate) struct SchemeSelector {
-    /// Steps other than implicit ones since the latest contact began, and how many of them were limited by stability.
+    /// Explicit steps since the latest contact began, and how many of them were limited by stability.
     since_contact: u32,
     limited: u32,
     /// Explicit step size at the latest switch to the implicit method, s.
     h_explicit: f64,
-    /// Time, s, and cost, in evaluations, of the latest steps other than implicit ones.
+    /// Time, s, and cost, in evaluations, of the latest explicit steps.
     explicit_progress: f64,
     explicit_cost: f64,
-    /// Trials of the friction scheme and of the implicit one.
-    friction: Trial,
     implicit: Trial,
 }
 
 impl SchemeSelector {
-    /// Progress per cost of the latest steps other than implicit ones.
+    /// Progress per cost of the latest explicit steps.
     fn explicit(&self) -> f64 {
         self.explicit_progress / self.explicit_cost
     }
@@ -120,14 +109,8 @@ impl Run<'_> {
 
     /// Chooses the scheme of the next step, after one of size `h` that took `evaluations` evaluations.
     pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
-        let before = self.state.control.member;
-        if before == ActiveScheme::Friction {
-            let longest = RINGING / self.mechanism.friction_ringing();
-            let control = &mut self.state.control;
-            control.h_next = control.h_next.min(longest);
-        }
         let member = self.next_member(h, stiffness, evaluations);
-        if member != before {
+        if member != self.state.control.member {
             self.put_member(member);
         }
     }
@@ -135,45 +118,22 @@ impl Run<'_> {
     fn put_member(&mut self, member: ActiveScheme) {
         self.state.control.member = member;
         self.state.control.controller = controller_of(Method::Automatic, member);
-        // Only schemes with their own interpolant locate corners.
-        self.freeze_branches(false);
         self.invalidate();
-    }
-
-    /// After an unstable explicit step: switches to the friction scheme if friction on its ramp may be the cause; returns whether
-    /// it did so.
-    pub(super) fn try_friction_scheme(&mut self) -> bool {
-        let touches = self.state.now.contact_states.iter().any(|m| m.active);
-        let turns = self.state.conditions.solver.method == Method::Automatic
-            && self.state.control.member == ActiveScheme::Explicit
-            && self.state.control.choice.friction.wait == 0
-            && touches
-            && self.mechanism.has_friction_alone();
-        if turns {
-            self.put_member(ActiveScheme::Friction);
-            self.stepper.choose(ActiveScheme::Friction);
-        }
-        turns
     }
 
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> ActiveScheme {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
-        let tries_friction = self.state.conditions.solver.tolerance < TRIED_BELOW;
         let state = &mut self.state;
         let member = state.control.member;
         let algebra = match member {
             ActiveScheme::Explicit => 0.0,
-            ActiveScheme::Friction => self.mechanism.friction_algebra(),
             ActiveScheme::Implicit => factorisations * self.mechanism.implicit_algebra(),
         };
         let cost = evaluations + algebra + STEP_COST;
         let choice = &mut state.control.choice;
-        match member {
-            ActiveScheme::Explicit => choice.friction.wait = choice.friction.wait.saturating_sub(1),
-            ActiveScheme::Friction if tries_friction => choice.friction.add(h, cost),
-            ActiveScheme::Friction => {}
-            ActiveScheme::Implicit => choice.implicit.add(h, cost),
+        if member == ActiveScheme::Implicit {
+            choice.implicit.add(h, cost);
         }
         if state.control.contact_began {
             choice.since_contact = 0;
@@ -203,54 +163,28 @@ impl Run<'_> {
         choice.since_contact += 1;
         choice.explicit_progress = KEPT * choice.explicit_progress + h;
         choice.explicit_cost = KEPT * choice.explicit_cost + cost;
-        let touches = state.now.contact_states.iter().any(|m| m.active);
-        let mut next = member;
-        if member == ActiveScheme::Friction {
-            // A friction step costs more than an explicit one, so it must be longer in proportion.
-            let dearer = 1.0 + algebra / EXPLICIT_COST;
-            let over = self.mechanism.friction_rate() * h < STABILITY_LIMIT * dearer;
-            let ends = over || choice.friction.steps >= FRICTION_STEPS;
-            let before = choice.explicit();
-            let fails = tries_friction && ends && choice.friction.conclude_trial(before);
-            if over || fails {
-                choice.limited = 0;
-                next = ActiveScheme::Explicit;
-            } else {
-                choice.limited += 1;
-            }
-        } else {
-            choice.limited =
-                if stiffness > STABILITY_LIMIT { choice.limited + 1 } else { choice.limited.saturating_sub(1) };
-            if touches
-                && choice.friction.wait == 0
-                && self.mechanism.has_friction_alone()
-                && choice.limited >= LIMITED_BEFORE_FRICTION
-                && choice.limited < LIMITED_STEPS
-            {
-                next = ActiveScheme::Friction;
-            }
-        }
+        choice.limited =
+            if stiffness > STABILITY_LIMIT { choice.limited + 1 } else { choice.limited.saturating_sub(1) };
         if choice.implicit.wait > 0 {
             choice.implicit.wait -= 1;
-            return next;
+            return member;
         }
+        let touches = state.now.contact_states.iter().any(|m| m.active);
         let limited = choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
         let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
         if settled && velocities <= self.mechanism.largest_implicit() {
             (choice.since_contact, choice.limited) = (0, 0);
             choice.h_explicit = h;
             choice.implicit.restart();
-            choice.friction.restart();
             return ActiveScheme::Implicit;
         }
-        next
+        member
     }
 }
 
 /// Step-size control for the order of the method's error estimate.
 pub(in crate::simulate) fn controller_of(method: Method, member: ActiveScheme) -> Controller {
     Controller::new(match (method, member) {
-        (Method::Rosenbrock, _) | (Method::Automatic, ActiveScheme::Friction) => 2,
         (Method::Radau5, _) | (Method::Automatic, ActiveScheme::Implicit) => 3,
         _ => 4,
     })
@@ -271,10 +205,6 @@ pub(in crate::simulate) fn prepare_implicit(mechanism: &mut Mechanism, method: M
     let tries = method == Method::Automatic && velocities <= mechanism.largest_implicit();
     if method.is_implicit() || tries {
         mechanism.prepare_linearisation();
-    }
-    if method == Method::Automatic {
-        // If contacts couple too widely, the method does without the friction scheme.
-        let _ = mechanism.prepare_friction();
     }
     Ok(())
 }

@@ -3,8 +3,7 @@
 
 use super::{Run, State};
 use crate::contact::{ApproachBranch, ContactState, FrictionBranch};
-use crate::integrate::{Method, find_root};
-use crate::simulate::stepper::ActiveScheme;
+use crate::integrate::find_root;
 
 /// Parts of a step at whose ends sliding speed and penetration rate are checked.
 const PARTS: u32 = 4;
@@ -58,18 +57,10 @@ impl Corner {
 }
 
 impl Run<'_> {
-    /// Whether the method locates corners. This takes the method's own interpolant: over a step longer than the contact's
-    /// oscillation, a cubic through both ends overshoots, and a step that ends on it gains energy.
-    fn locates_corners(&self) -> bool {
-        let method = self.state.conditions.solver.method;
-        let whole = self.state.control.member == ActiveScheme::Friction;
-        method.is_adaptive() && method != Method::Rosenbrock && !whole
-    }
-
     /// Assigns every touching joint its current branches of the laws; joints that already have branches retain them unless `anew`. If
     /// corners are not located, all joints use the full laws.
     pub(super) fn freeze_branches(&mut self, anew: bool) {
-        let holds = self.locates_corners() && !self.state.control.chatters;
+        let holds = self.locates() && !self.state.control.chatters;
         let Self { mechanism, state, .. } = self;
         let State { now, .. } = state;
         if anew || !holds {

@@ -109,7 +109,7 @@ impl Run<'_> {
         inside.max_by(|a, b| (a.1[0] / a.1[1]).total_cmp(&(b.1[0] / b.1[1])))
     }
 
-    /// Whether the method locates the instants at which contacts begin and end.
+    /// Whether the method locates the instants at which contacts begin and end, and the corners of their laws.
     pub(super) fn locates(&self) -> bool {
         self.state.conditions.solver.method.is_adaptive()
     }
