@@ -274,8 +274,7 @@ pub struct Mechanism {
     sources: power::Sources,
     /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once overwritten.
     evaluated: Option<f64>,
-    /// Allocated if only the contacts are stepped implicitly.
-    /// Workspace of the discrete-gradient step.
+    /// Workspace of the discrete-gradient step, allocated if that method is chosen.
     discrete: Option<Box<discrete_gradient::DiscreteGradient>>,
     /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
     evaluation_time: f64,
