@@ -832,3 +832,26 @@ stiffness = \"1 N m/rad\"
     let error = Scene::parse(&twice, None, &[]).expect_err("twice").to_string();
     assert!(error.contains("already a pattern of this name"), "{error}");
 }
+
+#[test]
+fn a_fast_preset_follows_the_number_of_loose_balls_in_whatever_order_it_is_set() {
+    let preset = ("solver.preset", "real-time");
+    let ideal = ("contact.clearance", "0");
+    let one = ("joint.A6.clearance", "0.1 mm");
+    let solver = |changes: &[(&str, &str)]| changed("hexapod", changes).machine.solver;
+    let many = Preset::RealTime.solver(12);
+    assert_eq!(many.method.control(), StepControl::PerImpact);
+    assert_eq!(solver(&[preset]), many);
+    for changes in [[preset, ideal, one], [ideal, one, preset], [ideal, preset, one]] {
+        assert_eq!(solver(&changes), Preset::RealTime.solver(1), "{changes:?}");
+    }
+    // What is set by name stays.
+    let own = [preset, ("solver.steps_per_impact", "8"), ("solver.tolerance", "1e-5")];
+    let found = solver(&own);
+    assert_eq!((found.method, found.steps_per_impact, found.tolerance), (many.method, 8, 1e-5));
+    let mut scene = changed("hexapod", &own);
+    scene.undo_change("solver.steps_per_impact").unwrap();
+    assert_eq!(scene.machine.solver.steps_per_impact, many.steps_per_impact);
+    scene.set("contact.clearance", "0").unwrap();
+    assert_eq!(scene.machine.solver.method, Preset::RealTime.solver(0).method);
+}
