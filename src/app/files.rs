@@ -444,6 +444,7 @@ pub(super) fn meta<const N: usize>(player: &Player, more: [(&str, serde_json::Va
         "method": scene.machine.solver.method,
         "step_s": scene.machine.solver.step,
         "tolerance": scene.machine.solver.tolerance,
+        "steps_per_impact": scene.machine.solver.steps_per_impact,
         "time_s": player.pacer.shown(),
         // The hash refers to the end of the latest step.
         "state_time_s": player.simulation().time(),

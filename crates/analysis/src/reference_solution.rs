@@ -155,7 +155,7 @@ impl ReferenceSolution {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn of_impacts(scene: &Scene, tolerance: f64, context: &mut RunContext) -> Result<Self, AnalysisError> {
+    pub(super) fn of_impacts(scene: &Scene, tolerance: f64, context: &mut RunContext) -> Result<Self, AnalysisError> {
         let setting = Setting::reference(tolerance);
         let (contacts, impacts) = first_contacts(&setting, scene, &mut context.part(0, 2))?;
         let mut reference = Self {

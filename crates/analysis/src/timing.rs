@@ -5,7 +5,6 @@ use std::fmt::Display;
 use serde::{Serialize, Serializer};
 
 use super::{AnalysisError, RunContext};
-use jointplay_physics::machine::BallJoint;
 use jointplay_physics::simulate::{Simulation, StartError, Stopped};
 use jointplay_scene::Scene;
 
@@ -58,8 +57,7 @@ impl WorkBudget {
     /// Budget for `scene`: runs of many loose joints are capped earlier, at the same settings.
     #[must_use]
     pub fn of(self, scene: &Scene) -> Self {
-        let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
-        if scene.machine.ball_joints.iter().filter(loose).count() <= Self::MANY {
+        if scene.machine.loose_joints() <= Self::MANY {
             return self;
         }
         Self {
