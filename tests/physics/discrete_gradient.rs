@@ -162,6 +162,16 @@ fn the_peak_of_an_ideal_joint_is_that_of_its_rows() {
     assert!(simulation.peak(0).0 >= rows);
 }
 
+/// Lever arms of a guessed normal would do work: 2e-4 of the energy exchanged.
+#[test]
+fn normal_forces_do_no_work_on_turning_bodies() {
+    for parts in ["4", "16"] {
+        let ledger = ledger("hexapod", &with(parts, &[]), 1.0);
+        let residual = ledger.relative_residual();
+        assert!(residual.abs() < 1e-4, "{parts}: {residual:e}");
+    }
+}
+
 #[test]
 fn no_step_creates_energy() {
     for parts in ["2", "4", "16"] {

@@ -1,29 +1,36 @@
-//! Banded matrices of 3 x 3 blocks, eliminated in place without pivoting. Allocates nothing.
+//! Sparse matrices of 3 x 3 blocks, eliminated in place without pivoting. Allocates nothing.
 
 use crate::machine::{Mat3, Vec3};
+use std::ops::Range;
 
-/// Sparsity pattern of a banded block matrix and of its factors, and the storage index of each block, row by row. The pattern is
-/// symmetric.
+/// Symmetric sparsity pattern of a block matrix within a band, and of its factors. Blocks are stored row by row.
 #[derive(Default)]
 pub struct Band {
     size: usize,
     reach: usize,
+    /// Of the band right of the diagonal, whether a block may be nonzero.
     filled: Vec<bool>,
-    /// Columns of each row that may be nonzero, row after row, and where each row starts.
+    /// Column of each stored block, where each row starts, and where its diagonal block is.
     columns: Vec<usize>,
     starts: Vec<usize>,
+    diagonal: Vec<usize>,
 }
 
 impl Band {
     /// With capacity for `size` block rows of bandwidth `reach`.
     pub fn with_room(size: usize, reach: usize) -> Self {
-        let places = Self::places(size, reach);
         Self {
-            filled: Vec::with_capacity(places),
-            columns: Vec::with_capacity(places),
+            filled: Vec::with_capacity(size * (reach + 1)),
+            columns: Vec::with_capacity(Self::most(size, reach)),
             starts: Vec::with_capacity(size + 1),
+            diagonal: Vec::with_capacity(size),
             ..Self::default()
         }
+    }
+
+    /// Largest number of blocks of `size` rows.
+    pub fn most(size: usize, reach: usize) -> usize {
+        size * (2 * reach + 1)
     }
 
     /// Sets the pattern of a matrix with `size` block rows: block (i, j) may be nonzero on the diagonal and, within bandwidth
@@ -31,71 +38,57 @@ impl Band {
     pub fn arrange(&mut self, size: usize, reach: usize, coupled: impl Fn(usize, usize) -> bool) {
         (self.size, self.reach) = (size, reach);
         self.filled.clear();
-        self.filled.resize(self.len(), false);
         for i in 0..size {
-            for j in i..self.end(i) {
-                let filled = i == j || coupled(i, j);
-                self.fill(i, j, filled);
-            }
+            self.filled.extend((i..=i + reach).map(|j| i == j || (j < size && coupled(i, j))));
         }
+        let at = |i: usize, j: usize| i * (reach + 1) + j - i;
         for k in 0..size {
-            for i in k + 1..self.end(k) {
-                if self.filled[self.at(i, k)] {
-                    for j in i + 1..self.end(k) {
-                        let filled = self.filled[self.at(i, j)] || self.filled[self.at(k, j)];
-                        self.fill(i, j, filled);
+            let end = (k + reach + 1).min(size);
+            for i in k + 1..end {
+                if self.filled[at(k, i)] {
+                    for j in i + 1..end {
+                        self.filled[at(i, j)] |= self.filled[at(k, j)];
                     }
                 }
             }
         }
         self.columns.clear();
         self.starts.clear();
+        self.diagonal.clear();
         for i in 0..size {
             self.starts.push(self.columns.len());
-            let row = i.saturating_sub(reach)..self.end(i);
-            self.columns.extend(row.filter(|&j| self.filled[i * (2 * reach + 1) + j + reach - i]));
+            let before = (i.saturating_sub(reach)..i).filter(|&j| self.filled[at(j, i)]);
+            self.columns.extend(before);
+            self.diagonal.push(self.columns.len());
+            let after = (i..(i + reach + 1).min(size)).filter(|&j| self.filled[at(i, j)]);
+            self.columns.extend(after);
         }
         self.starts.push(self.columns.len());
     }
 
-    fn fill(&mut self, i: usize, j: usize, filled: bool) {
-        let (one, other) = (self.at(i, j), self.at(j, i));
-        self.filled[one] = filled;
-        self.filled[other] = filled;
+    /// Where the blocks of row `i` are stored.
+    pub fn row(&self, i: usize) -> Range<usize> {
+        self.starts[i]..self.starts[i + 1]
     }
 
-    /// Number of block rows.
-    pub fn size(&self) -> usize {
-        self.size
+    /// Where its diagonal block is stored.
+    pub fn diagonal(&self, i: usize) -> usize {
+        self.diagonal[i]
     }
 
-    /// Storage for `size` block rows, in blocks.
-    pub fn places(size: usize, reach: usize) -> usize {
-        size * (2 * reach + 1)
+    /// Where block (`i`, `j`) of the pattern is stored.
+    pub fn place(&self, i: usize, j: usize) -> usize {
+        self.starts[i] + self.columns[self.row(i)].partition_point(|&column| column < j)
     }
 
-    /// Storage in use, in blocks.
-    pub fn len(&self) -> usize {
-        Self::places(self.size, self.reach)
+    /// Column of each stored block.
+    pub fn columns(&self) -> &[usize] {
+        &self.columns
     }
 
-    /// Storage index of block (`i`, `j`).
-    pub fn at(&self, i: usize, j: usize) -> usize {
-        i * (2 * self.reach + 1) + j + self.reach - i
-    }
-
-    /// Columns of row `i` that may be nonzero.
-    pub fn row(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
-        self.columns[self.starts[i]..self.starts[i + 1]].iter().copied()
-    }
-
-    /// Those right of the diagonal.
-    fn after(&self, k: usize) -> impl Iterator<Item = usize> + '_ {
-        self.row(k).skip_while(move |&j| j <= k)
-    }
-
-    fn end(&self, i: usize) -> usize {
-        (i + self.reach + 1).min(self.size)
+    /// Blocks of row `k` right of the diagonal.
+    fn after(&self, k: usize) -> Range<usize> {
+        self.diagonal[k] + 1..self.starts[k + 1]
     }
 
     /// Factors `blocks` in place; they become NaN if a diagonal block is singular. `is_unit(i)`: row i is that of the unit matrix.
@@ -105,15 +98,25 @@ impl Band {
                 // The pivot is 1 and the rest of its row 0, so that the rows below stay as they are.
                 continue;
             }
-            let inverse = blocks[self.at(k, k)].try_inverse().unwrap_or_else(|| Mat3::from_element(f64::NAN));
-            blocks[self.at(k, k)] = inverse;
-            for i in self.after(k).filter(|&i| !is_unit(i)) {
-                let lower = self.at(i, k);
-                let factor = blocks[lower] * inverse;
-                blocks[lower] = factor;
-                for j in self.after(k) {
-                    let by = factor * blocks[self.at(k, j)];
-                    blocks[self.at(i, j)] -= by;
+            let pivot = &mut blocks[self.diagonal[k]];
+            let inverse = pivot.try_inverse().unwrap_or_else(|| Mat3::from_element(f64::NAN));
+            *pivot = inverse;
+            for below in self.after(k) {
+                let i = self.columns[below];
+                if is_unit(i) {
+                    continue;
+                }
+                let (above, row) = blocks.split_at_mut(self.starts[i]);
+                let columns = &self.columns[self.row(i)];
+                // Row i has a block wherever row k has one.
+                let mut at = columns.iter().take_while(|&&j| j < k).count();
+                let factor = row[at] * inverse;
+                row[at] = factor;
+                for (&j, by) in self.columns[self.after(k)].iter().zip(&above[self.after(k)]) {
+                    while columns[at] != j {
+                        at += 1;
+                    }
+                    subtract_product(&mut row[at], &factor, by);
                 }
             }
         }
@@ -123,17 +126,28 @@ impl Band {
     pub fn solve(&self, blocks: &[Mat3], x: &mut [Vec3], is_unit: impl Fn(usize) -> bool) {
         for i in (0..self.size).filter(|&i| !is_unit(i)) {
             let mut sum = x[i];
-            for k in self.row(i).take_while(|&k| k < i) {
-                sum -= blocks[self.at(i, k)] * x[k];
+            for at in self.starts[i]..self.diagonal[i] {
+                sum -= blocks[at] * x[self.columns[at]];
             }
             x[i] = sum;
         }
         for k in (0..self.size).rev().filter(|&k| !is_unit(k)) {
             let mut sum = x[k];
-            for j in self.after(k) {
-                sum -= blocks[self.at(k, j)] * x[j];
+            for at in self.after(k) {
+                sum -= blocks[at] * x[self.columns[at]];
             }
-            x[k] = blocks[self.at(k, k)] * sum;
+            x[k] = blocks[self.diagonal[k]] * sum;
+        }
+    }
+}
+
+/// out -= a b.
+#[inline]
+fn subtract_product(out: &mut Mat3, a: &Mat3, b: &Mat3) {
+    for j in 0..3 {
+        let (x, y, z) = (b[(0, j)], b[(1, j)], b[(2, j)]);
+        for i in 0..3 {
+            out[(i, j)] -= a[(i, 0)] * x + a[(i, 1)] * y + a[(i, 2)] * z;
         }
     }
 }
@@ -151,15 +165,16 @@ mod tests {
             let is_unit = |i| i == 2;
             let mut band = Band::with_room(size, reach);
             band.arrange(size, reach, coupled);
-            let mut blocks = vec![Mat3::zeros(); band.len()];
+            let mut blocks = vec![Mat3::zeros(); band.columns().len()];
             for i in 0..size {
-                for j in band.row(i) {
+                for at in band.row(i) {
+                    let j = band.columns()[at];
                     let part = Mat3::from_fn(|a, b| number(9 * (size * i + j) + 3 * a + b));
                     let unit = if i == j { 9.0 } else { 0.0 };
                     if is_unit(i) {
-                        blocks[band.at(i, j)] = if i == j { Mat3::identity() } else { Mat3::zeros() };
+                        blocks[at] = if i == j { Mat3::identity() } else { Mat3::zeros() };
                     } else if i == j || coupled(i, j) {
-                        blocks[band.at(i, j)] = part + Mat3::identity() * unit;
+                        blocks[at] = part + Mat3::identity() * unit;
                     }
                 }
             }
@@ -168,7 +183,7 @@ mod tests {
             band.factor(&mut factors, is_unit);
             band.solve(&factors, &mut x, is_unit);
             for i in 0..size {
-                let row = band.row(i).map(|j| blocks[band.at(i, j)] * x[j]);
+                let row = band.row(i).map(|at| blocks[at] * x[band.columns()[at]]);
                 assert!((row.sum::<Vec3>() - b[i]).norm() < 1e-13, "{size} {reach}");
             }
         }

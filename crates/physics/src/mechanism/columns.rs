@@ -33,6 +33,8 @@ pub fn collect_columns(
     n: &Vec3,
 ) {
     columns.clear();
+    let block = |side: usize| model.block_of.get(sides[side].0.body);
+    let one_tree = block(0) == block(1);
     for ((anchor, radius), sign) in sides.iter().zip([1.0, -1.0]) {
         let m = &equations.motion()[anchor.body];
         let centre = m.position + m.rotation * anchor.offset;
@@ -42,7 +44,8 @@ pub fn collect_columns(
             let surface = (velocity + omega.cross(&to_surface)) * sign;
             let turn = omega * (*radius * sign);
             // A coordinate that is an ancestor of both bodies moves both.
-            if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
+            let shared = one_tree.then(|| columns.iter_mut().find(|c| c.coordinate == coordinate)).flatten();
+            if let Some(column) = shared {
                 column.centre += centre;
                 column.surface += surface;
                 column.turn += turn;

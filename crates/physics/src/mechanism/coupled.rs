@@ -9,10 +9,40 @@ use crate::integrate::Method;
 use crate::machine::{Mat3, Vec3};
 use std::ops::Range;
 
+/// Velocity coordinates that a force at a row may accelerate, in ascending order: those of the trees that it acts on, or all.
+#[derive(Clone, Copy, Default)]
+pub struct Spans([[usize; 2]; 2]);
+
+impl Spans {
+    /// Number of coordinates.
+    pub fn len(&self) -> usize {
+        self.0.iter().map(|[start, end]| end - start).sum()
+    }
+
+    fn ranges(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        self.0.iter().map(|&[start, end]| start..end).filter(|range| !range.is_empty())
+    }
+
+    /// Number of `coordinate` among its coordinates, if it is one of them.
+    fn place(&self, coordinate: usize) -> Option<usize> {
+        let [[start, end], [other, last]] = self.0;
+        if (start..end).contains(&coordinate) {
+            Some(coordinate - start)
+        } else {
+            (other..last).contains(&coordinate).then(|| coordinate - other + end - start)
+        }
+    }
+
+    /// Whether it shares coordinates with `other`.
+    pub fn meet(&self, other: &Self) -> bool {
+        self.ranges().any(|a| other.ranges().any(|b| a.start < b.end && b.start < a.end))
+    }
+}
+
 /// Which rows act on the same coordinates.
 pub struct CoupledRows {
-    /// Velocity coordinates that a force at each row may accelerate.
-    pub ranges: Vec<Range<usize>>,
+    /// What a force at each row may accelerate.
+    pub spans: Vec<Spans>,
     /// Bandwidth: rows further apart are not coupled.
     pub reach: usize,
 }
@@ -32,17 +62,20 @@ impl CoupledRows {
         let block_of =
             |body: usize| (body < model.bodies.len() && !model.bodies[body].driven_only).then(|| model.block_of[body]);
         let blocks: Vec<[Option<usize>; 2]> = bodies.map(|of| of.map(block_of)).collect();
-        let range = |of: &[Option<usize>; 2]| {
+        let spans = |of: &[Option<usize>; 2]| {
             if !within {
-                return 0..n;
+                return Spans([[0, n], [n, n]]);
             }
-            let mut range = n..0;
-            for block in of.iter().flatten().map(|&block| &model.blocks[block]) {
-                range = range.start.min(block.v)..range.end.max(block.v + block.n);
+            let mut spans = of.map(|block| {
+                block.map_or([0, 0], |block| [model.blocks[block].v, model.blocks[block].v + model.blocks[block].n])
+            });
+            if of[0] == of[1] {
+                spans[1] = [0, 0];
             }
-            range.start.min(range.end)..range.end
+            spans.sort_unstable();
+            Spans(spans)
         };
-        let ranges: Vec<Range<usize>> = blocks.iter().map(range).collect();
+        let spans: Vec<Spans> = blocks.iter().map(spans).collect();
         // Rows that act on the same tree are coupled.
         let mut first_on = vec![usize::MAX; model.blocks.len()];
         let mut reach = if within { 0 } else { blocks.len().saturating_sub(1) };
@@ -52,21 +85,47 @@ impl CoupledRows {
                 reach = reach.max(row - first_on[block]);
             }
         }
-        let cost = Cost::of_coupled_contacts(blocks.len(), reach, ranges.iter().map(ExactSizeIterator::len).sum());
+        let cost = Cost::of_coupled_contacts(blocks.len(), reach, spans.iter().map(Spans::len).sum());
         cost.check(CostOf::CoupledContacts, Advice::Method(Method::Automatic))?;
-        Ok(Self { ranges, reach })
-    }
-
-    /// Whether forces at two rows may act on the same coordinates.
-    pub fn meet(&self, one: usize, other: usize) -> bool {
-        let [a, b] = [&self.ranges[one], &self.ranges[other]];
-        a.start < b.end && b.start < a.end
+        Ok(Self { spans, reach })
     }
 }
 
-/// M^-1 S^T of one row over its `range`, as three interleaved columns, into `out`; `columns` has S, and `scratch` room for all velocity
+/// M^-1 S^T of one row over its `spans`, as three interleaved columns, into `out`; `columns` has S, and `scratch` room for all velocity
 /// coordinates.
 pub fn weigh(
+    model: &Model,
+    equations: &mut dyn Equations,
+    spans: &Spans,
+    columns: &[Column],
+    scratch: &mut [f64],
+    out: &mut [f64],
+) {
+    let mut rest = out;
+    for range in spans.ranges() {
+        let (own, after) = rest.split_at_mut(3 * range.len());
+        rest = after;
+        let Some((inverse_mass, inverse_inertia)) = equations.lone_body(model, range.start) else {
+            weigh_within(model, equations, &range, columns, scratch, own);
+            continue;
+        };
+        let first = columns.iter().position(|column| column.coordinate == range.start);
+        let Some([x, y, z, turns @ ..]) = first.and_then(|first| columns[first..].first_chunk::<6>()) else {
+            own.fill(0.0);
+            continue;
+        };
+        for (out, column) in own.chunks_exact_mut(3).zip([x, y, z]) {
+            out.copy_from_slice((column.surface * inverse_mass).as_slice());
+        }
+        for (a, out) in own[9..].chunks_exact_mut(3).enumerate() {
+            let of_axis = |b: usize| turns[b].surface * inverse_inertia[(a, b)];
+            out.copy_from_slice((of_axis(0) + of_axis(1) + of_axis(2)).as_slice());
+        }
+    }
+}
+
+/// The same for one `range` of its spans.
+fn weigh_within(
     model: &Model,
     equations: &mut dyn Equations,
     range: &Range<usize>,
@@ -74,13 +133,12 @@ pub fn weigh(
     scratch: &mut [f64],
     out: &mut [f64],
 ) {
-    let within = equations.is_block_diagonal();
     for i in 0..3 {
         scratch[range.clone()].fill(0.0);
-        for column in columns {
+        for column in columns.iter().filter(|column| range.contains(&column.coordinate)) {
             scratch[column.coordinate] = column.surface[i];
         }
-        if within {
+        if equations.is_block_diagonal() {
             equations.apply_inverse_mass_within(model, (range.start, range.end), scratch);
         } else {
             equations.apply_inverse_mass(model, scratch);
@@ -91,22 +149,30 @@ pub fn weigh(
     }
 }
 
-/// W M^-1 S^T, and the same for the velocity used by friction, of the row with `columns`, for a force at the row with `weighted` over
-/// its `range`. Friction follows the surfaces if `surface`, otherwise the centres.
-pub fn mobility_between(columns: &[Column], weighted: &[f64], range: &Range<usize>, surface: bool) -> [Mat3; 2] {
-    let mut mobility = [Mat3::zeros(); 2];
-    for c in columns {
-        if range.contains(&c.coordinate) {
-            let x = &weighted[3 * (c.coordinate - range.start)..][..3];
-            let x = Vec3::new(x[0], x[1], x[2]).transpose();
-            mobility[0] += c.centre * x;
-            if surface {
-                mobility[1] += c.surface * x;
-            }
+/// Adds to `velocities` the effect of `impulse` (N s) at the row with `weighted` over its `spans`.
+pub fn push(velocities: &mut [f64], weighted: &[f64], spans: &Spans, impulse: &Vec3) {
+    let mut weighted = weighted.chunks_exact(3);
+    for range in spans.ranges() {
+        for (v, w) in velocities[range].iter_mut().zip(&mut weighted) {
+            *v += w[0] * impulse[0] + w[1] * impulse[1] + w[2] * impulse[2];
         }
     }
-    if !surface {
-        mobility[1] = mobility[0];
+}
+
+/// Effect of a force at the row with `weighted` over its `spans` on the velocity of the row with `columns`, 1/kg: S M^-1 S^T, or
+/// W M^-1 S^T, of the centres, if `centres`.
+pub fn mobility_between(columns: &[Column], weighted: &[f64], spans: &Spans, centres: bool) -> Mat3 {
+    let mut mobility = Mat3::zeros();
+    for c in columns {
+        if let Some(place) = spans.place(c.coordinate) {
+            let x = &weighted[3 * place..][..3];
+            let velocity = if centres { &c.centre } else { &c.surface };
+            for (j, x) in x.iter().enumerate() {
+                for i in 0..3 {
+                    mobility[(i, j)] += velocity[i] * x;
+                }
+            }
+        }
     }
     mobility
 }

@@ -11,17 +11,16 @@
 use super::band::Band;
 use super::columns::{Column, collect_columns, collect_relative_columns, contact_sides};
 use super::contacts::Contacts;
-use super::coupled::{CoupledRows, mobility_between, weigh};
+use super::coupled::{CoupledRows, mobility_between, push, weigh};
 use super::elements::{ActiveSet, At, Counts, Powers, SceneElement};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
 use super::model::{Anchor, Model};
 use super::systems::Evaluator;
-use super::{Mechanism, MechanismError, elements};
+use super::{Latest, Mechanism, MechanismError, elements};
 use crate::contact::{Coefficients, ContactState, ContactStep, StepForce};
 use crate::integrate::System as _;
 use crate::machine::{Mat3, Vec3};
-use std::ops::Range;
 
 /// Maximum number of iterations, and of successive cuts of one of them.
 const ITERATIONS: u32 = 15;
@@ -30,6 +29,8 @@ const CUTS: u32 = 4;
 const CUT: f64 = 0.4;
 /// Change of a velocity at which the iteration ends where no friction asks for less, m/s or rad/s.
 const STILL: f64 = 1e-4;
+/// Part of that which may remain, by the rate at which the changes shrink.
+const REMAINDER: f64 = 0.1;
 /// An element whose force changes by less than this fraction of what moves it, over half a step, is as good as constant.
 const SOFT: f64 = 0.05;
 /// Distance of the end from the guessed one, over the scales, beyond which the step is repeated from there.
@@ -109,9 +110,14 @@ impl Touch {
         self.found.force == Vec3::zeros() && self.contact().is_some()
     }
 
-    /// Whether friction acts on the surfaces.
-    fn follows_surfaces(&self) -> bool {
-        matches!(&self.law, Law::Contact(law) if law.friction > 0.0 && law.uses_surface_velocity())
+    /// Velocities of the centres, and those used by friction, of [velocities of the centres and of the surfaces](moved_by).
+    fn of_motion(&self, [centres, surfaces]: [Vec3; 2]) -> [Vec3; 2] {
+        [centres, if self.follows_centres() { centres } else { surfaces }]
+    }
+
+    /// Whether friction uses the velocity of the centres.
+    fn follows_centres(&self) -> bool {
+        matches!(&self.law, Law::Contact(law) if law.friction > 0.0 && !law.uses_surface_velocity())
     }
 }
 
@@ -122,14 +128,17 @@ pub struct DiscreteGradient {
     ease: Vec<[f64; 2]>,
     coupled: CoupledRows,
     band: Band,
+    /// Rows for which it is arranged.
+    arranged: Vec<usize>,
     touches: Vec<Touch>,
     columns: Vec<Vec<Column>>,
-    /// M^-1 S^T: three interleaved columns per joint over its range.
+    /// M^-1 S^T: three interleaved columns per row over its spans.
     weighted: Vec<Vec<f64>>,
     blocks: Vec<Mat3>,
     right: Vec<Vec3>,
-    /// W M^-1 S^T and S M^-1 S^T in the same band, the latter for the velocity used by friction.
-    mobility: Vec<[Mat3; 2]>,
+    /// Effect of the forces on the velocities used by friction in the same band, 1/kg: S M^-1 S^T, or W M^-1 S^T where friction uses
+    /// the centres.
+    mobility: Vec<Mat3>,
     /// State at the middle and at the end, with the guessed velocities; derivative at the middle.
     middle: Vec<f64>,
     end: Vec<f64>,
@@ -140,6 +149,8 @@ pub struct DiscreteGradient {
     displacement: Vec<f64>,
     scratch: Vec<f64>,
     starts: Vec<JointStart>,
+    /// State at the end of the latest step, as measured.
+    result: Vec<f64>,
     /// Powers over the step.
     powers: Powers,
 }
@@ -191,18 +202,18 @@ impl DiscreteGradient {
         let of_joints = model.joints.iter().map(|joint| [joint.ball.body, joint.socket.body]);
         let of_elements = elements.iter().flat_map(|ends| [ends.map(|end| end.body); 2]);
         let coupled = CoupledRows::new(model, n, within, of_joints.chain(of_elements))?;
-        let (rows, reach) = (coupled.ranges.len(), coupled.reach);
-        let width = |range: &Range<usize>| range.len();
+        let (rows, reach) = (coupled.spans.len(), coupled.reach);
         Ok(Self {
             joints,
             ease: elements.iter().map(|ends| ease(model, ends)).collect(),
             band: Band::with_room(rows, reach),
             touches: Vec::with_capacity(rows),
-            columns: coupled.ranges.iter().map(|range| Vec::with_capacity(width(range))).collect(),
-            weighted: coupled.ranges.iter().map(|range| vec![0.0; 3 * width(range)]).collect(),
-            blocks: vec![Mat3::zeros(); Band::places(rows, reach)],
+            arranged: Vec::with_capacity(rows),
+            columns: coupled.spans.iter().map(|spans| Vec::with_capacity(spans.len())).collect(),
+            weighted: coupled.spans.iter().map(|spans| vec![0.0; 3 * spans.len()]).collect(),
+            blocks: vec![Mat3::zeros(); Band::most(rows, reach)],
             right: Vec::with_capacity(rows),
-            mobility: vec![[Mat3::zeros(); 2]; Band::places(rows, reach)],
+            mobility: vec![Mat3::zeros(); Band::most(rows, reach)],
             middle: vec![0.0; dimension],
             end: vec![0.0; dimension],
             rate: vec![0.0; dimension],
@@ -211,6 +222,7 @@ impl DiscreteGradient {
             displacement: vec![0.0; n],
             scratch: vec![0.0; n],
             starts: vec![JointStart::default(); joints],
+            result: vec![0.0; dimension],
             powers: Powers::default(),
             coupled,
         })
@@ -316,8 +328,7 @@ impl DiscreteGradient {
                 touch.guessed[2] = law.surface_velocity(&n, &mean, ball, socket);
                 collect_columns(columns, model, equations, &contact_sides(joint, law), &n);
             }
-            let [centres, surfaces] = moved_by(columns, &self.mean, &self.guess);
-            let slip = if touch.follows_surfaces() { surfaces } else { centres };
+            let [centres, slip] = touch.of_motion(moved_by(columns, |i| self.mean[i] - self.guess[i]));
             touch.free = [touch.guessed[0] + centres, touch.guessed[1] + slip];
             touch.added = [-centres, -slip];
         }
@@ -326,31 +337,41 @@ impl DiscreteGradient {
     /// M^-1 S^T of every touch, and the mobility that couples the touches.
     fn couple(&mut self, model: &Model, equations: &mut dyn Equations) {
         for touch in &self.touches {
-            let (row, range) = (touch.row, &self.coupled.ranges[touch.row]);
-            weigh(model, equations, range, &self.columns[row], &mut self.scratch, &mut self.weighted[row]);
+            let (row, spans) = (touch.row, &self.coupled.spans[touch.row]);
+            weigh(model, equations, spans, &self.columns[row], &mut self.scratch, &mut self.weighted[row]);
         }
-        let Self { band, touches, coupled, .. } = self;
-        band.arrange(touches.len(), coupled.reach, |i, j| coupled.meet(touches[i].row, touches[j].row));
-        let band = &self.band;
-        for i in 0..band.size() {
-            let touch = &self.touches[i];
-            let (columns, surface) = (&self.columns[touch.row], touch.follows_surfaces());
-            for j in band.row(i) {
-                let other = self.touches[j].row;
-                let (weighted, range) = (&self.weighted[other], &self.coupled.ranges[other]);
-                self.mobility[band.at(i, j)] = mobility_between(columns, weighted, range, surface);
+        let Self { band, arranged, touches, coupled, columns, weighted, mobility, .. } = self;
+        if !touches.iter().map(|touch| touch.row).eq(arranged.iter().copied()) {
+            let CoupledRows { spans, reach } = &*coupled;
+            band.arrange(touches.len(), *reach, |i, j| spans[touches[i].row].meet(&spans[touches[j].row]));
+            arranged.clear();
+            arranged.extend(touches.iter().map(|touch| touch.row));
+        }
+        for (i, touch) in touches.iter().enumerate() {
+            let (own, centres) = (&columns[touch.row], touch.follows_centres());
+            for at in band.row(i) {
+                let j = band.columns()[at];
+                let other = &touches[j];
+                let mirrored = j < i && !centres && !other.follows_centres();
+                mobility[at] = if mirrored {
+                    mobility[band.place(j, i)].transpose()
+                } else {
+                    mobility_between(own, &weighted[other.row], &coupled.spans[other.row], centres)
+                };
             }
-            let touch = &mut self.touches[i];
-            touch.mobility = touch.normal.dot(&(self.mobility[band.at(i, i)][0] * touch.normal));
+        }
+        for (i, touch) in touches.iter_mut().enumerate() {
+            touch.mobility = touch.normal.dot(&(mobility[band.diagonal(i)] * touch.normal));
         }
     }
 
     /// Contact forces over the step. Returns whether the iteration converged.
-    fn solve(&mut self, h: f64, counts: &mut Counts) -> bool {
+    fn solve(&mut self, h: f64, model: &Model, equations: &mut dyn Equations, counts: &mut Counts) -> bool {
         let half = 0.5 * h;
         let laws = self.touches.iter().filter_map(Touch::contact);
         let still = laws.map(|(_, law)| law.slip_high).fold(STILL, f64::min);
         let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
+        let (mut through_centres, mut latest) = (false, f64::NAN);
         for iteration in 0..ITERATIONS {
             counts.contacts += 1;
             for touch in &mut self.touches {
@@ -370,7 +391,7 @@ impl DiscreteGradient {
                 // Work of each missing force on the velocity that it would cause.
                 let missing = |(i, touch): (usize, &Touch)| {
                     let force = touch.found.force - touch.force;
-                    force.dot(&(self.mobility[self.band.at(i, i)][1] * force))
+                    force.dot(&(self.mobility[self.band.diagonal(i)] * force))
                 };
                 let now: f64 = self.touches.iter().enumerate().map(missing).sum();
                 if !(now <= merit) && cuts < CUTS {
@@ -385,57 +406,101 @@ impl DiscreteGradient {
                 (merit, cuts, part) = (now, 0, 1.0);
             }
             self.eliminate(half);
-            let mut change = 0.0_f64;
-            for i in 0..self.touches.len() {
-                let added = self.velocities(i).map(|velocity| velocity * half);
-                let touch = &mut self.touches[i];
-                (touch.before, touch.force_before) = (touch.added, touch.force);
-                (touch.added, touch.force) = (added, self.right[i]);
-                (touch.full, touch.full_force) = (added, self.right[i]);
-                let moved = [0, 1].map(|q| (added[q] - touch.before[q]).norm());
-                change = change.max(moved[0]).max(moved[1]);
-            }
+            let change = self.take_forces(half);
             if !change.is_finite() {
                 return false;
             }
-            if change < still {
-                return true;
+            let rate = change / latest;
+            latest = change;
+            if change < still || rate * change < REMAINDER * (1.0 - rate) * still {
+                if through_centres || self.move_normal_forces(half, model, equations) < still {
+                    return true;
+                }
+                through_centres = true;
+                merit = f64::INFINITY;
             }
         }
         false
     }
 
-    /// W and S M^-1 S^T times the forces in `right`, for touch `i`.
-    fn velocities(&self, i: usize) -> [Vec3; 2] {
-        let band = &self.band;
-        let mut sum = [Vec3::zeros(); 2];
-        for j in band.row(i) {
-            if self.right[j] == Vec3::zeros() {
-                continue;
+    /// Moves the normal forces from the guessed points of contact to the centres, where they have no lever arm, by a change of the
+    /// velocities without contact forces: with the arms of a guess they would do work that is not in the elastic energy. Returns the
+    /// largest change of a relative velocity, m/s or rad/s.
+    fn move_normal_forces(&mut self, half: f64, model: &Model, equations: &mut dyn Equations) -> f64 {
+        let change = &mut self.scratch;
+        change.fill(0.0);
+        for touch in self.touches.iter().filter(|touch| touch.contact().is_some() && !touch.is_open()) {
+            let n = touch.step.mean_normal(&(touch.free[0] + touch.added[0]));
+            let normal_force = n * touch.force.dot(&n);
+            for column in &self.columns[touch.row] {
+                change[column.coordinate] += half * (column.centre - column.surface).dot(&normal_force);
             }
-            let mobility = &self.mobility[band.at(i, j)];
-            sum[0] += mobility[0] * self.right[j];
-            sum[1] += mobility[1] * self.right[j];
         }
-        sum
+        equations.apply_inverse_mass(model, change);
+        let mut largest = 0.0_f64;
+        for touch in &mut self.touches {
+            let [centres, slip] = touch.of_motion(moved_by(&self.columns[touch.row], |i| change[i]));
+            touch.free[0] += centres;
+            touch.free[1] += slip;
+            largest = largest.max(centres.norm()).max(slip.norm());
+        }
+        for (mean, change) in self.mean.iter_mut().zip(change) {
+            *mean += *change;
+        }
+        largest
+    }
+
+    /// Takes the forces in `right`, and what they add to the velocities over `half` a step (s). Returns the largest change of a
+    /// relative velocity, m/s or rad/s.
+    fn take_forces(&mut self, half: f64) -> f64 {
+        let Self { touches, coupled, weighted, columns, right, scratch, .. } = self;
+        scratch.fill(0.0);
+        for (touch, force) in touches.iter_mut().zip(&*right) {
+            (touch.before, touch.force_before) = (touch.added, touch.force);
+            (touch.force, touch.full_force) = (*force, *force);
+            if *force != Vec3::zeros() {
+                push(scratch, &weighted[touch.row], &coupled.spans[touch.row], &(force * half));
+            }
+        }
+        let mut change = 0.0_f64;
+        for touch in touches {
+            touch.added = touch.of_motion(moved_by(&columns[touch.row], |i| scratch[i]));
+            touch.full = touch.added;
+            change = change.max((touch.added[0] - touch.before[0]).norm());
+            change = change.max((touch.added[1] - touch.before[1]).norm());
+        }
+        change
     }
 
     /// Forces of the next Newton iteration into `right`; `half` a step, s.
+    ///
+    /// A contact's normal force depends on the velocity of the centres, friction on that of the surfaces. The derivatives take both
+    /// from the latter: the two differ by the lever arms, along which the normal force does not act. Then each row of a contact can be
+    /// divided by its derivative, and only the diagonal blocks change from one iteration to the next.
     fn eliminate(&mut self, half: f64) {
         let band = &self.band;
         self.right.clear();
         for (i, touch) in self.touches.iter().enumerate() {
-            let StepForce { by_velocity, by_slip, force, .. } = &touch.found;
             if touch.is_open() {
                 self.right.push(Vec3::zeros());
                 continue;
             }
-            for j in band.row(i) {
-                let unit = if i == j { Mat3::identity() } else { Mat3::zeros() };
-                let [centre, slip] = &self.mobility[band.at(i, j)];
-                self.blocks[band.at(i, j)] = unit - (by_velocity * centre + by_slip * slip) * half;
+            let StepForce { force, by_velocity, by_slip, .. } = &touch.found;
+            let slope = (by_velocity + by_slip) * half;
+            match slope.try_inverse().filter(|_| touch.contact().is_some()) {
+                Some(inverse) => {
+                    self.blocks[band.row(i)].copy_from_slice(&self.mobility[band.row(i)]);
+                    self.blocks[band.diagonal(i)] -= inverse;
+                    self.right.push(touch.added[1] / half - inverse * force);
+                }
+                None => {
+                    for (block, mobility) in self.blocks[band.row(i)].iter_mut().zip(&self.mobility[band.row(i)]) {
+                        *block = -slope * mobility;
+                    }
+                    self.blocks[band.diagonal(i)] += Mat3::identity();
+                    self.right.push(force - slope * touch.added[1] / half);
+                }
             }
-            self.right.push(force - by_velocity * touch.added[0] - by_slip * touch.added[1]);
         }
         let touches = &self.touches;
         let is_open = |i: usize| touches[i].is_open();
@@ -446,11 +511,8 @@ impl DiscreteGradient {
     /// Adds to the mean velocity what the contact forces add, over half a step `half`, s.
     fn push(&mut self, half: f64) {
         for touch in &self.touches {
-            let range = self.coupled.ranges[touch.row].clone();
-            let weighted = self.weighted[touch.row].chunks_exact(3);
-            for (v, w) in self.mean[range].iter_mut().zip(weighted) {
-                *v += half * (w[0] * touch.force[0] + w[1] * touch.force[1] + w[2] * touch.force[2]);
-            }
+            let spans = &self.coupled.spans[touch.row];
+            push(&mut self.mean, &self.weighted[touch.row], spans, &(touch.force * half));
         }
     }
 }
@@ -470,11 +532,11 @@ fn ease(model: &Model, ends: &[Anchor; 2]) -> [f64; 2] {
     ease
 }
 
-/// Relative velocities of centres and of surfaces for the change of the mean velocity from `guess` to `mean`.
-fn moved_by(columns: &[Column], mean: &[f64], guess: &[f64]) -> [Vec3; 2] {
+/// Relative velocities of centres and of surfaces for the `change` of the mean velocity along each coordinate.
+fn moved_by(columns: &[Column], change: impl Fn(usize) -> f64) -> [Vec3; 2] {
     let mut moved = [Vec3::zeros(); 2];
     for column in columns {
-        let change = mean[column.coordinate] - guess[column.coordinate];
+        let change = change(column.coordinate);
         moved[0] += column.centre * change;
         moved[1] += column.surface * change;
     }
@@ -499,6 +561,14 @@ impl Mechanism {
             self.discrete = Some(Box::new(discrete));
         }
         Ok(())
+    }
+
+    /// Measures the end of such a step, from which the next one goes on.
+    pub fn measure_step_end(&mut self, t: f64, y: &[f64]) {
+        self.measure(t, y);
+        if let Some(discrete) = &mut self.discrete {
+            discrete.result.copy_from_slice(y);
+        }
     }
 
     /// Upper bound on the effect of a force at ball joint `j` on its opening, 1/kg.
@@ -557,7 +627,10 @@ impl Evaluator<'_> {
     ) -> bool {
         let StepStart { t, h, y, k, .. } = *from;
         let positions = self.positions();
-        self.mechanism.measure(t, y);
+        // The step before ended with this measurement, unless something has happened since.
+        if self.mechanism.latest != Latest::Measured(t) || discrete.result != y {
+            self.mechanism.measure(t, y);
+        }
         discrete.record_start(&self.mechanism.contacts, self.mechanism.motion());
         for (i, guess) in discrete.guess.iter_mut().enumerate() {
             *guess = y[positions + i] + 0.5 * h * k[positions + i];
@@ -598,7 +671,7 @@ impl Evaluator<'_> {
             if !discrete.touches.is_empty() {
                 discrete.arrange(model, &**equations);
                 discrete.couple(model, &mut **equations);
-                if !discrete.solve(h, &mut self.counts) {
+                if !discrete.solve(h, model, &mut **equations, &mut self.counts) {
                     return false;
                 }
                 discrete.push(0.5 * h);
@@ -627,7 +700,7 @@ impl Evaluator<'_> {
             let Some((joint, _)) = touch.contact() else {
                 continue;
             };
-            let [centres, surfaces] = moved_by(&discrete.columns[touch.row], &discrete.mean, &discrete.guess);
+            let [centres, surfaces] = moved_by(&discrete.columns[touch.row], |i| discrete.mean[i] - discrete.guess[i]);
             let (u, s) = (touch.guessed[0] + centres, touch.guessed[2] + surfaces);
             let n = touch.found.normal;
             let normal = -touch.force.dot(&n);
@@ -656,14 +729,17 @@ impl Evaluator<'_> {
                 let Some((joint, law)) = touch.contact() else {
                     continue;
                 };
-                let (joint, n) = (&model.joints[joint], touch.normal);
+                let joint = &model.joints[joint];
                 let [arm_ball, arm_socket] = joint.arms(motion);
+                // Only friction has a lever arm about the centres.
+                let n = touch.found.normal;
+                let turning = touch.normal.cross(&(touch.force - n * touch.force.dot(&n)));
                 let ball = &mut wrench[joint.ball.body];
                 ball.force += touch.force;
-                ball.torque += (arm_ball + n * law.ball_radius).cross(&touch.force);
+                ball.torque += arm_ball.cross(&touch.force) + turning * law.ball_radius;
                 let socket = &mut wrench[joint.socket.body];
                 socket.force -= touch.force;
-                socket.torque -= (arm_socket + n * (law.ball_radius + law.clearance)).cross(&touch.force);
+                socket.torque -= arm_socket.cross(&touch.force) + turning * (law.ball_radius + law.clearance);
             }
             let rates = &mut discrete.end[positions..];
             if equations.rows() > 0 {

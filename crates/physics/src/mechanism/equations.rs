@@ -3,7 +3,7 @@
 use super::kinematics::{Driven, Kinematics, Wrench};
 use super::model::{BallJoint, BodyIndex, Model};
 use super::path::Path;
-use crate::machine::Vec3;
+use crate::machine::{Mat3, Vec3};
 
 /// Smallest acceptable pivot ratio of the constraints: below it they determine the motion to fewer than four digits.
 pub(super) const LEAST_PIVOT: f64 = 1e-12;
@@ -90,6 +90,10 @@ pub(super) trait Equations: Send {
 
     /// Applies the constrained inverse mass matrix: generalised forces to accelerations, in place.
     fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]);
+
+    /// Inverse mass, 1/kg, and inverse inertia in world axes, 1/(kg m^2), of the free body with six coordinates from `first` on, if its
+    /// accelerations depend on the forces on it alone.
+    fn lone_body(&self, model: &Model, first: usize) -> Option<(f64, Mat3)>;
 
     /// The same for forces on the coordinates `range` only, if [`Self::is_block_diagonal`].
     fn apply_inverse_mass_within(&mut self, model: &Model, range: (usize, usize), x: &mut [f64]);

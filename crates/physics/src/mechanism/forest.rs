@@ -7,7 +7,7 @@ use super::model::{BallJoint, BodyIndex, Model, Motion};
 use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
-use crate::machine::Vec3;
+use crate::machine::{Mat3, Vec3};
 
 /// Spanning forest with constraint rows for the joints that close loops.
 pub(super) struct Forest {
@@ -166,6 +166,16 @@ impl Equations for Forest {
         if let Some(constraints) = &mut self.constraints {
             constraints.project_accelerations(model, x);
         }
+    }
+
+    fn lone_body(&self, model: &Model, first: usize) -> Option<(f64, Mat3)> {
+        if self.constraints.is_some() {
+            return None;
+        }
+        let block = model.blocks.partition_point(|block| block.v < first);
+        let b = model.blocks.get(block)?.lone?;
+        let (body, rotation) = (&model.bodies[b], &self.tree.motion[b].rotation);
+        Some((1.0 / body.mass, rotation * body.inertia_inverse * rotation.transpose()))
     }
 
     fn apply_inverse_mass_within(&mut self, model: &Model, (first, end): (usize, usize), x: &mut [f64]) {

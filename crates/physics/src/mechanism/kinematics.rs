@@ -244,6 +244,8 @@ pub fn accelerate(child: &mut Kinematics, parent: &Kinematics, revolute: bool, r
 /// Motion prescribed by time alone, computed once per instant.
 pub struct Driven {
     time: Option<f64>,
+    /// Time, coordinates and motion of the bodies at the instant before, to which the end of a step often returns.
+    earlier: (Option<f64>, Vec<Jet>, Vec<Kinematics>),
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
     /// Closed-form motion, if the scene has one.
@@ -255,11 +257,14 @@ pub struct Driven {
 impl Driven {
     /// For `model`; nothing is computed yet.
     pub fn new(model: &Model) -> Self {
+        let bodies: Vec<usize> = model.order.iter().copied().filter(|&b| model.bodies[b].driven_only).collect();
+        let coordinates = vec![Jet::default(); model.drives.len()];
         Self {
             time: None,
-            coordinates: vec![Jet::default(); model.drives.len()],
+            earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()]),
+            coordinates,
             closed: None,
-            bodies: (model.order.iter().copied()).filter(|&b| model.bodies[b].driven_only).collect(),
+            bodies,
         }
     }
 
@@ -272,6 +277,7 @@ impl Driven {
     /// From now on moves no bodies: their motion is part of the state.
     pub fn only_coordinates(&mut self) {
         self.bodies.clear();
+        self.earlier.2.clear();
     }
 
     /// Moves the bodies that depend on time alone to `t`.
@@ -280,6 +286,13 @@ impl Driven {
         if self.time == Some(t) {
             return;
         }
+        // A closed form computes more than these, at once.
+        if self.time.is_some() && model.closed_form.is_none() {
+            self.exchange(motion);
+            if self.time == Some(t) {
+                return;
+            }
+        }
         self.time = Some(t);
         self.closed = model.closed_form.as_ref().map(|form| form.at(t));
         for i in 0..self.coordinates.len() {
@@ -287,6 +300,16 @@ impl Driven {
         }
         for &b in &self.bodies {
             self.move_body(model, b, motion);
+        }
+    }
+
+    /// Exchanges the latest instant with the one before.
+    fn exchange(&mut self, motion: &mut [Kinematics]) {
+        let (time, coordinates, bodies) = &mut self.earlier;
+        std::mem::swap(&mut self.time, time);
+        std::mem::swap(&mut self.coordinates, coordinates);
+        for (&b, body) in self.bodies.iter().zip(bodies) {
+            std::mem::swap(&mut motion[b], body);
         }
     }
 

@@ -504,6 +504,10 @@ impl Equations for Lagrange {
         }
     }
 
+    fn lone_body(&self, _: &Model, _: usize) -> Option<(f64, Mat3)> {
+        None
+    }
+
     fn apply_inverse_mass_within(&mut self, model: &Model, _: (usize, usize), x: &mut [f64]) {
         self.apply_inverse_mass(model, x);
     }

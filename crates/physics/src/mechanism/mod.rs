@@ -272,14 +272,25 @@ pub struct Mechanism {
     /// Linearisation, allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
     sources: power::Sources,
-    /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once overwritten.
-    evaluated: Option<f64>,
+    /// What motion and forces belong to.
+    latest: Latest,
     /// Workspace of the discrete-gradient step, allocated if that method is chosen.
     discrete: Option<Box<discrete_gradient::DiscreteGradient>>,
     /// Time of one evaluation, ns, from [`bounds::evaluation_time`].
     evaluation_time: f64,
     free_flight_bodies: Vec<FreeFlightBody>,
     moving: ActiveRanges,
+}
+
+/// What the motion and the forces in a mechanism belong to.
+#[derive(Clone, Copy, PartialEq)]
+enum Latest {
+    /// An evaluation at this time, s.
+    Evaluated(f64),
+    /// The motion and the gaps alone, at this time, s.
+    Measured(f64),
+    /// Neither: they have been overwritten.
+    Unknown,
 }
 
 impl Mechanism {
@@ -315,7 +326,7 @@ impl Mechanism {
             elements: elements_of(machine, &model),
             of_scene: machine.elements.len(),
             pull: None,
-            evaluated: None,
+            latest: Latest::Unknown,
             model,
             equations,
             contacts,
@@ -410,13 +421,13 @@ impl Mechanism {
 
     /// Projects the state after a step: quaternions to unit length, loops closed. Returns the remaining closure error, m.
     pub fn project(&mut self, t: f64, y: &mut [f64]) -> f64 {
-        self.evaluated = None;
+        self.latest = Latest::Unknown;
         self.equations.project(&self.model, t, y)
     }
 
     /// Poses, velocities and gaps at (t, y), without forces.
     pub fn measure(&mut self, t: f64, y: &[f64]) {
-        self.evaluated = None;
+        self.latest = Latest::Measured(t);
         self.equations.update_kinematics(&self.model, t, y);
         self.contacts.measure(t, self.equations.motion());
     }
@@ -428,7 +439,7 @@ impl Mechanism {
 
     /// Measures the gap of ball joint `j` at (t, y), and the motion of the bodies that determine it.
     pub fn measure_one(&mut self, j: usize, t: f64, y: &[f64]) {
-        self.evaluated = None;
+        self.latest = Latest::Unknown;
         match &self.paths[j] {
             Some(path) => self.equations.update_along(&self.model, t, y, path),
             None => self.equations.update_kinematics(&self.model, t, y),

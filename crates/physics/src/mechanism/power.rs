@@ -1,10 +1,10 @@
 //! Powers of all energy sources and sinks, each from a force and the velocity of its point of application. Allocates nothing.
 
-use super::Mechanism;
 use super::elements::{ForceElement, Powers, Touch};
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
+use super::{Latest, Mechanism};
 use crate::machine::Vec3;
 
 /// Parts of a scene that can have power.
@@ -42,12 +42,17 @@ impl Mechanism {
 
     /// Whether motion and forces of the latest evaluation are those at `t`.
     pub fn is_evaluated_at(&self, t: f64) -> bool {
-        self.evaluated == Some(t)
+        self.latest == Latest::Evaluated(t)
+    }
+
+    /// Whether motion and gaps, at least, are those of a measurement or evaluation at `t`.
+    pub fn is_measured_at(&self, t: f64) -> bool {
+        self.latest == Latest::Measured(t) || self.is_evaluated_at(t)
     }
 
     /// Marks the latest evaluation as stale.
     pub fn forget_evaluation(&mut self) {
-        self.evaluated = None;
+        self.latest = Latest::Unknown;
     }
 
     /// Powers at the latest evaluation; `dy` is its derivative, needed if accelerations enter.
@@ -66,7 +71,7 @@ impl Mechanism {
             let (model, gravity) = (&self.model, &self.gravity);
             powers.drive += self.equations.drive_power(model, gravity, y, dv, all);
             // The accelerations may have been changed.
-            self.evaluated = None;
+            self.latest = Latest::Unknown;
         }
         powers
     }

@@ -3,7 +3,7 @@
 use super::elements::{ActiveSet, Counts};
 use super::elements::{At, Loads};
 use super::kinematics::Wrench;
-use super::{Mechanism, Powers};
+use super::{Latest, Mechanism, Powers};
 use crate::integrate::{StiffSystem, System};
 use std::ops::Range;
 
@@ -34,8 +34,8 @@ impl Evaluator<'_> {
     /// reactions and actuator forces.
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
-        let Mechanism { model, equations, contacts, evaluated, .. } = &mut *self.mechanism;
-        *evaluated = None;
+        let Mechanism { model, equations, contacts, latest, .. } = &mut *self.mechanism;
+        *latest = Latest::Unknown;
         equations.complete_motion(model, y, &dy[equations.positions(model)..]);
         // Forces are those of the derivative; only the geometry of ideal joints is missing.
         contacts.measure(t, equations.motion());
@@ -43,8 +43,8 @@ impl Evaluator<'_> {
 
     /// Motion and contact forces at (t, y), without accelerations.
     fn load(&mut self, t: f64, y: &[f64]) {
-        let Mechanism { model, equations, contacts, elements, evaluated, .. } = &mut *self.mechanism;
-        *evaluated = None;
+        let Mechanism { model, equations, contacts, elements, latest, .. } = &mut *self.mechanism;
+        *latest = Latest::Unknown;
         equations.update_awake(model, t, y);
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
@@ -86,11 +86,11 @@ impl System for Evaluator<'_> {
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.counts.equations += 1;
         self.load(t, y);
-        let Mechanism { model, equations, gravity, evaluated, .. } = &mut *self.mechanism;
+        let Mechanism { model, equations, gravity, latest, .. } = &mut *self.mechanism;
         let (dq, dv) = dy.split_at_mut(equations.positions(model));
         equations.position_rate(model, y, dq);
         equations.accelerate(model, gravity, t, y, dv);
-        *evaluated = Some(t);
+        *latest = Latest::Evaluated(t);
     }
 
     fn moving(&self) -> &[Range<usize>] {

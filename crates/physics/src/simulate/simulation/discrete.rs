@@ -147,7 +147,13 @@ impl Run<'_> {
             let mut evaluator = self.mechanism.evaluator(ActiveSet::by(false, &now.contact_states));
             let converged = evaluator.discrete_step(&from, all, &mut self.attempt.end.y);
             self.attempt.counts += evaluator.counts;
-            let part = if converged { self.part_to_repeat(t_end, size, &mut all) } else { Some(0.5) };
+            let mut open = 0.0;
+            let part = if converged {
+                open = self.mechanism.project(t_end, &mut self.attempt.end.y);
+                self.part_to_repeat(t_end, size, &mut all)
+            } else {
+                Some(0.5)
+            };
             match part {
                 Some(part) if attempt < ATTEMPTS => {
                     h = size * part;
@@ -157,7 +163,7 @@ impl Run<'_> {
                     return Err(self.stopped(StopFault::NoForces { shortest: size }, StopAdvice::OtherMethod));
                 }
                 _ => {
-                    self.accept(t_end, size)?;
+                    self.accept_closed(t_end, size, open)?;
                     let finer = finer(self.state);
                     let State { now, control, .. } = &mut *self.state;
                     control.h_next = if t_end == limit { h } else { size };
@@ -174,7 +180,7 @@ impl Run<'_> {
     fn part_to_repeat(&mut self, t_end: f64, h: f64, all: &mut bool) -> Option<f64> {
         let Self { mechanism, state, attempt, .. } = self;
         let end = &mut attempt.end;
-        mechanism.measure(t_end, &end.y);
+        mechanism.measure_step_end(t_end, &end.y);
         store_gaps(mechanism, &mut end.gaps);
         let mut part = 1.0_f64;
         for (j, (start, end)) in state.now.gaps.iter().zip(&end.gaps).enumerate() {

@@ -43,11 +43,13 @@ impl Run<'_> {
         }
         let located = self.locates();
         let Self { mechanism, state, before, scratch_k, .. } = self;
-        if !mechanism.is_evaluated_at(state.now.t) {
+        let discrete = state.conditions.solver.method == Method::DiscreteGradient && !mechanism.is_kinematic();
+        let known = if discrete { Mechanism::is_measured_at } else { Mechanism::is_evaluated_at };
+        if !known(mechanism, state.now.t) {
             mechanism.measure(state.now.t, &state.now.y);
         }
         let energies = energies(mechanism, state);
-        if state.conditions.solver.method == Method::DiscreteGradient && !mechanism.is_kinematic() {
+        if discrete {
             let account = &mut state.record.account;
             account.course.clear();
             account.course.push(0.5, mechanism.discrete_powers());

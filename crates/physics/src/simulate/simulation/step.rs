@@ -243,18 +243,21 @@ impl Run<'_> {
     /// Accepts the attempted step: projection, guard, contact state, peaks.
     pub(super) fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
         let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
+        self.accept_closed(t_end, h, open)
+    }
+
+    /// As [`Self::accept`], once loops have been closed up to `open`, m or rad. With mean rates the end has been measured.
+    pub(super) fn accept_closed(&mut self, t_end: f64, h: f64, open: f64) -> Result<(), Stopped> {
         let mean_rates = self.stepper.has_mean_rates();
         if mean_rates {
             // Forces at the end of the step belong to a contact that may end long before the next step does: the mean over the
             // step is more informative.
             let (mechanism, now) = (&mut self.mechanism, &self.state.now);
             let StepEnd { y, k, .. } = &mut self.attempt.end;
-            mechanism.measure(t_end, y);
             mechanism.position_rate(y, k);
             for i in mechanism.positions()..y.len() {
                 k[i] = (y[i] - now.y[i]) / h;
             }
-            store_gaps(mechanism, &mut self.attempt.end.gaps);
         } else if !self.stepper.ends_with_derivative() || self.mechanism.projects() {
             self.evaluate_end(t_end);
         }

@@ -89,6 +89,7 @@ impl Workspace {
 
 /// Prepares the equations for the conditions, clearances and pull of `state`.
 pub(super) fn sync_parameters(mechanism: &mut Mechanism, model: &Model, state: &State) {
+    mechanism.forget_evaluation();
     mechanism.gravity = state.conditions.gravity;
     if mechanism.pull() != state.pull {
         mechanism.set_pull(model.machine(), state.pull);
