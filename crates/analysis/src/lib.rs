@@ -6,6 +6,8 @@
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
 //!   known answers ([`validation`]).
+//! - Uncertain parameters, without any scene: [`sampling`], [`distribution`] and ISO fits ([`iso286`]); which input matters
+//!   ([`morris`], [`indices`]); percentiles, yield and rejects ([`statistics`]); the cheapest fits that hold a yield ([`fits`]).
 //!
 //! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
 //!
@@ -36,17 +38,24 @@
 
 pub mod beginning;
 mod cost;
+pub mod distribution;
 pub mod drive;
 pub mod exponent;
+pub mod fits;
 mod front;
 pub mod grid;
 pub mod impact_row;
+pub mod indices;
+pub mod iso286;
 pub mod layout;
 mod many_joints;
+pub mod morris;
+mod normal;
 pub mod orbit;
 pub mod paper;
 pub mod point;
 pub mod presets;
+mod random;
 mod reach;
 pub mod ready;
 mod reference_solution;
@@ -54,9 +63,11 @@ pub mod regime;
 pub mod reproduction;
 pub mod response;
 mod run_context;
+pub mod sampling;
 pub mod section;
 mod setting;
 pub mod source;
+pub mod statistics;
 pub mod sweep;
 pub mod sweep_task;
 pub mod task;

@@ -1,0 +1,434 @@
+//! The cheapest fits of several joints that hold a required yield.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use crate::statistics::Estimate;
+
+/// Largest number of choices that a proof looks at; without an evaluation a choice costs nearly nothing.
+const MOST_CHOICES: usize = 1 << 20;
+
+/// The yield that a choice of fits has to hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RequiredYield {
+    /// Fraction of accepted units, above 0 and up to 1.
+    pub fraction: f64,
+    /// Whether the lower end of the confidence interval must reach it, not only the estimate.
+    pub with_confidence: bool,
+}
+
+impl RequiredYield {
+    fn is_held(self, estimate: Estimate) -> bool {
+        (if self.with_confidence { estimate.low } else { estimate.value }) >= self.fraction
+    }
+}
+
+/// Why there is no search.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitSearchError<E> {
+    /// No joints.
+    #[error("no joints to choose fits for")]
+    NoJoints,
+    /// A joint without candidates.
+    #[error("joint {joint} has no candidate fits")]
+    NoCandidates {
+        /// Index of the joint.
+        joint: usize,
+    },
+    /// A cost that cannot be added up.
+    #[error("cost {cost} of candidate {candidate} of joint {joint}: a finite number of at least 0 is possible")]
+    Cost {
+        /// Index of the joint.
+        joint: usize,
+        /// Index of its candidate.
+        candidate: usize,
+        /// The cost.
+        cost: f64,
+    },
+    /// A yield out of range.
+    #[error("required yield {fraction}: above 0 and up to 1 is possible")]
+    Yield {
+        /// As given.
+        fraction: f64,
+    },
+    /// No evaluations allowed.
+    #[error("0 evaluations: at least one is needed")]
+    NoEvaluations,
+    /// The evaluation of a choice failed.
+    #[error(transparent)]
+    Evaluation(E),
+}
+
+/// A candidate for each joint, with its cost and yield.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitChoice {
+    /// Index of the chosen candidate of each joint.
+    pub candidates: Vec<usize>,
+    /// Sum of their costs.
+    pub cost: f64,
+    /// Their yield.
+    pub estimate: Estimate,
+}
+
+/// Result of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitSearch {
+    /// The cheapest choice found that holds the yield; `None` if even the tightest fits do not.
+    pub best: Option<FitChoice>,
+    /// Whether every cheaper choice is known to fail. Not if the evaluations ran out.
+    pub is_proven: bool,
+    /// Number of evaluated choices.
+    pub evaluations: usize,
+}
+
+/// Finds the cheapest choice that holds a required yield. `costs` holds the costs of each joint's candidates, **loosest first**;
+/// `evaluate` estimates the yield of a choice, given as the index of each joint's candidate, and is called at most
+/// `most_evaluations` times, never twice for a choice.
+///
+/// The search assumes that a tighter fit in any joint never lowers the yield. It holds for a tip error that grows with every
+/// clearance; with estimates from samples, all choices must share the same random points, or noise breaks it. Where a tighter fit
+/// moves the centre of a clearance away from its best value, the result is not the optimum.
+///
+/// Candidates that cost as much as a tighter one are left out. First one joint after the other is loosened as far as the yield
+/// allows. Then choices cheaper than the best are visited in the order of their costs (branch and bound). One that is not tighter
+/// in any joint than a choice known to fail fails, too. Of the others, the tightest affordable choice above is evaluated: either
+/// it is a cheaper solution, or it decides all choices below it.
+///
+/// # Errors
+/// No joints or candidates, a cost or yield out of range, no evaluations, or an error of `evaluate`.
+pub fn cheapest_fits<E>(
+    costs: &[Vec<f64>],
+    required: RequiredYield,
+    most_evaluations: usize,
+    evaluate: impl FnMut(&[usize]) -> Result<Estimate, E>,
+) -> Result<FitSearch, FitSearchError<E>> {
+    if costs.is_empty() {
+        return Err(FitSearchError::NoJoints);
+    }
+    for (joint, costs) in costs.iter().enumerate() {
+        if costs.is_empty() {
+            return Err(FitSearchError::NoCandidates { joint });
+        }
+        let is_cost = |cost: f64| cost.is_finite() && cost >= 0.0;
+        if let Some((candidate, &cost)) = costs.iter().enumerate().find(|(_, cost)| !is_cost(**cost)) {
+            return Err(FitSearchError::Cost { joint, candidate, cost });
+        }
+    }
+    if !(required.fraction > 0.0 && required.fraction <= 1.0) {
+        return Err(FitSearchError::Yield { fraction: required.fraction });
+    }
+    if most_evaluations == 0 {
+        return Err(FitSearchError::NoEvaluations);
+    }
+    let levels = costs.iter().map(|costs| levels(costs)).collect();
+    let mut search =
+        Search { levels, required, most_evaluations, evaluations: 0, evaluate, failed: Vec::new(), best: None };
+    let is_proven = search.run().map_err(FitSearchError::Evaluation)?;
+    let best = search.best.as_ref().map(|(choice, estimate)| FitChoice {
+        candidates: search.candidates(choice),
+        cost: search.cost(choice),
+        estimate: *estimate,
+    });
+    Ok(FitSearch { best, is_proven, evaluations: search.evaluations })
+}
+
+/// (candidate, cost) of the candidates that cost less than every tighter one, loosest and cheapest first.
+fn levels(costs: &[f64]) -> Vec<(usize, f64)> {
+    let mut levels: Vec<(usize, f64)> = Vec::new();
+    for (candidate, &cost) in costs.iter().enumerate().rev() {
+        if levels.last().is_none_or(|&(_, tighter)| cost < tighter) {
+            levels.push((candidate, cost));
+        }
+    }
+    levels.reverse();
+    levels
+}
+
+struct Search<F> {
+    levels: Vec<Vec<(usize, f64)>>,
+    required: RequiredYield,
+    most_evaluations: usize,
+    evaluations: usize,
+    evaluate: F,
+    /// Choices known to fail, none of them below another.
+    failed: Vec<Vec<usize>>,
+    best: Option<(Vec<usize>, Estimate)>,
+}
+
+/// A choice to visit, by the level of each joint; those from `open` on may still be tightened, so that each is visited once.
+struct Node {
+    cost: f64,
+    choice: Vec<usize>,
+    open: usize,
+}
+
+impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
+    /// Whether the result is proven.
+    fn run(&mut self) -> Result<bool, E> {
+        let tightest: Vec<usize> = self.levels.iter().map(|levels| levels.len() - 1).collect();
+        match self.holds(&tightest)? {
+            Some(true) => self.loosen(tightest)?,
+            _ => return Ok(true),
+        }
+        let loosest = vec![0; self.levels.len()];
+        let mut nodes = BinaryHeap::from([Node { cost: self.cost(&loosest), choice: loosest, open: 0 }]);
+        let mut visited = 0;
+        while let Some(node) = nodes.pop() {
+            visited += 1;
+            if visited > MOST_CHOICES {
+                return Ok(false);
+            }
+            while node.cost < self.best_cost() && !self.is_known_to_fail(&node.choice) {
+                let above = self.tightest_affordable(&node.choice);
+                match self.holds(&above)? {
+                    None => return Ok(false),
+                    Some(true) => self.loosen(above)?,
+                    Some(false) => {}
+                }
+            }
+            for joint in node.open..node.choice.len() {
+                if node.choice[joint] + 1 < self.levels[joint].len() {
+                    let mut choice = node.choice.clone();
+                    choice[joint] += 1;
+                    let cost = self.cost(&choice);
+                    if cost < self.best_cost() {
+                        nodes.push(Node { cost, choice, open: joint });
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn candidates(&self, choice: &[usize]) -> Vec<usize> {
+        self.levels.iter().zip(choice).map(|(levels, &level)| levels[level].0).collect()
+    }
+
+    fn cost(&self, choice: &[usize]) -> f64 {
+        self.levels.iter().zip(choice).map(|(levels, &level)| levels[level].1).sum()
+    }
+
+    fn best_cost(&self) -> f64 {
+        self.best.as_ref().map_or(f64::INFINITY, |(choice, _)| self.cost(choice))
+    }
+
+    fn is_known_to_fail(&self, choice: &[usize]) -> bool {
+        self.failed.iter().any(|failed| choice.iter().zip(failed).all(|(own, failed)| own <= failed))
+    }
+
+    /// Whether a choice holds the yield; `None` if no evaluation is left. A cheaper choice that does becomes the best.
+    fn holds(&mut self, choice: &[usize]) -> Result<Option<bool>, E> {
+        if self.is_known_to_fail(choice) {
+            return Ok(Some(false));
+        }
+        if self.evaluations == self.most_evaluations {
+            return Ok(None);
+        }
+        self.evaluations += 1;
+        let candidates = self.candidates(choice);
+        let estimate = (self.evaluate)(&candidates)?;
+        let is_held = self.required.is_held(estimate);
+        if !is_held {
+            self.failed.retain(|failed| failed.iter().zip(choice).any(|(failed, own)| failed > own));
+            self.failed.push(choice.to_vec());
+        } else if self.cost(choice) < self.best_cost() {
+            self.best = Some((choice.to_vec(), estimate));
+        }
+        Ok(Some(is_held))
+    }
+
+    /// Loosens one joint after the other of a choice that holds the yield, by bisection, the one with the largest saving first.
+    fn loosen(&mut self, mut choice: Vec<usize>) -> Result<(), E> {
+        let saving = |joint: usize| self.levels[joint][choice[joint]].1 - self.levels[joint][0].1;
+        let mut joints: Vec<(usize, f64)> = (0..choice.len()).map(|joint| (joint, saving(joint))).collect();
+        joints.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (joint, _) in joints {
+            let (mut fails_below, mut holds) = (0, choice[joint]);
+            while fails_below < holds {
+                choice[joint] = (fails_below + holds) / 2;
+                match self.holds(&choice)? {
+                    Some(true) => holds = choice[joint],
+                    Some(false) => fails_below = choice[joint] + 1,
+                    None => return Ok(()),
+                }
+            }
+            choice[joint] = holds;
+        }
+        Ok(())
+    }
+
+    /// The choice at or above `choice` that is tightened, one level after the other, where it costs least, while it is cheaper
+    /// than the best.
+    fn tightest_affordable(&self, choice: &[usize]) -> Vec<usize> {
+        let mut above = choice.to_vec();
+        loop {
+            let next = (0..above.len()).filter(|&joint| above[joint] + 1 < self.levels[joint].len()).map(|joint| {
+                let mut next = above.clone();
+                next[joint] += 1;
+                (self.cost(&next), next)
+            });
+            match next.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((cost, next)) if cost < self.best_cost() => above = next,
+                _ => return above,
+            }
+        }
+    }
+}
+
+impl Ord for Node {
+    /// The cheapest is the greatest, and of equal costs the first in lexical order: the heap yields it first.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.cost.total_cmp(&self.cost).then_with(|| other.choice.cmp(&self.choice))
+    }
+}
+
+impl PartialOrd for Node {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Node {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Node {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, RandomStream};
+    use crate::statistics::yield_fraction;
+
+    const UNITS: usize = 400;
+
+    /// A stack of gaps, each uniform from 0 to a width that halves from one candidate to the next, and the largest acceptable
+    /// sum.
+    struct Stack {
+        widths: Vec<f64>,
+        costs: Vec<Vec<f64>>,
+        units: Vec<Vec<f64>>,
+        limit: f64,
+    }
+
+    impl Stack {
+        fn new(joints: usize, candidates: usize, seed: u64) -> Self {
+            let stream = RandomStream::new(seed, Purpose::Position, 0);
+            let widths: Vec<f64> = (0..joints).map(|joint| 1.0 + stream.unit(joint as u64)).collect();
+            let cost = |joint: usize, candidate: usize| {
+                // Grows with tightness, but for some noise: a few candidates cost more than a tighter one.
+                (1.6_f64).powi(candidate as i32) * (1.0 + stream.unit((100 + 10 * joint + candidate) as u64))
+            };
+            let costs =
+                (0..joints).map(|joint| (0..candidates).map(|candidate| cost(joint, candidate)).collect()).collect();
+            let unit = |k: usize| (0..joints).map(|joint| stream.unit((1000 + joints * k + joint) as u64)).collect();
+            Self { limit: 0.3 * widths.iter().sum::<f64>(), widths, costs, units: (0..UNITS).map(unit).collect() }
+        }
+
+        fn yield_of(&self, choice: &[usize]) -> Estimate {
+            let width = |joint: usize| self.widths[joint] * 0.5_f64.powi(choice[joint] as i32);
+            let sum = |u: &Vec<f64>| u.iter().enumerate().map(|(joint, u)| width(joint) * u).sum::<f64>();
+            yield_fraction(self.units.iter().filter(|u| sum(u) <= self.limit).count(), UNITS, 0.95).unwrap()
+        }
+
+        /// Lowest cost by enumeration, and the number of choices.
+        fn enumerate(&self, required: RequiredYield) -> (Option<f64>, usize) {
+            let candidates = self.costs[0].len();
+            let count = candidates.pow(self.costs.len() as u32);
+            let choice = |index: usize| -> Vec<usize> {
+                (0..self.costs.len()).map(|joint| index / candidates.pow(joint as u32) % candidates).collect()
+            };
+            let holding = (0..count).map(choice).filter(|choice| required.is_held(self.yield_of(choice)));
+            let costs = holding.map(|choice| choice.iter().zip(&self.costs).map(|(&c, costs)| costs[c]).sum::<f64>());
+            (costs.min_by(f64::total_cmp), count)
+        }
+    }
+
+    fn search(stack: &Stack, required: RequiredYield, most: usize) -> FitSearch {
+        let mut seen = Vec::new();
+        let found = cheapest_fits(&stack.costs, required, most, |choice| {
+            assert!(!seen.contains(&choice.to_vec()), "{choice:?} is evaluated twice");
+            seen.push(choice.to_vec());
+            Ok::<_, String>(stack.yield_of(choice))
+        });
+        let found = found.unwrap();
+        assert_eq!(found.evaluations, seen.len());
+        found
+    }
+
+    #[test]
+    fn the_cheapest_choice_of_a_stack_is_that_of_the_enumeration() {
+        let (mut evaluations, mut choices) = (0, 0);
+        for seed in 0..20 {
+            for with_confidence in [false, true] {
+                let stack = Stack::new(4, 5, seed);
+                let required = RequiredYield { fraction: 0.95, with_confidence };
+                let found = search(&stack, required, usize::MAX);
+                let (cost, count) = stack.enumerate(required);
+                let best = found.best.unwrap();
+                assert!((best.cost - cost.unwrap()).abs() < 1e-12, "seed {seed}: {best:?}");
+                assert!(found.is_proven && required.is_held(best.estimate));
+                assert_eq!(best.estimate, stack.yield_of(&best.candidates));
+                evaluations += found.evaluations;
+                choices += count;
+            }
+        }
+        assert!(20 * evaluations < choices, "{evaluations} evaluations of {choices} choices");
+    }
+
+    #[test]
+    fn a_yield_that_the_tightest_fits_miss_takes_one_evaluation() {
+        let mut stack = Stack::new(3, 4, 1);
+        stack.limit = 1e-3;
+        let found = search(&stack, RequiredYield { fraction: 0.99, with_confidence: false }, 100);
+        assert_eq!(found, FitSearch { best: None, is_proven: true, evaluations: 1 });
+    }
+
+    #[test]
+    fn with_few_evaluations_the_result_holds_the_yield_but_is_not_proven() {
+        let stack = Stack::new(5, 5, 2);
+        let required = RequiredYield { fraction: 0.9, with_confidence: true };
+        let all = search(&stack, required, usize::MAX);
+        let mut last = f64::INFINITY;
+        for most in [1, 3, 8, all.evaluations - 1] {
+            let found = search(&stack, required, most);
+            let best = found.best.unwrap();
+            assert!(!found.is_proven && found.evaluations == most && required.is_held(best.estimate));
+            assert!(best.cost <= last && best.cost >= all.best.as_ref().unwrap().cost);
+            last = best.cost;
+        }
+        assert_eq!(search(&stack, required, all.evaluations), all);
+    }
+
+    #[test]
+    fn many_joints_take_few_evaluations_when_the_costs_are_alike() {
+        // 6^12 choices. Any three joints on the second level hold the yield, so that the proof must exclude all pairs.
+        let costs = vec![vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0]; 12];
+        let estimate = |choice: &[usize]| {
+            let value = if choice.iter().map(|&c| c.min(1)).sum::<usize>() >= 3 { 1.0 } else { 0.0 };
+            Ok::<_, String>(Estimate { value, low: value, high: value })
+        };
+        let required = RequiredYield { fraction: 0.5, with_confidence: false };
+        let found = cheapest_fits(&costs, required, 1000, estimate).unwrap();
+        assert_eq!(found.best.unwrap().cost, 15.0);
+        assert!(found.is_proven && found.evaluations < 66 + 50, "{}", found.evaluations);
+    }
+
+    #[test]
+    fn bad_input_is_refused_and_errors_are_passed_on() {
+        let required = RequiredYield { fraction: 0.9, with_confidence: false };
+        let failing = |costs: &[Vec<f64>], required, most| {
+            cheapest_fits(costs, required, most, |_| Err("diverged".to_owned())).unwrap_err().to_string()
+        };
+        assert_eq!(failing(&[vec![1.0]], required, 9), "diverged");
+        assert_eq!(failing(&[], required, 9), "no joints to choose fits for");
+        assert_eq!(failing(&[vec![1.0], vec![]], required, 9), "joint 1 has no candidate fits");
+        let cost = failing(&[vec![1.0, f64::NAN]], required, 9);
+        assert_eq!(cost, "cost NaN of candidate 1 of joint 0: a finite number of at least 0 is possible");
+        assert_eq!(failing(&[vec![1.0]], required, 0), "0 evaluations: at least one is needed");
+        let percent = RequiredYield { fraction: 99.0, with_confidence: false };
+        assert_eq!(failing(&[vec![1.0]], percent, 9), "required yield 99: above 0 and up to 1 is possible");
+    }
+}

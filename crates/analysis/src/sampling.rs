@@ -1,0 +1,179 @@
+//! Points in the unit cube: scrambled Sobol sequence, Latin hypercube, independent random points.
+
+mod direction_numbers;
+
+use jointplay_physics::words::words;
+
+use crate::random::{BITS, Purpose, RandomStream, unit};
+use direction_numbers::ROWS;
+
+/// Largest number of coordinates of a point.
+pub const MOST_DIMENSIONS: usize = ROWS.len() + 1;
+/// Largest number of points.
+pub const MOST_POINTS: usize = 1 << 24;
+/// Largest number of coordinates in a Latin hypercube, whose permutations are in memory: 256 MB.
+const MOST_STRATA: usize = 1 << 26;
+
+/// How points are distributed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampling {
+    /// Sobol sequence with the direction numbers of Joe & Kuo (2008), each coordinate under a nested uniform scrambling (Owen
+    /// 1995; 1998, "Scrambling Sobol' and Niederreiter-Xing points", J. Complexity 14, 466-489): every point is uniform, and the
+    /// points together are as evenly spaced as those of the plain sequence. Best at powers of two.
+    Sobol,
+    /// Latin hypercube (McKay, Beckman & Conover 1979, Technometrics 21, 239-245): of N points, each of the N equal strata of
+    /// every coordinate holds one.
+    LatinHypercube,
+    /// Independent, uniform.
+    Random,
+}
+
+words! { Sampling {
+    Sobol => "sobol",
+    LatinHypercube => "latin-hypercube",
+    Random => "random",
+} }
+
+/// Why there is no such sample.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SamplingError {
+    /// No coordinates or too many.
+    #[error("{dimensions} dimensions: 1 to {MOST_DIMENSIONS} are possible")]
+    Dimensions {
+        /// As asked for.
+        dimensions: usize,
+    },
+    /// No points or too many.
+    #[error("{points} points: 1 to {most} are possible for a sample `{sampling}` of {dimensions} dimensions")]
+    Points {
+        /// As asked for.
+        points: usize,
+        /// Largest number.
+        most: usize,
+        /// Kind of sample.
+        sampling: Sampling,
+        /// Coordinates of a point.
+        dimensions: usize,
+    },
+}
+
+/// A finite sample in the open unit cube. Each point is computed from its index, the seed and, for a Latin hypercube, the number
+/// of points alone, so that parts of a sample can be computed anywhere. No coordinate is 0 or 1.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    points: usize,
+    coordinates: Vec<Coordinate>,
+}
+
+/// The rule for one coordinate.
+#[derive(Clone, Debug)]
+enum Coordinate {
+    Sobol { directions: Box<[u64; BITS as usize]>, scrambling: RandomStream },
+    LatinHypercube { strata: Vec<u32>, position: RandomStream },
+    Random { position: RandomStream },
+}
+
+impl Sampler {
+    /// A sample of `points` points with `dimensions` coordinates each.
+    ///
+    /// # Errors
+    /// A number of dimensions or points out of range.
+    pub fn new(sampling: Sampling, dimensions: usize, points: usize, seed: u64) -> Result<Self, SamplingError> {
+        if !(1..=MOST_DIMENSIONS).contains(&dimensions) {
+            return Err(SamplingError::Dimensions { dimensions });
+        }
+        let most = match sampling {
+            Sampling::LatinHypercube => (MOST_STRATA / dimensions).min(MOST_POINTS),
+            Sampling::Sobol | Sampling::Random => MOST_POINTS,
+        };
+        if !(1..=most).contains(&points) {
+            return Err(SamplingError::Points { points, most, sampling, dimensions });
+        }
+        let stream = |purpose, dimension| RandomStream::new(seed, purpose, dimension);
+        let coordinate = |dimension: usize| match sampling {
+            Sampling::Sobol => Coordinate::Sobol {
+                directions: Box::new(directions(dimension)),
+                scrambling: stream(Purpose::Scrambling, dimension),
+            },
+            Sampling::LatinHypercube => Coordinate::LatinHypercube {
+                strata: stream(Purpose::Permutation, dimension).permutation(0, points),
+                position: stream(Purpose::Position, dimension),
+            },
+            Sampling::Random => Coordinate::Random { position: stream(Purpose::Position, dimension) },
+        };
+        Ok(Self { points, coordinates: (0..dimensions).map(coordinate).collect() })
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// Number of coordinates of a point.
+    pub fn dimensions(&self) -> usize {
+        self.coordinates.len()
+    }
+
+    /// Point `index`, each coordinate in (0, 1); `None` beyond the last.
+    pub fn point(&self, index: usize) -> Option<Vec<f64>> {
+        if index >= self.points {
+            return None;
+        }
+        let at = |coordinate: &Coordinate| match coordinate {
+            Coordinate::Sobol { directions, scrambling } => unit(scramble(sobol(directions, index as u64), scrambling)),
+            Coordinate::LatinHypercube { strata, position } => {
+                let stratum = f64::from(strata[index]) + position.unit(index as u64);
+                // The sum may round up to the number of points.
+                (stratum / self.points as f64).min(1.0 - f64::EPSILON)
+            }
+            Coordinate::Random { position } => position.unit(index as u64),
+        };
+        Some(self.coordinates.iter().map(at).collect())
+    }
+}
+
+/// Direction numbers of a coordinate, counted from 0, as binary fractions of [`BITS`] digits (Joe & Kuo 2008, section 2).
+fn directions(dimension: usize) -> [u64; BITS as usize] {
+    let mut v = [0; BITS as usize];
+    let Some(row) = dimension.checked_sub(1).and_then(|row| ROWS.get(row)) else {
+        // Van der Corput: all m are 1.
+        for (k, v) in v.iter_mut().enumerate() {
+            *v = 1 << (BITS as usize - 1 - k);
+        }
+        return v;
+    };
+    let degree = row.initial.len();
+    for k in 0..v.len() {
+        v[k] = match row.initial.get(k) {
+            Some(&m) => u64::from(m) << (BITS as usize - 1 - k),
+            None => {
+                let own = v[k - degree] ^ (v[k - degree] >> degree);
+                (1..degree).filter(|j| row.polynomial >> (degree - j) & 1 == 1).fold(own, |sum, j| sum ^ v[k - j])
+            }
+        };
+    }
+    v
+}
+
+/// Point `index` of the plain sequence, as a binary fraction of [`BITS`] digits. The order is that of the indices, not of their
+/// Gray codes; the first 2^m points are the same set.
+fn sobol(directions: &[u64; BITS as usize], index: u64) -> u64 {
+    let digits = directions.iter().enumerate().filter(|(k, _)| index >> k & 1 == 1);
+    digits.fold(0, |sum, (_, v)| sum ^ v)
+}
+
+/// Nested uniform scrambling (Owen 1995): each digit is flipped or not at random, with a decision of its own for every
+/// combination of the digits before it. The first point is scrambled as the others and must not be dropped (Owen 2020, "On
+/// dropping the first Sobol' point").
+fn scramble(x: u64, scrambling: &RandomStream) -> u64 {
+    let mut scrambled = x;
+    for digit in 0..BITS {
+        // A number for each node of the binary tree of digits.
+        let node = 1 << digit | x >> (BITS - digit);
+        scrambled ^= scrambling.bits(node) >> 63 << (BITS - 1 - digit);
+    }
+    scrambled
+}
+
+#[cfg(test)]
+mod tests;
