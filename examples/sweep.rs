@@ -6,8 +6,9 @@
 
 use std::error::Error;
 
+use jointplay_analysis::axis::Axis;
+use jointplay_analysis::design::{Design, Start};
 use jointplay_analysis::drive::OBSERVABLES;
-use jointplay_analysis::grid::{Grid, ParameterRange, Start};
 use jointplay_analysis::point::Plan;
 use jointplay_analysis::sweep::Sweep;
 use jointplay_scene::Scene;
@@ -15,15 +16,15 @@ use jointplay_scene::Scene;
 fn main() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::load("slider-crank-driven", &[])?;
     scene.set("contact.friction", "0.004")?;
-    let clearance = ParameterRange::parse(&scene, "contact.clearance=0.1mm..0.9mm:3")?;
-    let grid = Grid::new(&scene, vec![clearance], Start::Cold)?;
+    let clearance = Axis::parse(&scene, "contact.clearance=0.1mm..0.9mm:3")?;
+    let design = Design::crossed(&scene, vec![clearance], &[Start::Cold])?;
     let plan = Plan { periods: 10, discard: 2, phase: 0.0, exponent: true };
-    let sweep = Sweep::new(scene, grid, plan)?;
+    let sweep = Sweep::new(scene, design, plan)?;
 
     println!("{:26} {:>16} {:>10} {:>12} {:>8}", "", "exponent", "regime", "spread of x", "peak");
     let mut rows = Vec::new();
     // Blocks are independent: a larger sweep gives each of its threads some of them.
-    for block in 0..sweep.grid().blocks() {
+    for block in 0..sweep.design().blocks() {
         let mut run = sweep.begin(block);
         while !run.is_done() {
             run.advance(10_000);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::analysis::grid::Start;
+use crate::analysis::design::Start;
 
 /// A 3D laboratory that shows what play in a ball joint does to a machine.
 ///
@@ -39,7 +39,7 @@ pub enum Command {
     Tradeoff(TradeoffArguments),
     /// Measure how fast the default scene and machines with many loose joints run, against their speed goals.
     Bench(BenchArguments),
-    /// Run a driven scene at many parameter values: sections, forces, regimes, exponents.
+    /// Run a scene at many parameter values: statistics of any channel, sections, regimes, exponents.
     Sweep(SweepArguments),
     /// Merge the shards of a sweep.
     Merge(MergeArguments),
@@ -171,25 +171,45 @@ pub struct SweepArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Parameter to vary, with N equally spaced values including both ends, e.g. `contact.clearance=0.01mm..1mm:200`;
-    /// twice for a map, the second varying fastest.
-    #[arg(long, value_name = "KEY=A..B:N", required = true)]
+    /// Parameter to vary; may be repeated. `contact.clearance=0.01mm..1mm:200`: equally spaced values, both ends included;
+    /// `0.01mm..1mm:20:log`: with equal ratios; `contact.normal_law=hertz,flores`: listed numbers or words. All combinations are
+    /// run, the last parameter varying fastest.
+    #[arg(long, value_name = "KEY=VALUES", required_unless_present = "points", conflicts_with = "points")]
     pub vary: Vec<String>,
+    /// Take the values of all `--vary` in parallel instead of crossing them: point i has value i of each.
+    #[arg(long, requires = "vary")]
+    pub zip: bool,
+    /// Take the points from a CSV file: a header of parameter keys, then one row per point, with units.
+    #[arg(long, value_name = "FILE")]
+    pub points: Option<PathBuf>,
     /// Drive periods per point, including those discarded.
-    #[arg(long, value_name = "P", value_parser = periods)]
-    pub periods: usize,
+    #[arg(long, value_name = "P", value_parser = periods, required_unless_present = "duration", requires = "discard")]
+    pub periods: Option<usize>,
     /// Initial periods to discard as the transient.
-    #[arg(long, value_name = "D", value_parser = periods)]
-    pub discard: usize,
+    #[arg(long, value_name = "D", value_parser = periods, requires = "periods")]
+    pub discard: Option<usize>,
+    /// Time between two sections, where the drives have no common period or none at all [default: the common period].
+    #[arg(long, value_name = "TIME", requires = "periods")]
+    pub period: Option<String>,
+    /// Length of each point's run, e.g. `2s`, in place of periods: any scene, without sections, regimes and exponents.
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["periods", "discard", "section", "phase"])]
+    pub duration: Option<String>,
+    /// End of the transient of `--duration`: statistics begin there [default: 0].
+    #[arg(long, value_name = "TIME", requires = "duration")]
+    pub from: Option<String>,
+    /// What to record, as CHANNEL:STATISTIC, e.g. `S1.normal:max,tip_error:rms,*.force:mean`; channels as in `run --channels`;
+    /// statistics: max, min, mean, rms, std, range, end [default: the forces and impacts of the ball joints, and the tip error].
+    #[arg(long, value_name = "LIST")]
+    pub keep: Option<String>,
     /// Where the sections are taken.
     #[arg(long, value_enum, value_name = "WHERE", default_value = "phase")]
     pub section: SectionChoice,
     /// Drive phase of the sections: a fraction of the period, or an angle such as `90deg`.
     #[arg(long, value_name = "PHASE", default_value = "0", allow_hyphen_values = true)]
     pub phase: String,
-    /// Where each point starts from.
-    #[arg(long, value_parser = starts(), value_name = "START", default_value = "cold")]
-    pub start: Start,
+    /// Where each point starts from; several, separated by commas, run every point from each.
+    #[arg(long, value_parser = starts(), value_name = "START", value_delimiter = ',', default_value = "cold")]
+    pub start: Vec<Start>,
     /// Leave out the twin runs that measure the largest Lyapunov exponent.
     #[arg(long)]
     pub no_exponent: bool,
@@ -199,7 +219,7 @@ pub struct SweepArguments {
     /// Threads to use [default: one for each core]; the result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// File to write, a NumPy archive (.npz).
+    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Format of the summary on standard output.
@@ -219,7 +239,7 @@ pub struct MergeArguments {
     /// Files that `sweep --shard` wrote, all from one sweep.
     #[arg(value_name = "SHARD", required = true)]
     pub shards: Vec<PathBuf>,
-    /// File to write, a NumPy archive (.npz).
+    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Format of the summary on standard output.

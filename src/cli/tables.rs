@@ -74,11 +74,7 @@ impl Table {
 
     /// As CSV.
     pub fn csv(&self) -> String {
-        let quoted = |text: &String| {
-            let plain = !text.contains([',', '"', '\n']);
-            if plain { text.clone() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
-        };
-        let line = |cells: &Vec<String>| cells.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n";
+        let line = |cells: &Vec<String>| cells.iter().map(|cell| quoted(cell)).collect::<Vec<_>>().join(",") + "\n";
         std::iter::once(&self.heads).chain(&self.rows).map(line).collect()
     }
 
@@ -103,6 +99,12 @@ impl Table {
         let title = if self.title.is_empty() { String::new() } else { format!("{}\n", self.title) };
         std::iter::once(&self.heads).chain(&self.rows).map(line).fold(title, |all, line| all + &line)
     }
+}
+
+/// A cell of a CSV file.
+pub fn quoted(text: &str) -> String {
+    let plain = !text.contains([',', '"', '\n']);
+    if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
 /// Fills every gap `{name}` of `page`.

@@ -87,8 +87,8 @@ impl Load {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::design::Start;
     use crate::analysis::drive::observed;
-    use crate::analysis::grid::Start;
     use crate::analysis::sweep_task::{Share, SweepTask};
     use crate::analysis::task::{Job, Message, perform};
     use crate::scene::Scene;

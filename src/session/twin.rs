@@ -250,7 +250,7 @@ mod tests {
         let period = crate::analysis::drive::drive_period(&scene).expect("driven");
         let (discard, kept) = (ALIGNMENT, FEWEST);
         let plan = Plan { periods: discard + kept, discard, phase: 0.0, exponent: true };
-        let mut point = PointRun::cold(&scene, plan, period).expect("starts");
+        let mut point = PointRun::cold(&scene, &plan.into(), period).expect("starts");
         while !point.is_done() {
             point.step().expect("runs");
         }

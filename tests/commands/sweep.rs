@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use jointplay::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange, Start};
+use jointplay::analysis::axis::Axis;
+use jointplay::analysis::design::{Design, FOLLOW_BLOCK, Start};
 use jointplay::analysis::point::Plan;
 use jointplay::analysis::sweep::Sweep;
 use jointplay::scene::Scene;
@@ -18,7 +19,7 @@ use crate::program::{command, folder, jointplay, names};
 /// A sweep of four points that takes a fraction of a second.
 const SMALL: &str = "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 1";
 
-/// The arrays of an archive, whole numbers as floating-point ones, and its `meta`.
+/// The arrays of numbers in an archive, whole ones as floating-point ones, and its `meta`.
 fn archive(path: &Path) -> (BTreeMap<String, ArrayD<f64>>, Json) {
     let mut reader = NpzReader::new(fs::File::open(path).unwrap()).unwrap();
     let mut arrays = BTreeMap::new();
@@ -29,8 +30,7 @@ fn archive(path: &Path) -> (BTreeMap<String, ArrayD<f64>>, Json) {
             meta = serde_json::from_slice(&bytes.into_raw_vec_and_offset().0).unwrap();
         } else if let Ok(array) = reader.by_name::<OwnedRepr<f64>, IxDyn>(&name) {
             arrays.insert(name, array);
-        } else {
-            let array: ArrayD<i64> = reader.by_name::<OwnedRepr<i64>, IxDyn>(&name).unwrap();
+        } else if let Ok(array) = reader.by_name::<OwnedRepr<i64>, IxDyn>(&name) {
             arrays.insert(name, array.mapv(|value| value as f64));
         }
     }
@@ -113,7 +113,7 @@ fn neither_threads_nor_shards_change_a_bit() {
     assert!(text.stderr.contains("text.npz"), "{}", text.stderr);
     merge("nowhere.npz --out bad.npz").expect(1);
     merge("s1.npz s2.npz s3.npz --out merged.npz").expect(1);
-    merge("s1.npz s2.npz s3.npz --out merged.csv").expect(2);
+    merge("s1.npz s2.npz s3.npz --out merged.txt").expect(2);
     let over = merge("s1.npz s2.npz s3.npz --out ./s2.npz --force").expect(2);
     assert!(over.stderr.contains("one of the shards"), "{}", over.stderr);
     fs::remove_file(folder.path().join("text.npz")).unwrap();
@@ -253,29 +253,28 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
 #[test]
 fn a_sweep_that_is_killed_at_any_instant_ends_in_the_same_bytes() {
     let folder = folder();
-    let line =
-        "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 2 --discard 1 --threads 2 --no-exponent --out";
-    let started = std::time::Instant::now();
-    jointplay(folder.path(), &format!("{line} a.npz")).expect(0);
-    let length = started.elapsed();
-    let whole = fs::read(folder.path().join("a.npz")).unwrap();
-    crate::common::at_random_instants(length, 4, |instant| {
-        let folder = self::folder();
-        let mut child = command(folder.path(), &format!("{line} a.npz"))
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(instant);
-        child.kill().unwrap();
-        child.wait().unwrap();
-        let out = folder.path().join("a.npz");
-        if !out.exists() {
-            jointplay(folder.path(), &format!("{line} a.npz")).expect(0);
-            assert_eq!(names(folder.path()), ["a.npz"]);
-        }
-        assert!(fs::read(out).unwrap() == whole);
-    });
+    let over_periods =
+        "spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 2 --discard 1 --no-exponent --out a.npz";
+    let over_time = "pendulum --vary contact.clearance=0.2mm..0.3mm:12 --duration 0.3s --keep S1.*:max --out a.csv";
+    for (line, out) in [(over_periods, "a.npz"), (over_time, "a.csv")] {
+        let line = format!("sweep {line} --threads 2");
+        let started = std::time::Instant::now();
+        jointplay(folder.path(), &line).expect(0);
+        let length = started.elapsed();
+        let whole = fs::read(folder.path().join(out)).unwrap();
+        crate::common::at_random_instants(length, 4, |instant| {
+            let folder = self::folder();
+            let mut child = command(folder.path(), &line).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            std::thread::sleep(instant);
+            child.kill().unwrap();
+            child.wait().unwrap();
+            if !folder.path().join(out).exists() {
+                jointplay(folder.path(), &line).expect(0);
+                assert!(names(folder.path()).iter().all(|name| !name.ends_with(".partial")));
+            }
+            assert!(fs::read(folder.path().join(out)).unwrap() == whole);
+        });
+    }
 }
 
 #[test]
@@ -331,6 +330,7 @@ fn bad_input_is_refused_before_anything_runs() {
         ),
         (format!("sweep spcmm --vary spcmm.frequency=0.5Hz..1Hz:3 --start follow-up {plan}"), 2, "--start cold"),
         (format!("sweep pendulum --vary contact.clearance=0.1mm..1mm:5 {plan}"), 2, "no drive that repeats"),
+        (format!("sweep pendulum --vary contact.clearance=0.1mm..1mm:5 {plan}"), 2, "--duration"),
         (
             format!("sweep spcmm --set spcmm.frequency=0Hz --vary contact.clearance=0.1mm..1mm:5 {plan}"),
             2,
@@ -347,7 +347,18 @@ fn bad_input_is_refused_before_anything_runs() {
             2,
             "more than a result holds",
         ),
-        (format!("{SMALL} --out a.csv"), 2, ".npz"),
+        (format!("{SMALL} --out a.txt"), 2, ".npz or .csv"),
+        (format!("{SMALL} --shard 1/2 --out a.csv"), 2, "a shard is a NumPy archive"),
+        (format!("{SMALL} --period 0 --out a.npz"), 2, "--period 0: the time must be above 0"),
+        (format!("{SMALL} --keep S1.nromal:max --out a.npz"), 2, "did you mean `S1.normal`?"),
+        (format!("{SMALL} --keep S1.normal:top --out a.npz"), 2, "`top` is no statistic"),
+        (format!("{SMALL} --start cold,cold --out a.npz"), 2, "cold is given twice"),
+        (format!("{SMALL} --duration 1s --out a.npz"), 2, "cannot be used with"),
+        (format!("{SMALL} --points points.csv --out a.npz"), 2, "cannot be used with"),
+        (format!("{PENDULUM} --from 60ms --out a.npz"), 2, "must begin before the end"),
+        (format!("{PENDULUM} --vary contact.friction=0.1,0.2 --zip --out a.npz"), 2, "contact.friction has 2"),
+        (format!("{PENDULUM} --vary contact.normal_law=hertz,flores --start follow-up --out a.npz"), 2, "ascending"),
+        ("sweep pendulum --points none.csv --duration 1ms --out a.npz".to_owned(), 1, "cannot read none.csv"),
         (format!("{SMALL} --out no/such/folder/a.npz"), 1, "a.npz"),
         (format!("{SMALL} --shard 4/3 --out a.npz"), 2, "--shard 4/3"),
         (format!("{SMALL} --phase 2 --out a.npz"), 2, "--phase 2"),
@@ -360,13 +371,168 @@ fn bad_input_is_refused_before_anything_runs() {
     }
 }
 
+/// A sweep of three points without a drive.
+const PENDULUM: &str = "sweep pendulum --vary contact.clearance=0.2mm..0.4mm:3 --duration 50ms";
+
+#[test]
+fn a_duration_needs_no_drive_and_threads_and_shards_change_no_bit_of_it() {
+    let folder = folder();
+    let line = format!("{PENDULUM} --from 10ms --vary contact.normal_law=hertz,flores");
+    let run = |rest: &str| jointplay(folder.path(), &format!("{line} {rest}")).expect(0);
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    let said = run("--threads 1 --out one.npz").stdout;
+    assert!(said.contains("Points            6") && !said.contains("Regimes"), "{said}");
+    run("--threads 2 --out two.npz");
+    run("--threads 2 --out two.csv");
+    run("--shard 1/2 --out s1.npz");
+    run("--shard 2/2 --out s2.npz");
+    jointplay(folder.path(), "merge s2.npz s1.npz --out merged.npz").expect(0);
+    jointplay(folder.path(), "merge s1.npz s2.npz --out merged.csv").expect(0);
+    assert!(read("one.npz") == read("two.npz") && read("one.npz") == read("merged.npz"));
+    assert!(read("two.csv") == read("merged.csv") && read("two.csv.meta.json") == read("merged.csv.meta.json"));
+
+    let (arrays, meta) = archive(&folder.path().join("one.npz"));
+    assert_eq!((&meta["duration_s"], &meta["from_s"]), (&Json::from(0.05), &Json::from(0.01)));
+    let own: Vec<&str> = meta["arrays"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
+    let expected = "status stopped_at_s doubts energy_residual S1_peak_N S1_peak_kept_N S1_mean_N S1_impacts \
+                    S1_impacts_kept S1_last_separation_s";
+    assert_eq!(own.join(" "), expected);
+    assert_eq!(arrays["S1_peak_N"].shape(), [3, 2]);
+    // NumPy's arrays of words are UTF-32.
+    let utf32 = |word: &str| word.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect::<Vec<u8>>();
+    let holds = |bytes: &[u8]| read("one.npz").windows(bytes.len()).any(|window| window == bytes);
+    assert!(holds(b"<U32") && holds(&utf32("hertz")) && holds(&utf32("flores")) && !holds(&utf32("gonthier")));
+
+    // The table has the same numbers, point by point.
+    let text = String::from_utf8(read("two.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().unwrap();
+    assert_eq!(heads[..3], ["contact.clearance_m", "contact.normal_law", "status"]);
+    let rows: Vec<Vec<&str>> = lines.collect();
+    assert_eq!(rows.len(), 6);
+    for (i, row) in rows.iter().enumerate() {
+        assert_eq!(row[1], ["hertz", "flores"][i % 2]);
+        for (head, cell) in heads.iter().zip(row).skip(2) {
+            let (cell, value): (f64, f64) = (cell.parse().unwrap(), arrays[*head][[i / 2, i % 2]]);
+            assert!((cell - value).abs() <= 1e-11 * value.abs() || (cell.is_nan() && value.is_nan()), "{head}");
+        }
+    }
+    assert_eq!((rows[2][0], rows[4][0]), ("0.0003", "0.0004"));
+}
+
+#[test]
+fn statistics_are_those_of_the_rows_of_a_run() {
+    let folder = folder();
+    let keep = "S1.normal:max,S1.normal:min,S1.normal:mean,*.force.x:rms,tip_error:max,tip_error:end,P1.rate:range,P1.rate:std";
+    let line = format!("sweep spcmm --vary solver.method=dopri5,radau5 --duration 0.2s --keep {keep} --out a.npz");
+    jointplay(folder.path(), &line).expect(0);
+    let (arrays, _) = archive(&folder.path().join("a.npz"));
+    for (i, method) in ["dopri5", "radau5"].into_iter().enumerate() {
+        let value = |name: &str| arrays[name][[i]];
+        let run = jointplay(
+            folder.path(),
+            &format!(
+                "run spcmm --set solver.method={method} --duration 0.2s --every 20us --channels \
+                 S1.normal,S*.force.x,tip_error,P1.rate --out run.json --summary json --force"
+            ),
+        );
+        let summary: Json = serde_json::from_str(&run.expect(0).stdout).unwrap();
+        assert_eq!(value("S1_normal_max_N"), summary["peak_normal_N"]["S1"]);
+        let rows: Json = serde_json::from_slice(&fs::read(folder.path().join("run.json")).unwrap()).unwrap();
+        let column = |name: &str| -> Vec<f64> {
+            rows["columns"][name].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+        };
+        let mean =
+            |values: &[f64]| values.windows(2).map(|w| 0.5 * (w[0] + w[1])).sum::<f64>() / (values.len() - 1) as f64;
+        let squares = |values: &[f64], about: f64| values.iter().map(|v| (v - about).powi(2)).collect::<Vec<_>>();
+        let (least, largest) = (
+            |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min),
+            |v: &[f64]| v.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        );
+        let (normal, tip, rate) = (column("S1_normal_N"), column("probe_error_m"), column("P1_rate_m_s"));
+        // Both see every impact, of some 0.1 ms, at instants of their own.
+        let near = |name: &str, expected: f64, part: f64| {
+            let error = value(name) - expected;
+            assert!(error.abs() <= part * expected.abs(), "{method}: {name}: {} for {expected}", value(name));
+        };
+        assert_eq!(value("S1_normal_min_N"), least(&normal));
+        near("S1_normal_mean_N", mean(&normal), 1e-2);
+        for joint in ["S1", "S2", "S3"] {
+            let force = column(&format!("{joint}_force_x_N"));
+            near(&format!("{joint}_force_x_rms_N"), mean(&squares(&force, 0.0)).sqrt(), 1e-2);
+        }
+        near("probe_error_max_m", largest(&tip), 1e-3);
+        near("probe_error_end_m", tip[tip.len() - 1], 1e-9);
+        near("P1_rate_range_m_s", largest(&rate) - least(&rate), 1e-3);
+        near("P1_rate_std_m_s", mean(&squares(&rate, mean(&rate))).sqrt(), 1e-4);
+    }
+}
+
+#[test]
+fn points_of_a_file_zipped_and_crossed_are_the_same_points() {
+    let folder = folder();
+    let points = "contact.clearance,contact.friction,contact.normal_law\n0.2mm,0.1,hertz\n\"0.8 mm\",0.3,flores\n";
+    fs::write(folder.path().join("points.csv"), points).unwrap();
+    let rest = "--duration 30ms --keep S1.normal:max,S1.normal:mean";
+    let run = |line: &str| jointplay(folder.path(), &format!("sweep pendulum {line} {rest}")).expect(0);
+    run("--points points.csv --out file.csv");
+    let zipped = "--vary contact.clearance=0.2mm..0.8mm:2:log --vary contact.friction=0.1,0.3 \
+                  --vary contact.normal_law=hertz,flores";
+    run(&format!("{zipped} --zip --out zip.csv"));
+    run(&format!("{zipped} --out cross.csv"));
+    run("--points points.csv --out file.npz");
+    let rows = |name: &str| -> Vec<String> {
+        fs::read_to_string(folder.path().join(name)).unwrap().lines().map(str::to_owned).collect()
+    };
+    let (zip, cross) = (rows("zip.csv"), rows("cross.csv"));
+    assert_eq!(rows("file.csv"), zip);
+    assert_eq!((zip.len(), cross.len()), (3, 9));
+    assert_eq!((&cross[1], &cross[8]), (&zip[1], &zip[2]));
+    assert!(zip[2].starts_with("0.0008,0.3,flores,0,NaN,"), "{}", zip[2]);
+    let (arrays, meta) = archive(&folder.path().join("file.npz"));
+    assert_eq!(meta["arrangement"], "zipped");
+    assert_eq!((arrays["contact.friction"].shape(), arrays["S1_normal_max_N"].shape()), (&[2][..], &[2][..]));
+
+    let refused =
+        jointplay(folder.path(), "sweep pendulum --points points.csv --duration 1ms --out points.csv --force");
+    assert!(refused.expect(2).stderr.contains("the same file"), "the points are not overwritten");
+}
+
+#[test]
+fn every_start_has_its_part_of_the_result() {
+    let folder = folder();
+    let line = "sweep spcmm --set spcmm.frequency=5Hz --vary contact.friction=0.1..0.3:3 --periods 2 --discard 1 --no-exponent";
+    let run = |rest: &str| jointplay(folder.path(), &format!("{line} {rest}")).expect(0);
+    run("--start cold,follow-up,follow-down --threads 2 --out all.npz");
+    run("--start cold,follow-up,follow-down --out all.csv");
+    for k in 1..=2 {
+        run(&format!("--start cold,follow-up,follow-down --shard {k}/2 --out s{k}.npz"));
+    }
+    jointplay(folder.path(), "merge s1.npz s2.npz --out merged.npz").expect(0);
+    assert!(fs::read(folder.path().join("all.npz")).unwrap() == fs::read(folder.path().join("merged.npz")).unwrap());
+    let (all, meta) = archive(&folder.path().join("all.npz"));
+    assert_eq!(meta["start"], serde_json::json!(["cold", "follow-up", "follow-down"]));
+    assert_eq!(all["section_beta_rad"].shape(), [3, 3, 1]);
+    let table = fs::read_to_string(folder.path().join("all.csv")).unwrap();
+    for (s, start) in ["cold", "follow-up", "follow-down"].into_iter().enumerate() {
+        run(&format!("--start {start} --out {start}.npz"));
+        let (own, meta) = archive(&folder.path().join(format!("{start}.npz")));
+        assert_eq!(meta["start"], start);
+        assert_eq!(table.lines().filter(|line| line.starts_with(&format!("{start},"))).count(), 3);
+        for name in ["section_beta_rad", "S1_peak_N", "energy_residual"] {
+            let part = all[name].index_axis(ndarray::Axis(0), s);
+            assert!(part == own[name], "{start}: {name}");
+        }
+    }
+}
+
 fn small(start: Start, points: usize) -> Sweep {
     let scene = Scene::load("spcmm", &[]).unwrap();
     let text = format!("contact.clearance=0.2mm..0.3mm:{points}");
-    let axis = ParameterRange::parse(&scene, &text).unwrap();
-    let grid = Grid::new(&scene, vec![axis], start).unwrap();
+    let axis = Axis::parse(&scene, &text).unwrap();
+    let design = Design::crossed(&scene, vec![axis], &[start]).unwrap();
     let plan = Plan { periods: 2, discard: 1, phase: 0.25, exponent: true };
-    Sweep::new(scene, grid, plan).unwrap()
+    Sweep::new(scene, design, plan).unwrap()
 }
 
 fn records(sweep: &Sweep, b: usize, steps: u32) -> Vec<u64> {
@@ -393,7 +559,7 @@ fn following_continues_the_neighbour_within_fixed_blocks() {
     let points = FOLLOW_BLOCK + 2;
     let up = small(Start::FollowUp, points);
     let down = small(Start::FollowDown, points);
-    assert_eq!(up.grid().blocks(), 2);
+    assert_eq!(up.design().blocks(), 2);
     let cold = small(Start::Cold, points);
     let column = |sweep: &Sweep, name: &str| {
         let columns = sweep.layout().columns();

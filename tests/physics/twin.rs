@@ -75,7 +75,7 @@ fn ideal_joints_stay_closed_under_a_displacement() {
 fn point(name: &str, changes: &Changes, periods: usize, discard: usize) -> PointResult {
     let scene = scene(name, changes);
     let plan = Plan { periods, discard, phase: 0.0, exponent: true };
-    let mut run = PointRun::cold(&scene, plan, drive_period(&scene).unwrap()).unwrap();
+    let mut run = PointRun::cold(&scene, &plan.into(), drive_period(&scene).unwrap()).unwrap();
     while !run.is_done() {
         run.step().unwrap();
     }
@@ -129,7 +129,7 @@ fn sections_are_those_of_the_run_without_a_twin() {
     let period = drive_period(&scene).unwrap();
     let sections = |exponent: bool| {
         let plan = Plan { periods: 3, discard: 1, phase: 0.0, exponent };
-        let mut run = PointRun::cold(&scene, plan, period).unwrap();
+        let mut run = PointRun::cold(&scene, &plan.into(), period).unwrap();
         while !run.is_done() {
             run.step().unwrap();
         }
@@ -171,7 +171,7 @@ fn drives_tell_their_common_period() {
 fn exponent_of(scene: &jointplay::scene::Scene, periods: usize, discard: usize) -> PointResult {
     let period = drive_period(scene).expect("a drive");
     let plan = Plan { periods, discard, phase: 0.0, exponent: true };
-    let mut run = PointRun::cold(scene, plan, period).expect("starts");
+    let mut run = PointRun::cold(scene, &plan.into(), period).expect("starts");
     while !run.is_done() {
         run.step().expect("runs");
     }

@@ -2,7 +2,7 @@
 
 use super::drive::OBSERVABLES;
 use super::exponent::Exponent;
-use super::point::{JointResult, Plan, PointResult};
+use super::point::{JointResult, PointResult, Protocol};
 use jointplay_scene::Scene;
 
 /// How a point ended.
@@ -42,15 +42,22 @@ pub struct Column {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     columns: Vec<Column>,
-    joints: usize,
+    /// Ball joints whose quantities are recorded.
+    joints: Vec<String>,
     probe: bool,
+    /// Number of statistics of channels.
+    statistics: usize,
+    has_sections: bool,
     kept: usize,
 }
 
 /// An array with one value per point: its name, whether it is an integer, and how to read it from a result.
 type OfPoint = (&'static str, bool, fn(&PointResult, Status) -> f64);
 
-const POINT: [OfPoint; 12] = [
+/// Those of [`POINT`] that exist only with sections.
+const OF_SECTIONS: std::ops::Range<usize> = 2..10;
+
+static POINT: [OfPoint; 12] = [
     ("status", true, |_, status| status.code() as f64),
     ("stopped_at_s", false, |r, _| r.stopped.unwrap_or(f64::NAN)),
     // A point that did not reach its end has no regime: code -1.
@@ -92,29 +99,36 @@ fn exponent(result: &PointResult, of: fn(&Exponent) -> f64) -> f64 {
 
 impl Layout {
     /// The arrays of a sweep of `scene`.
-    pub fn new(scene: &Scene, plan: &Plan) -> Self {
+    pub fn new(scene: &Scene, protocol: &Protocol) -> Self {
         let mut columns = Vec::new();
         let mut add = |name: &str, whole: bool, per_section: bool| {
             columns.push(Column { name: name.to_owned(), whole, per_section });
         };
-        for (name, whole, _) in POINT {
-            add(name, whole, false);
+        let has_sections = protocol.plan().is_some();
+        for (name, whole, _) in of_point(has_sections) {
+            add(name, *whole, false);
         }
-        for joint in &scene.machine.ball_joints {
+        let by_default = protocol.keep.is_empty();
+        let joints = scene.machine.ball_joints.iter().filter(|_| by_default);
+        let joints: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
+        for joint in &joints {
             for (quantity, whole, _) in JOINT {
-                add(&format!("{}_{quantity}", joint.name), whole, false);
+                add(&format!("{joint}_{quantity}"), whole, false);
             }
         }
-        let probe = scene.machine.output.probe.is_some();
+        let probe = scene.machine.output.probe.is_some() && by_default;
         if probe {
             add("probe_error_max_um", false, false);
             add("probe_error_rms_um", false, false);
         }
-        add("exponent_running_per_s", false, true);
-        for observable in OBSERVABLES {
-            add(&format!("section_{observable}"), false, true);
+        protocol.keep.iter().for_each(|of| add(of.column(), false, false));
+        if has_sections {
+            add("exponent_running_per_s", false, true);
+            for observable in OBSERVABLES {
+                add(&format!("section_{observable}"), false, true);
+            }
         }
-        Self { columns, joints: scene.machine.ball_joints.len(), probe, kept: plan.periods - plan.discard }
+        Self { columns, joints, probe, statistics: protocol.keep.len(), has_sections, kept: protocol.kept() }
     }
 
     /// Arrays in order.
@@ -149,27 +163,39 @@ impl Layout {
             Some(result) if result.stopped.is_some() => (Status::Diverged, result),
             Some(result) => (Status::Done, result),
             None => {
-                unknown = PointResult::empty(self.joints);
+                unknown = PointResult::unknown();
                 (Status::NoStart, &unknown)
             }
         };
         let start = record.len();
-        record.extend(POINT.iter().map(|(.., of)| of(result, status)));
-        for joint in &result.joints {
-            record.extend(JOINT.iter().map(|(.., of)| of(joint)));
+        record.extend(of_point(self.has_sections).map(|(.., of)| of(result, status)));
+        for name in &self.joints {
+            // A point may lack a joint of the scene, such as the last one of a chain with fewer links.
+            let joint = result.joints.iter().find(|joint| joint.name == *name);
+            let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
+            record.extend(JOINT.iter().map(|(.., of)| of(joint.unwrap_or(&unknown))));
         }
         if self.probe {
             let (largest, rms) = result.probe.unwrap_or((f64::NAN, f64::NAN));
             record.extend([largest * 1e6, rms * 1e6]);
         }
-        let exponent = result.evidence.exponent.as_ref();
-        let running = exponent.map_or(&[][..], |e| &e.running);
-        record.extend((0..self.kept).map(|k| running.get(k).copied().unwrap_or(f64::NAN)));
-        let width = OBSERVABLES.len();
-        for i in 0..width {
-            let value = |k: usize| result.sections.get(k * width + i).copied();
-            record.extend((0..self.kept).map(|k| value(k).unwrap_or(f64::NAN)));
+        record.extend((0..self.statistics).map(|i| result.statistics.get(i).copied().unwrap_or(f64::NAN)));
+        if self.has_sections {
+            let exponent = result.evidence.exponent.as_ref();
+            let running = exponent.map_or(&[][..], |e| &e.running);
+            record.extend((0..self.kept).map(|k| running.get(k).copied().unwrap_or(f64::NAN)));
+            let width = OBSERVABLES.len();
+            for i in 0..width {
+                let value = |k: usize| result.sections.get(k * width + i).copied();
+                record.extend((0..self.kept).map(|k| value(k).unwrap_or(f64::NAN)));
+            }
         }
         debug_assert_eq!(record.len() - start, self.record_length());
     }
+}
+
+/// The rows of [`POINT`], with or without those of sections.
+fn of_point(has_sections: bool) -> impl Iterator<Item = &'static OfPoint> {
+    let rows = POINT.iter().enumerate();
+    rows.filter(move |(i, _)| has_sections || !OF_SECTIONS.contains(i)).map(|(_, row)| row)
 }

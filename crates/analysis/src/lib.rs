@@ -1,7 +1,7 @@
 //! Results computed from whole runs. The crate starts no threads, and the caller supplies its clock ([`RunContext`]).
 //!
-//! - Sweeps: [`grid`] defines the values, [`sweep`] runs them, [`point`] records the results; [`sweep_task`] and [`task`] are the
-//!   same as plain data for a thread or a worker.
+//! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`] and [`statistic`] record the results;
+//!   [`sweep_task`] and [`task`] are the same as plain data for a thread or a worker.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
@@ -12,17 +12,18 @@
 //! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
 //!
 //! ```
-//! use jointplay_analysis::grid::{Grid, ParameterRange, Start};
+//! use jointplay_analysis::axis::Axis;
+//! use jointplay_analysis::design::{Design, Start};
 //! use jointplay_analysis::point::Plan;
 //! use jointplay_analysis::sweep::Sweep;
 //! use jointplay_scene::Scene;
 //!
 //! let scene = Scene::load("slider-crank-driven", &[])?;
-//! let clearance = ParameterRange::parse(&scene, "contact.clearance=0.1mm..0.3mm:2")?;
-//! let grid = Grid::new(&scene, vec![clearance], Start::Cold)?;
+//! let clearance = Axis::parse(&scene, "contact.clearance=0.1mm..0.3mm:2")?;
+//! let design = Design::crossed(&scene, vec![clearance], &[Start::Cold])?;
 //! let plan = Plan { periods: 4, discard: 1, phase: 0.0, exponent: false };
-//! let sweep = Sweep::new(scene, grid, plan)?;
-//! for block in 0..sweep.grid().blocks() {
+//! let sweep = Sweep::new(scene, design, plan)?;
+//! for block in 0..sweep.design().blocks() {
 //!     let mut run = sweep.begin(block);
 //!     while !run.is_done() {
 //!         run.advance(10_000);
@@ -36,14 +37,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod axis;
 pub mod beginning;
 mod cost;
 pub mod distribution;
+pub mod design;
 pub mod drive;
 pub mod exponent;
 pub mod fits;
 mod front;
-pub mod grid;
 pub mod impact_row;
 pub mod indices;
 pub mod iso286;
@@ -54,6 +56,7 @@ mod normal;
 pub mod orbit;
 pub mod paper;
 pub mod point;
+mod points;
 pub mod presets;
 mod random;
 mod reach;
@@ -68,6 +71,7 @@ pub mod section;
 mod setting;
 pub mod source;
 pub mod statistics;
+pub mod statistic;
 pub mod sweep;
 pub mod sweep_task;
 pub mod task;
@@ -78,6 +82,7 @@ mod work_precision;
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use front::front;
 pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
+pub use points::{PointsError, read_points};
 pub use reach::{Goal, GoalResult, reach};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};

@@ -1,15 +1,18 @@
 //! One point of a sweep: the run of a scene through its periods, and the recorded results.
 
-use super::drive::{OBSERVABLES, ObservedError, ObservedRun};
+use super::drive::{NoPeriod, OBSERVABLES, ObservedError, ObservedRun, drive_period};
 use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
 use super::section::{Schedule, SectionRun};
+use super::statistic::{Accumulator, ChannelStatistic};
 use jointplay_physics::machine::{Machine, Solver};
 use jointplay_physics::simulate::{Effect, Peak};
 use jointplay_scene::Scene;
 
-/// Largest number of samples per period for the means and the tip error.
+/// Samples per period for the means and the tip error: at most, and at least for statistics of channels.
 const SAMPLES: f64 = 400.0;
+/// The same for a run of given duration.
+const SAMPLES_OF_DURATION: f64 = 1000.0;
 /// Separation of the twin over the tolerance, and its range, in units of the scales of the tolerance: 10 nm at a tolerance of
 /// 1e-6 in a machine with balls of 10 mm. It is so small that the twins part only at a grazing contact, and well above the
 /// difference between runs with the same steps, which comes from the last iteration of an implicit step.
@@ -36,9 +39,90 @@ pub struct Plan {
     pub exponent: bool,
 }
 
+/// Length of the run of each point, and its observed part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Span {
+    /// Periods with a section in each.
+    Sections {
+        /// Number of periods and phase of the sections.
+        plan: Plan,
+        /// Time between two sections, s; `None` is the common period of the scene's drives.
+        interval: Option<f64>,
+    },
+    /// A time without sections.
+    Duration {
+        /// Length, s, from the point's start.
+        duration: f64,
+        /// End of the transient, s, 0 <= from < duration.
+        from: f64,
+    },
+}
+
+/// The run of each point of a sweep and the recorded quantities.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Protocol {
+    /// Length.
+    pub span: Span,
+    /// Statistics of channels, in place of the quantities of the ball joints and the probe; if empty, those.
+    pub keep: Vec<ChannelStatistic>,
+}
+
+impl Protocol {
+    /// The plan of the sections, if there are any.
+    pub fn plan(&self) -> Option<&Plan> {
+        match &self.span {
+            Span::Sections { plan, .. } => Some(plan),
+            Span::Duration { .. } => None,
+        }
+    }
+
+    /// Number of sections recorded per point.
+    pub fn kept(&self) -> usize {
+        self.plan().map_or(0, |plan| plan.periods.saturating_sub(plan.discard))
+    }
+
+    /// Time between two sections of `scene`, or the observed time, s.
+    ///
+    /// # Errors
+    /// A scene without a common period of its drives, where that is needed.
+    pub fn interval(&self, scene: &Scene) -> Result<f64, NoPeriod> {
+        match self.span {
+            Span::Sections { interval, .. } => interval.map_or_else(|| drive_period(scene), Ok),
+            Span::Duration { duration, from } => Ok(duration - from),
+        }
+    }
+
+    /// Times of the sections of a run that starts cold at t = 0 or, with `follows`, continues a run at the time given there, s.
+    /// A duration is a transient that ends at a first, discarded section, and one interval to a second.
+    fn schedule(&self, interval: f64, follows: Option<f64>) -> Schedule {
+        match self.span {
+            Span::Sections { plan, .. } => {
+                // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
+                let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
+                let first = follows.map_or(part * interval, |now| now + interval);
+                Schedule { first, interval, sections: plan.periods, discard: plan.discard }
+            }
+            Span::Duration { duration, from } => {
+                let discard = usize::from(from > 0.0);
+                let first = follows.unwrap_or(0.0) + if from > 0.0 { from } else { duration };
+                Schedule { first, interval, sections: 1 + discard, discard }
+            }
+        }
+    }
+}
+
+impl From<Plan> for Protocol {
+    /// Sections in each period of the drives.
+    fn from(plan: Plan) -> Self {
+        Self { span: Span::Sections { plan, interval: None }, keep: Vec::new() }
+    }
+}
+
 /// Result for one ball joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointResult {
+    /// Its name.
+    pub name: String,
     /// Largest normal force of all periods, in continuous time, N.
     pub peak: f64,
     /// Largest normal force of the kept periods, N.
@@ -74,13 +158,13 @@ pub struct PointResult {
     pub residual: f64,
     /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
     pub sections: Vec<f64>,
+    /// Values of [`Protocol::keep`], SI; NaN where unknown.
+    pub statistics: Vec<f64>,
 }
 
 /// A point being computed.
 pub struct PointRun {
     watch: SectionRun<ObservedRun>,
-    plan: Plan,
-    period: f64,
     resolution: Vec<f64>,
     started: f64,
     impacts_at_start: Vec<u64>,
@@ -88,34 +172,35 @@ pub struct PointRun {
     peaks: Vec<Peak>,
     transient_peaks: Vec<f64>,
     means: Means,
+    statistics: Accumulator,
 }
 
 impl PointRun {
-    /// Starts `scene` at t = 0.
+    /// Starts `scene` at t = 0; `interval` is [`Protocol::interval`], s.
     ///
     /// # Errors
     /// A scene that cannot start.
-    pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, ObservedError> {
-        // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
-        let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
-        Ok(Self::begin(ObservedRun::new(scene)?, plan, period, part * period))
+    pub fn cold(scene: &Scene, protocol: &Protocol, interval: f64) -> Result<Self, ObservedError> {
+        Ok(Self::begin(ObservedRun::new(scene)?, protocol, protocol.schedule(interval, None)))
     }
 
     /// Continues from the latest section of another point as `machine`; `None` if a running simulation cannot change to that.
-    pub fn follow(mut run: ObservedRun, machine: &Machine, plan: Plan, period: f64) -> Option<Self> {
+    pub fn follow(mut run: ObservedRun, machine: &Machine, protocol: &Protocol, interval: f64) -> Option<Self> {
         if run.simulation_mut().adopt(machine) != Ok(Effect::Now) {
             return None;
         }
-        let first = run.time() + period;
-        Some(Self::begin(run, plan, period, first))
+        let schedule = protocol.schedule(interval, Some(run.time()));
+        Some(Self::begin(run, protocol, schedule))
     }
 
-    fn begin(mut machine: ObservedRun, plan: Plan, period: f64, first: f64) -> Self {
+    fn begin(mut machine: ObservedRun, protocol: &Protocol, schedule: Schedule) -> Self {
         let solver = machine.simulation().machine().solver;
         let tolerance = tolerance_of(&solver);
-        let schedule = Schedule { first, interval: period, sections: plan.periods, discard: plan.discard };
+        let samples = if protocol.plan().is_some() { SAMPLES } else { SAMPLES_OF_DURATION };
+        let sample_interval = schedule.interval / samples;
         // The motion of a purely kinematic scene has no neighbours.
-        let twin = plan.exponent && !machine.simulation().mechanism().is_kinematic();
+        let exponent = protocol.plan().is_some_and(|plan| plan.exponent);
+        let twin = exponent && !machine.simulation().mechanism().is_kinematic();
         let separation = twin.then(|| separation(tolerance));
         let mut peaks = Vec::new();
         let simulation = machine.simulation_mut();
@@ -127,17 +212,16 @@ impl PointRun {
         let started = simulation.time();
         let mut run = Self {
             resolution: resolution(simulation.machine(), tolerance),
-            means: Means::new(joints, period / SAMPLES),
+            means: Means::new(joints, sample_interval),
+            statistics: Accumulator::new(&protocol.keep, simulation, sample_interval),
             watch: SectionRun::new(machine, schedule, separation),
-            plan,
-            period,
             started,
             impacts_at_discard: impacts.clone(),
             impacts_at_start: impacts,
             peaks,
             transient_peaks: vec![0.0; joints],
         };
-        if run.plan.discard == 0 {
+        if schedule.discard == 0 {
             run.begin_keeping();
         }
         run
@@ -179,13 +263,15 @@ impl PointRun {
     /// The divergence guard: the point has diverged.
     pub fn step(&mut self) -> Result<(), ObservedError> {
         let at_section = self.watch.step()?;
-        if self.watch.taken() < self.plan.discard {
+        let discard = self.watch.schedule().discard;
+        if self.watch.taken() < discard {
             return Ok(());
         }
-        if at_section && self.watch.taken() == self.plan.discard {
+        if at_section && self.watch.taken() == discard {
             self.begin_keeping();
         } else {
             self.means.look(self.watch.orbit_mut(), at_section);
+            self.statistics.look(self.watch.orbit_mut().simulation_mut());
         }
         Ok(())
     }
@@ -200,6 +286,7 @@ impl PointRun {
         }
         self.impacts_at_discard.clone_from(&simulation.statistics().impacts);
         self.means.begin(machine);
+        self.statistics.begin(machine.simulation_mut());
     }
 
     /// The result, and the scene in the state of its latest section, from which the next point can continue.
@@ -210,8 +297,11 @@ impl PointRun {
         let residual = simulation.ledger().map_or(f64::NAN, |ledger| ledger.share());
         let statistics = simulation.statistics();
         let span = self.means.span;
+        let machine = simulation.machine();
+        let statistics_of_channels = self.statistics.values(machine, |j| self.peaks[j].normal);
         let joints = (0..self.peaks.len())
             .map(|j| JointResult {
+                name: machine.ball_joints[j].name.clone(),
                 peak: self.peaks[j].normal.max(self.transient_peaks[j]),
                 peak_kept: self.peaks[j].normal,
                 mean: self.means.normal[j] / span,
@@ -226,28 +316,35 @@ impl PointRun {
         let probe = known.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
         let exponent = self.watch.exponent().and_then(|benettin| benettin.result());
         let sections = self.watch.sections().to_vec();
-        let (regime, evidence) = classify(&sections, &self.resolution, self.period, exponent);
-        let result = PointResult { stopped: None, joints, probe, regime, evidence, doubts, residual, sections };
+        let (regime, evidence) = classify(&sections, &self.resolution, self.watch.schedule().interval, exponent);
+        let statistics = statistics_of_channels;
+        let result =
+            PointResult { stopped: None, joints, probe, regime, evidence, doubts, residual, sections, statistics };
         (result, self.watch.into_orbit())
     }
 
     /// Result of a point that the divergence guard stopped: only the time.
     pub fn stopped(self) -> PointResult {
-        PointResult {
-            stopped: Some(self.machine().time() - self.started),
-            ..PointResult::empty(self.transient_peaks.len())
-        }
+        PointResult { stopped: Some(self.machine().time() - self.started), ..PointResult::unknown() }
     }
 }
 
 impl PointResult {
     /// A result without known values.
-    pub fn empty(joints: usize) -> Self {
-        let unknown = JointResult { peak: f64::NAN, peak_kept: f64::NAN, mean: f64::NAN, ..JointResult::default() };
+    pub fn unknown() -> Self {
         let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
-        let (doubts, residual) = (0, f64::NAN);
-        let joints = vec![unknown; joints];
-        Self { stopped: None, joints, probe: None, regime, evidence, doubts, residual, sections: Vec::new() }
+        let (joints, sections, statistics) = (Vec::new(), Vec::new(), Vec::new());
+        Self {
+            stopped: None,
+            joints,
+            probe: None,
+            regime,
+            evidence,
+            doubts: 0,
+            residual: f64::NAN,
+            sections,
+            statistics,
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Ready-made sweeps for the chaos bench; each states beforehand what it will show.
 
-use super::grid::Start;
+use super::design::Start;
 use super::source::SceneSource;
 use super::sweep_task::SweepTask;
 use jointplay_scene::{Scene, SceneError};

@@ -11,7 +11,8 @@ pub use record::{
 };
 pub use statements::Statement;
 
-use super::grid::{Grid, ParameterRange, Start};
+use super::axis::Axis;
+use super::design::{Design, Start};
 use super::paper::{Case, Coordinate, PAPER, Series, Variant};
 use super::point::{Plan, resolution};
 use super::response::{Observation, ResponseError, derivatives, respond};
@@ -111,10 +112,11 @@ type SweepRow<'a> = (&'static str, &'a [String], Start, (usize, usize), bool);
 fn sweep_data(variant: &'static Variant, row: &SweepRow) -> SweepData {
     let &(name, vary, start, (periods, discard), exponent) = row;
     let scene = planned(variant, name, PAPER.runs[0], &[]).scene;
-    let axes = vary.iter().map(|text| ParameterRange::parse(&scene, text).expect(LOADS));
-    let grid = Grid::new(&scene, axes.collect(), start).expect(LOADS);
-    let sweep = Sweep::new(scene, grid, Plan { periods, discard, phase: 0.0, exponent }).expect(LOADS);
-    SweepData { variant, name, sweep, records: Vec::new(), points: Vec::new() }
+    let axes = vary.iter().map(|text| Axis::parse(&scene, text).expect(LOADS));
+    let design = Design::crossed(&scene, axes.collect(), &[start]).expect(LOADS);
+    let plan = Plan { periods, discard, phase: 0.0, exponent };
+    let sweep = Sweep::new(scene, design, plan).expect(LOADS);
+    SweepData { variant, name, plan, sweep, records: Vec::new(), points: Vec::new() }
 }
 
 impl Agenda {
@@ -157,7 +159,7 @@ impl Agenda {
         runs.push(planned(&variants.corrected, "ideal", nominal, &[("contact.clearance", "0")]));
         // Blocks take longest and come first, so that no thread is left running one at the end.
         let blocks =
-            |(s, data): (usize, &SweepData)| (0..data.sweep.grid().blocks()).map(move |b| ReportJob::Block(s, b));
+            |(s, data): (usize, &SweepData)| (0..data.sweep.design().blocks()).map(move |b| ReportJob::Block(s, b));
         let jobs = sweeps.iter().enumerate().flat_map(blocks).chain((0..runs.len()).map(ReportJob::Run)).collect();
         Self { extent, runs, sweeps, jobs }
     }
@@ -186,9 +188,9 @@ impl Agenda {
             ReportJob::Run(n) if self.runs[n].settles => 1 + self.extent.settle + 2,
             ReportJob::Run(_) => 1,
             ReportJob::Block(s, b) => {
-                let sweep = &self.sweeps[s].sweep;
-                let twin = if sweep.plan().exponent { 2 } else { 1 };
-                twin * sweep.plan().periods * sweep.grid().block(b).len()
+                let SweepData { plan, sweep, .. } = &self.sweeps[s];
+                let twin = if plan.exponent { 2 } else { 1 };
+                twin * plan.periods * sweep.design().block(b).len()
             }
         };
         PAPER.period * periods as f64
@@ -207,9 +209,9 @@ impl Agenda {
                 Ok(Outcome::Run(Box::new(recorded)))
             }
             ReportJob::Block(s, b) => {
-                let sweep = &self.sweeps[s].sweep;
-                let all = sweep.plan().periods as f64;
-                let share = self.length(job) / sweep.grid().block(b).len() as f64;
+                let SweepData { plan, sweep, .. } = &self.sweeps[s];
+                let all = plan.periods as f64;
+                let share = self.length(job) / sweep.design().block(b).len() as f64;
                 let mut block = sweep.begin(b);
                 while !block.is_done() {
                     block.advance(2048);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::AnalysisError;
-use super::grid::RangeError;
+use super::axis::RangeError;
 use super::sweep::SweepError;
 use jointplay_scene::{Scene, SceneError};
 

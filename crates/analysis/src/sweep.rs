@@ -1,18 +1,15 @@
 //! A whole sweep: its scene, its points, and the computation of one block of them. The caller schedules the blocks: the records
 //! of a block depend only on the sweep and the block number.
 
-use super::drive::{NoPeriod, ObservedRun, drive_period};
-use super::grid::{Grid, ParameterRange, Start};
+use super::design::{Design, Start};
+use super::drive::{NoPeriod, ObservedRun};
 use super::layout::Layout;
-use super::point::{Plan, PointResult, PointRun};
+use super::point::{Plan, PointResult, PointRun, Protocol};
 use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
 use jointplay_scene::{Scene, SceneError, Value};
 
 /// Largest total number of kept sections: an array of them takes 512 MiB.
 const MOST_SECTIONS: usize = 1 << 26;
-
-/// Largest number of values per range at which the interior of a map is tried before anything runs.
-const MOST_WITHIN: usize = 64;
 
 /// Why a sweep is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,7 +53,7 @@ pub enum SweepError {
         most: usize,
     },
     /// No drive phase.
-    #[error("{0}; a sweep needs a driven scene such as spcmm or slider-crank-driven")]
+    #[error("{0}; give the length of each point with --duration instead, or the time between sections with --period")]
     NoPeriod(#[from] NoPeriod),
     /// A point that the scene does not accept, or that cannot start.
     #[error("the scene cannot start at {point}: {error}")]
@@ -72,65 +69,52 @@ pub enum SweepError {
 #[derive(Clone, Debug)]
 pub struct Sweep {
     scene: Scene,
-    grid: Grid,
-    plan: Plan,
+    design: Design,
+    protocol: Protocol,
     layout: Layout,
 }
 
 impl Sweep {
-    /// A sweep of `scene`. Every value of each range is tried with the other range at its ends. Values inside a map are tried
-    /// too, all of them if there are few enough.
+    /// A sweep of `scene`. Before anything runs, every value of each range is tried with the other ranges at their ends, and
+    /// up to 4096 points within a map or of a table.
     ///
     /// # Errors
-    /// No kept periods, no drive phase, or a value at which the scene cannot start.
-    pub fn new(scene: Scene, grid: Grid, plan: Plan) -> Result<Self, SweepError> {
-        if plan.discard >= plan.periods {
-            return Err(SweepError::NothingKept { periods: plan.periods, discard: plan.discard });
-        }
-        let (points, kept) = (grid.points(), plan.periods - plan.discard);
-        if kept > MOST_SECTIONS / points {
-            return Err(SweepError::TooLarge { points, kept, most: MOST_SECTIONS });
-        }
-        let layout = Layout::new(&scene, &plan);
-        let sweep = Self { scene, grid, plan, layout };
-        for point in sweep.tried() {
-            let scene = sweep.grid.scene(&sweep.scene, point);
-            let started = scene.and_then(|scene| {
-                Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
-                Ok(scene)
-            });
-            match started {
-                Ok(scene) => {
-                    let period = drive_period(&scene)?;
-                    let most = (LONGEST_RUN / period) as usize;
-                    if plan.periods > most {
-                        return Err(SweepError::TooLong {
-                            periods: plan.periods,
-                            point: sweep.describe(point),
-                            period,
-                            most,
-                        });
-                    }
-                }
-                Err(error) => {
-                    return Err(SweepError::Infeasible { point: sweep.describe(point), error: Box::new(error) });
-                }
+    /// No kept periods, no drive phase where sections need one, or a value at which the scene cannot start.
+    pub fn new(scene: Scene, design: Design, protocol: impl Into<Protocol>) -> Result<Self, SweepError> {
+        let protocol = protocol.into();
+        if let Some(&Plan { periods, discard, .. }) = protocol.plan() {
+            if discard >= periods {
+                return Err(SweepError::NothingKept { periods, discard });
+            }
+            let (points, kept) = (design.points(), protocol.kept());
+            if kept > MOST_SECTIONS / points {
+                return Err(SweepError::TooLarge { points, kept, most: MOST_SECTIONS });
             }
         }
+        let layout = Layout::new(&scene, &protocol);
+        let sweep = Self { scene, design, protocol, layout };
+        sweep.design.tried().into_iter().try_for_each(|point| sweep.check(point))?;
         Ok(sweep)
     }
 
-    /// Points tried before anything runs: every value of each range with the other at its ends, and a lattice inside, which
-    /// covers every point of a small map.
-    fn tried(&self) -> Vec<usize> {
-        let tried = |point: &usize| {
-            let indices = self.grid.indices(*point);
-            let along = || self.grid.axes().iter().zip(&indices);
-            let is_end = |(axis, i): (&ParameterRange, &usize)| *i == 0 || *i + 1 == axis.count();
-            let ends = along().filter(|&of| is_end(of)).count();
-            ends + 1 >= indices.len() || along().all(|(axis, i)| i % axis.count().div_ceil(MOST_WITHIN) == 0)
-        };
-        (0..self.grid.points()).filter(tried).collect()
+    /// Requires that a point can start, and that its run is no longer than the longest.
+    fn check(&self, point: usize) -> Result<(), SweepError> {
+        let scene = self.design.scene(&self.scene, point);
+        let started = scene.and_then(|scene| {
+            Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
+            Ok(scene)
+        });
+        let infeasible = |error| SweepError::Infeasible { point: self.describe(point), error: Box::new(error) };
+        let interval = self.protocol.interval(&started.map_err(infeasible)?)?;
+        match self.protocol.plan() {
+            Some(plan) if plan.periods > (LONGEST_RUN / interval) as usize => Err(SweepError::TooLong {
+                periods: plan.periods,
+                point: self.describe(point),
+                period: interval,
+                most: (LONGEST_RUN / interval) as usize,
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// Parameters of a point, formatted for the user.
@@ -139,7 +123,7 @@ impl Sweep {
             let shown = self.scene.parameter(key).map(|parameter| parameter.show(&value));
             format!("{key} = {}", shown.unwrap_or_default())
         };
-        let settings = self.grid.settings(point).into_iter();
+        let settings = self.design.settings(point).into_iter();
         settings.map(written).collect::<Vec<_>>().join(", ")
     }
 
@@ -149,13 +133,13 @@ impl Sweep {
     }
 
     /// The points.
-    pub fn grid(&self) -> &Grid {
-        &self.grid
+    pub fn design(&self) -> &Design {
+        &self.design
     }
 
-    /// Periods and sections of each point.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
+    /// Length of each point's run, and the recorded quantities.
+    pub fn protocol(&self) -> &Protocol {
+        &self.protocol
     }
 
     /// The arrays of the result.
@@ -165,7 +149,7 @@ impl Sweep {
 
     /// Block `b`, not yet started.
     pub fn begin(&self, b: usize) -> BlockRun<'_> {
-        BlockRun { sweep: self, order: self.grid.order(b), at: 0, run: None, machine: None, done: Vec::new() }
+        BlockRun { sweep: self, order: self.design.order(b), at: 0, run: None, machine: None, done: Vec::new() }
     }
 }
 
@@ -223,18 +207,19 @@ impl BlockRun<'_> {
     fn start(&mut self) -> Option<PointRun> {
         let sweep = self.sweep;
         let point = self.order[self.at];
-        let scene = sweep.grid.scene(&sweep.scene, point).ok()?;
-        let period = drive_period(&scene).ok()?;
+        let scene = sweep.design.scene(&sweep.scene, point).ok()?;
+        let interval = sweep.protocol.interval(&scene).ok()?;
         let run = self.machine.take();
-        let followed = run.and_then(|run| PointRun::follow(run, &scene.machine, sweep.plan, period));
-        followed.or_else(|| PointRun::cold(&scene, sweep.plan, period).ok())
+        let followed = run.and_then(|run| PointRun::follow(run, &scene.machine, &sweep.protocol, interval));
+        followed.or_else(|| PointRun::cold(&scene, &sweep.protocol, interval).ok())
     }
 
     /// Finishes the current point; the next one follows `machine`, or starts cold without one.
     fn close(&mut self, result: Option<PointResult>, machine: Option<ObservedRun>) {
-        self.done.push((self.order[self.at], result));
+        let point = self.order[self.at];
+        self.done.push((point, result));
         self.at += 1;
-        self.machine = machine.filter(|_| self.sweep.grid.start() != Start::Cold);
+        self.machine = machine.filter(|_| self.sweep.design.start(point) != Start::Cold);
     }
 
     /// Records of the finished block, in point order.
@@ -251,25 +236,87 @@ impl BlockRun<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::Axis;
+    use crate::point::Span;
+    use crate::statistic::ChannelStatistic;
+    use jointplay_physics::simulate::Frame;
+
+    fn swept(name: &str, vary: &str, span: Span, keep: &str) -> (Sweep, Vec<PointResult>) {
+        let scene = Scene::load(name, &[]).expect("built in");
+        let keep = ChannelStatistic::parse_list(&scene, keep).expect("channels");
+        let design = Design::crossed(&scene, vec![Axis::parse(&scene, vary).expect("a range")], &[Start::Cold]);
+        let sweep = Sweep::new(scene, design.expect("points"), Protocol { span, keep }).expect("a sweep");
+        let mut results = Vec::new();
+        for b in 0..sweep.design().blocks() {
+            let mut block = sweep.begin(b);
+            while !block.is_done() {
+                block.advance(100);
+            }
+            results.extend(block.finished().iter().map(|(_, result)| result.clone().expect("starts")));
+        }
+        (sweep, results)
+    }
+
+    /// Statistics of a run that is stepped and sampled here.
+    #[test]
+    fn a_duration_needs_no_drive_and_its_statistics_are_those_of_a_run() {
+        let span = Span::Duration { duration: 0.06, from: 0.02 };
+        let keep = "rod.pose.x:min,rod.pose.x:max,rod.velocity.x:mean,rod.pose.x:end,*.normal:max,*.normal:mean";
+        let (sweep, results) = swept("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, keep);
+        let names: Vec<&str> = sweep.layout().columns().iter().map(|column| &column.name[..]).collect();
+        assert_eq!(names[..4], ["status", "stopped_at_s", "doubts", "energy_residual"]);
+        for (point, result) in results.iter().enumerate() {
+            let scene = sweep.design().scene(sweep.scene(), point).expect("a scene");
+            let mut simulation = Simulation::new(&scene.machine).expect("starts");
+            let mut frame = Frame::default();
+            let (mut x, mut forces, mut peaks): (Vec<f64>, Vec<f64>, Vec<_>) = Default::default();
+            for end in [0.02, 0.06] {
+                // Only what follows the transient counts.
+                simulation.take_peaks(&mut peaks);
+                (x, forces) = (Vec::new(), Vec::new());
+                loop {
+                    simulation.sample(simulation.time(), &mut frame);
+                    x.push(frame.pose.position.x);
+                    forces.push(frame.joints[0].normal_force.norm());
+                    if simulation.time() >= end {
+                        break;
+                    }
+                    simulation.step_until(end).expect("runs");
+                }
+            }
+            simulation.take_peaks(&mut peaks);
+            let value = |name: &str| {
+                let at = names.iter().position(|column| *column == name).expect(name);
+                let mut record = Vec::new();
+                sweep.layout().append(Some(result), &mut record);
+                record[at]
+            };
+            assert_eq!(value("status"), 0.0);
+            assert_eq!(value("x_end_m"), x[x.len() - 1]);
+            let least = x.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            assert!((value("x_min_m") - least).abs() < 1e-9 && (value("x_max_m") - largest).abs() < 1e-9);
+            // The mean velocity is the path over the time.
+            let first = value("x_end_m") - 0.04 * value("vx_mean_m_s");
+            assert!((first - x[0]).abs() < 1e-5, "{first} {}", x[0]);
+            assert!(result.statistics.iter().all(|value| value.is_finite()));
+            let joint = &scene.machine.ball_joints[0].name;
+            let peak = value(&format!("{joint}_normal_max_N"));
+            assert_eq!(peak, peaks[0].normal);
+            assert!(forces.iter().all(|force| *force <= peak * (1.0 + 1e-12)));
+            let mean = value(&format!("{joint}_normal_mean_N"));
+            assert!(mean > 0.0 && mean < peak, "{mean} {peak}");
+        }
+    }
 
     #[test]
-    fn maps_are_tried_within() {
-        let scene = Scene::load("spcmm", &[]).expect("built in");
-        let tried = |rows: usize, columns: usize| {
-            let ranges =
-                [format!("contact.clearance=0.2mm..0.5mm:{rows}"), format!("contact.friction=0.1..0.2:{columns}")];
-            let axes = ranges.map(|text| ParameterRange::parse(&scene, &text).expect("a range"));
-            let grid = Grid::new(&scene, axes.to_vec(), Start::Cold).expect("a map");
-            let plan = Plan { periods: 2, discard: 1, phase: 0.0, exponent: false };
-            let layout = Layout::new(&scene, &plan);
-            let sweep = Sweep { scene: scene.clone(), grid, plan, layout };
-            sweep.tried()
-        };
-        assert_eq!(tried(3, 5), (0..15).collect::<Vec<_>>());
-        // The border, and every second value of the first range and every third of the second.
-        let large = tried(128, 130);
-        for (i, j, is) in [(0, 1, true), (127, 7, true), (5, 129, true), (2, 3, true), (2, 4, false), (3, 3, false)] {
-            assert_eq!(large.contains(&(i * 130 + j)), is, "{i} {j}");
-        }
+    fn a_given_period_replaces_that_of_the_drives() {
+        let plan = Plan { periods: 3, discard: 1, phase: 0.0, exponent: false };
+        let span = Span::Sections { plan, interval: Some(0.01) };
+        let (sweep, results) = swept("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "time:end");
+        assert_eq!(sweep.layout().kept(), 2);
+        assert!(
+            results.iter().all(|result| (result.statistics[0] - 0.03).abs() < 1e-12 && result.sections.len() == 24)
+        );
     }
 }

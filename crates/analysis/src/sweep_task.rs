@@ -4,8 +4,9 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
+use super::axis::Axis;
+use super::design::{Design, Start};
 use super::drive::drive_period;
-use super::grid::{Grid, ParameterRange, Start};
 use super::point::{Plan, PointResult};
 use super::source::{SceneSource, TaskFault};
 use super::sweep::{BlockRun, Sweep};
@@ -119,12 +120,15 @@ pub(super) async fn run(
         ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
     let scene = task.scene.scene()?;
-    let axes = task.vary.iter().map(|text| ParameterRange::parse(&scene, text));
+    let axes = task.vary.iter().map(|text| Axis::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>()?;
+    if let Some(words) = axes.iter().find(|axis| axis.words().is_some()) {
+        return Err(words.not_numbers(&scene).into());
+    }
     let ranges = axes.iter().map(|axis| Range {
         key: axis.key().to_owned(),
-        from: axis.value(0),
-        to: axis.value(axis.count() - 1),
+        from: axis.number(0),
+        to: axis.number(axis.count() - 1),
         count: axis.count(),
     });
     let ranges: Vec<Range> = ranges.collect();
@@ -132,14 +136,14 @@ pub(super) async fn run(
         return Err(TaskFault::Phase(task.phase));
     }
     let plan = Plan { periods: task.periods, discard: task.discard, phase: task.phase, exponent: task.exponent };
-    let grid = Grid::new(&scene, axes, task.start)?;
+    let design = Design::crossed(&scene, axes, &[task.start])?;
     let kept = task.periods.saturating_sub(task.discard);
-    if kept.saturating_mul(grid.points()) > MOST_SECTIONS {
-        return Err(TaskFault::TooManySections { points: grid.points(), kept, most: MOST_SECTIONS });
+    if kept.saturating_mul(design.points()) > MOST_SECTIONS {
+        return Err(TaskFault::TooManySections { points: design.points(), kept, most: MOST_SECTIONS });
     }
-    let sweep = Sweep::new(scene, grid, plan)?;
+    let sweep = Sweep::new(scene, design, plan)?;
     say(SweepMessage::Ranges(ranges))?;
-    let blocks = sweep.grid().blocks();
+    let blocks = sweep.design().blocks();
     let mut through = 0;
     let own = coarse_first(blocks).into_iter();
     for b in own.skip(share.index).step_by(share.of.max(1)) {
@@ -152,7 +156,7 @@ pub(super) async fn run(
                 say(SweepMessage::Point(Box::new(point)))?;
             }
             let part = block.run.current().map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
-            say(SweepMessage::Progress((through as f64 + part) / sweep.grid().points() as f64))?;
+            say(SweepMessage::Progress((through as f64 + part) / sweep.design().points() as f64))?;
         }
     }
     Ok(())
@@ -209,8 +213,8 @@ impl<'a> Block<'a> {
         self.told += 1;
         let (first, cold) = self.first.take().unwrap_or((0.0, true));
         let before = self.before.take();
-        let settings = self.sweep.grid().settings(*index);
-        let scene = self.sweep.grid().scene(self.sweep.scene(), *index).ok();
+        let settings = self.sweep.design().settings(*index);
+        let scene = self.sweep.design().scene(self.sweep.scene(), *index).ok();
         let interval = scene.as_ref().and_then(|scene| drive_period(scene).ok());
         let interval = interval.unwrap_or(0.0);
         let write = |key: &str, value| {
@@ -233,15 +237,15 @@ impl<'a> Block<'a> {
             probe: None,
             doubts: 0,
         };
-        let indices = self.sweep.grid().indices(*index).into_iter();
-        let axes = self.sweep.grid().axes().iter().zip(indices);
-        point.values.extend(axes.map(|(axis, i)| axis.value(i)));
+        let indices = self.sweep.design().indices(*index).into_iter();
+        let axes = self.sweep.design().axes().iter().zip(indices);
+        point.values.extend(axes.map(|(axis, i)| axis.number(i)));
         match result {
             None => point.diverged = Some(0.0),
             Some(PointResult { stopped: Some(time), .. }) => point.diverged = Some(*time),
             Some(result) => {
                 tell_result(&mut point, result);
-                let periods = self.sweep.plan().periods;
+                let periods = self.sweep.protocol().plan().map_or(1, |plan| plan.periods);
                 self.before = Some((*index, first + (periods - 1) as f64 * interval));
             }
         }

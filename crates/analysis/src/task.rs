@@ -112,7 +112,7 @@ mod tests {
     use std::task::Poll;
 
     use super::*;
-    use crate::grid::Start;
+    use crate::design::Start;
     use jointplay_scene::Scene;
 
     fn job(changes: &[(&str, &str)], presets: &[&str]) -> Job {

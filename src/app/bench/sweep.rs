@@ -7,7 +7,7 @@ use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use super::swept::{Swept, start_word};
 use super::throttle::Throttle;
-use crate::analysis::grid::Start;
+use crate::analysis::design::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
 use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;

@@ -1,6 +1,6 @@
 //! A sweep of the bench and its results.
 
-use crate::analysis::grid::Start;
+use crate::analysis::design::Start;
 use crate::analysis::sweep_task::{Range, SweepTask, SweptPoint};
 use crate::app::player::Player;
 use crate::app::value;

@@ -22,7 +22,7 @@ pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
 }
 
 /// Forwards bytes and computes their CRC-32, which tells a reader whether rows and metadata belong together.
-pub(super) struct ChecksumWriter<W> {
+pub struct ChecksumWriter<W> {
     inner: W,
     checksum: crc32fast::Hasher,
 }

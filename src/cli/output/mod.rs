@@ -6,8 +6,7 @@ mod npz;
 mod rows;
 mod table;
 
-pub use csv::significant;
-#[cfg(feature = "gui")]
+pub use csv::{ChecksumWriter, significant};
 pub use json::write_meta;
 pub use npz::{as_io, write_archive};
 pub use table::{RowError, Table};

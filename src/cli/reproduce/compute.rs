@@ -30,7 +30,7 @@ impl Kept {
         let folder = PathBuf::from(name);
         create_dir_all(&folder).map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
         let part = |data: &SweepData| {
-            let blocks: Vec<usize> = (0..data.sweep.grid().blocks()).collect();
+            let blocks: Vec<usize> = (0..data.sweep.design().blocks()).collect();
             Partial::open(&folder.join(data.file_name()), &meta(&data.sweep), &data.sweep, &blocks)
         };
         let parts = work.sweeps().iter().map(part).collect::<Result<_, Failure>>()?;

@@ -103,15 +103,15 @@ fn curves(found: &Findings) -> Table {
 
 /// One row per point of a sweep, without its sections.
 fn points(data: &SweepData) -> Table {
-    let (layout, grid) = (data.sweep.layout(), data.sweep.grid());
+    let (layout, design) = (data.sweep.layout(), data.sweep.design());
     let single = layout.columns().iter().filter(|c| !c.per_section);
-    let names: Vec<&str> = grid.axes().iter().map(|a| a.key()).chain(single.clone().map(|c| &c.name[..])).collect();
+    let names: Vec<&str> = design.axes().iter().map(|a| a.key()).chain(single.clone().map(|c| &c.name[..])).collect();
     let columns: Vec<Vec<f64>> = single.map(|c| data.values(&c.name)).collect();
     let row = |point: usize| {
-        let at = grid.axes().iter().zip(grid.indices(point)).map(|(axis, index)| axis.value(index));
+        let at = design.axes().iter().zip(design.indices(point)).map(|(axis, index)| axis.number(index));
         at.chain(columns.iter().map(|column| column[point])).map(number).collect()
     };
-    Table::new(&names.join(" | "), (0..grid.points()).map(row))
+    Table::new(&names.join(" | "), (0..design.points()).map(row))
 }
 
 impl Source for &SweepData {

@@ -217,7 +217,7 @@ const LEAST_EXPONENT: f64 = -10.0;
 fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
     let data = found.cold(series);
     let points = &data.points;
-    let (kept, discard) = (data.sweep.layout().kept(), data.sweep.plan().discard);
+    let (kept, discard) = (data.sweep.layout().kept(), data.plan.discard);
     let running = data.values("exponent_running_per_s");
     let legible: Vec<usize> = (0..points.len()).filter(|&k| points[k].exponent.0 > LEAST_EXPONENT).collect();
     let chosen = 5.min(legible.len());
@@ -244,9 +244,9 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
 
 fn map(found: &Findings) -> Vec<Chart> {
     let data = found.sweep("map");
-    let axes = data.sweep.grid().axes();
+    let axes = data.sweep.design().axes();
     let heat = |title: &str, values: Vec<f64>, scale: Axis, names: Vec<(f64, String)>| {
-        let (xs, ys) = (axes[1].values().map(|v| v * 1e3).collect(), axes[0].values().collect());
+        let (xs, ys) = (axes[1].numbers().map(|v| v * 1e3).collect(), axes[0].numbers().collect());
         let [x, y] = [Series::Clearance, Series::Friction].map(parameter);
         Chart { map: Some(Map { xs, ys, values, scale, names }), ..Chart::new(title, x, y, Vec::new()) }
     };

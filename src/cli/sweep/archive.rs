@@ -1,4 +1,4 @@
-//! A sweep's result as a NumPy archive: one array per quantity, the varied values, and `meta`.
+//! A sweep's result: one array per quantity, the varied values, and `meta`; written as a NumPy archive or as a table.
 
 use std::io;
 use std::path::Path;
@@ -7,12 +7,18 @@ use ndarray::{Array1, ArrayD, IxDyn};
 use ndarray_npy::NpzWriter;
 use serde_json::{Map, Value as Json, json};
 
+use super::csv;
 use super::options::Shard;
+use super::word::Word;
+use crate::analysis::axis::Axis;
+use crate::analysis::design::Arrangement;
 use crate::analysis::layout::Column;
 use crate::analysis::sweep::Sweep;
 use crate::cli::Failure;
-use crate::cli::output::{as_io, write_archive};
-use crate::files::OutputFile;
+use crate::cli::output::{ChecksumWriter, Format, as_io, claim_account, write_archive, write_meta};
+use crate::files::{OutputFile, publish};
+use crate::scene::{Kind, Scene};
+use crate::units::si_unit;
 
 /// Source of an archive's numbers.
 pub trait Source {
@@ -23,11 +29,40 @@ pub trait Source {
     fn gather(&mut self, offset: usize, length: usize, out: &mut [f64]) -> Result<(), Failure>;
 }
 
+/// Values of a varied parameter, SI or words.
+pub enum AxisValues {
+    /// Numbers, SI.
+    Numbers(Vec<f64>),
+    /// Words.
+    Words(Vec<Word>),
+}
+
+impl AxisValues {
+    fn len(&self) -> usize {
+        match self {
+            Self::Numbers(values) => values.len(),
+            Self::Words(words) => words.len(),
+        }
+    }
+}
+
+/// A varied parameter.
+pub struct ArchivedAxis {
+    /// Key.
+    pub key: String,
+    /// SI unit as a suffix of a column's name, such as `_m`; empty for a pure number or a word.
+    pub unit: String,
+    /// Its values.
+    pub values: AxisValues,
+}
+
 /// An archive to be written: its description, without the numbers.
 pub struct Archive {
     meta: Map<String, Json>,
-    /// Key and values of each varied parameter.
-    axes: Vec<(String, Vec<f64>)>,
+    axes: Vec<ArchivedAxis>,
+    zipped: bool,
+    /// Words of the starts, if there are several.
+    starts: Vec<String>,
     columns: Vec<Column>,
     kept: usize,
     /// Points of a shard; `None` in a whole sweep.
@@ -36,29 +71,80 @@ pub struct Archive {
 
 /// Key in `meta` that only shards have.
 pub const SHARD: &str = "shard";
+/// Word for zipped axes in `meta`.
+pub const ZIPPED: &str = "zipped";
 
-/// Rejects a name that readers would not recognise as a NumPy archive.
-///
-/// # Errors
-/// Usage.
-pub fn check_ending(path: &Path) -> Result<(), Failure> {
-    let npz = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
-    if npz {
-        return Ok(());
+/// The file to be written, claimed before the sweep runs.
+pub struct Target {
+    file: OutputFile,
+    /// Metadata beside a table.
+    account: Option<OutputFile>,
+}
+
+impl Target {
+    /// Checks that `path` can be written; only an archive can hold a shard.
+    ///
+    /// # Errors
+    /// Another ending, an existing file without `force`, or an unwritable folder.
+    pub fn claim(path: &Path, force: bool, is_shard: bool) -> Result<Self, Failure> {
+        let wrong = |what: &str| Failure::usage(format!("--out {}: {what}", path.display()));
+        let account = match Format::of(path) {
+            Ok(Format::Npz) => false,
+            Ok(Format::Csv) if is_shard => {
+                return Err(wrong("a shard is a NumPy archive; use the extension .npz, and .csv for `merge`"));
+            }
+            Ok(Format::Csv) => true,
+            _ => {
+                return Err(wrong(
+                    "a sweep is written as a NumPy archive or as a table of points; use the extension .npz or .csv",
+                ));
+            }
+        };
+        let file = OutputFile::claim(path, force)?;
+        let account = if account { Some(claim_account(path, force)?) } else { None };
+        Ok(Self { file, account })
     }
-    Err(Failure::usage(format!(
-        "--out {}: a sweep is written as a NumPy archive; use the extension .npz",
-        path.display()
-    )))
+
+    /// Writes the result.
+    ///
+    /// # Errors
+    /// A file system error; an existing file is then unchanged.
+    pub fn write(self, archive: &Archive, source: &mut impl Source) -> Result<(), Failure> {
+        let Some(account) = self.account else {
+            return archive.write(self.file, source);
+        };
+        let mut failure = None;
+        let mut checksum = String::new();
+        let rows = self.file.fill(|file| {
+            let mut file = ChecksumWriter::new(file);
+            csv::write(&mut file, archive, source, &mut failure)?;
+            checksum = file.checksum();
+            Ok(())
+        });
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        let mut meta = archive.meta.clone();
+        meta.insert("rows_crc32".into(), checksum.into());
+        let account = account.fill(|file| write_meta(file, &meta))?;
+        // In this order, a kill between the two renames never leaves rows without metadata.
+        Ok(publish(vec![account, rows?])?)
+    }
 }
 
 impl Archive {
     /// The archive of a sweep or of one shard of it.
     pub fn of_sweep(mut meta: Map<String, Json>, sweep: &Sweep, shard: Option<&Shard>) -> Self {
-        let grid = sweep.grid();
+        let design = sweep.design();
         let layout = sweep.layout();
-        let axes = grid.axes().iter();
-        let axes = axes.map(|axis| (axis.key().to_owned(), axis.values().collect()));
+        let axes = design.axes().iter().map(|axis| ArchivedAxis {
+            key: axis.key().to_owned(),
+            unit: unit_suffix(sweep.scene(), axis),
+            values: match axis.words() {
+                Some(words) => AxisValues::Words(words.into_iter().map(|word| Word(word.to_owned())).collect()),
+                None => AxisValues::Numbers(axis.numbers().collect()),
+            },
+        });
         let columns = layout
             .columns()
             .iter()
@@ -67,14 +153,22 @@ impl Archive {
         meta.insert("arrays".into(), Json::Array(columns.collect()));
         let points = shard.map(|shard| {
             meta.insert(SHARD.into(), json!(shard.to_string()));
-            let blocks = (0..grid.blocks()).filter(|&b| shard.has(b));
-            blocks.flat_map(|b| grid.block(b)).collect()
+            let blocks = (0..design.blocks()).filter(|&b| shard.has(b));
+            blocks.flat_map(|b| design.block(b)).collect()
         });
-        Self { meta, axes: axes.collect(), columns: layout.columns().to_vec(), kept: layout.kept(), points }
+        Self {
+            zipped: design.arrangement() == Arrangement::Zipped,
+            starts: starts_of(&meta),
+            meta,
+            axes: axes.collect(),
+            columns: layout.columns().to_vec(),
+            kept: layout.kept(),
+            points,
+        }
     }
 
     /// The archive of a whole sweep as its shards describe it; `None` if `meta` is not that of a sweep.
-    pub fn of_meta(meta: Map<String, Json>, axes: Vec<(String, Vec<f64>)>) -> Option<Self> {
+    pub fn of_meta(meta: Map<String, Json>, axes: Vec<ArchivedAxis>) -> Option<Self> {
         let kept = usize::try_from(meta.get("kept")?.as_u64()?).ok()?;
         let column = |array: &Json| {
             Some(Column {
@@ -84,7 +178,59 @@ impl Archive {
             })
         };
         let columns = meta.get("arrays")?.as_array()?.iter().map(column);
-        Some(Self { columns: columns.collect::<Option<Vec<_>>>()?, meta, axes, kept, points: None })
+        Some(Self {
+            columns: columns.collect::<Option<Vec<_>>>()?,
+            zipped: meta.get("arrangement")?.as_str()? == ZIPPED,
+            starts: starts_of(&meta),
+            meta,
+            axes,
+            kept,
+            points: None,
+        })
+    }
+
+    /// Varied parameters.
+    pub fn axes(&self) -> &[ArchivedAxis] {
+        &self.axes
+    }
+
+    /// Words of the starts; empty if there is only one.
+    pub fn starts(&self) -> &[String] {
+        &self.starts
+    }
+
+    /// Arrays in order.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Shape of an array with one value per point.
+    fn shape(&self) -> Vec<usize> {
+        if let Some(points) = &self.points {
+            return vec![points.len()];
+        }
+        let starts = (!self.starts.is_empty()).then_some(self.starts.len());
+        starts.into_iter().chain(self.counts()).collect()
+    }
+
+    /// Number of values along each independent direction.
+    fn counts(&self) -> impl DoubleEndedIterator<Item = usize> {
+        let independent = if self.zipped { 1 } else { self.axes.len() };
+        self.axes[..independent.min(self.axes.len())].iter().map(|axis| axis.values.len())
+    }
+
+    /// Index of the start of a point of the whole sweep, and its index along each axis.
+    pub fn indices(&self, point: usize) -> (usize, Vec<usize>) {
+        let mut rest = point;
+        let mut indices: Vec<usize> = Vec::new();
+        for count in self.counts().rev() {
+            indices.insert(0, rest % count);
+            rest /= count;
+        }
+        if self.zipped {
+            indices = vec![indices[0]; self.axes.len()];
+        }
+        (rest, indices)
     }
 
     /// Provenance.
@@ -94,10 +240,7 @@ impl Archive {
 
     /// Number of points.
     pub fn count(&self) -> usize {
-        match &self.points {
-            Some(points) => points.len(),
-            None => self.axes.iter().map(|(_, values)| values.len()).product(),
-        }
+        self.shape().into_iter().product()
     }
 
     /// Name of each array, whether it holds integers, and its number of values per point.
@@ -134,9 +277,16 @@ impl Archive {
         let mut failure = None;
         let written = target.write(|file| {
             write_archive(*file.get_ref(), |archive| {
-                for (key, values) in &self.axes {
-                    let values = Array1::from(values.clone());
-                    archive.add_array(key.as_str(), &values).map_err(as_io)?;
+                if !self.starts.is_empty() {
+                    let starts: Array1<Word> = self.starts.iter().map(|word| Word(word.clone())).collect();
+                    archive.add_array("start", &starts).map_err(as_io)?;
+                }
+                for axis in &self.axes {
+                    let written = match &axis.values {
+                        AxisValues::Numbers(values) => archive.add_array(&*axis.key, &Array1::from(values.clone())),
+                        AxisValues::Words(words) => archive.add_array(&*axis.key, &Array1::from(words.clone())),
+                    };
+                    written.map_err(as_io)?;
                 }
                 if let Some(points) = &self.points {
                     let points: Array1<i64> = points.iter().map(|&point| point as i64).collect();
@@ -148,10 +298,7 @@ impl Archive {
                         failure = Some(error);
                         io::Error::other(text)
                     })?;
-                    let mut shape = match &self.points {
-                        Some(points) => vec![points.len()],
-                        None => self.axes.iter().map(|(_, values)| values.len()).collect(),
-                    };
+                    let mut shape = self.shape();
                     if column.per_section {
                         shape.push(self.kept);
                     }
@@ -172,6 +319,22 @@ impl Archive {
             None => Ok(written?),
         }
     }
+}
+
+/// Words of the starts of a sweep with several.
+fn starts_of(meta: &Map<String, Json>) -> Vec<String> {
+    let words = meta.get("start").and_then(Json::as_array).into_iter().flatten();
+    words.filter_map(|word| word.as_str().map(str::to_owned)).collect()
+}
+
+/// SI unit of the values of `axis`, as a suffix: `_m`, `_rad_s`.
+pub(super) fn unit_suffix(scene: &Scene, axis: &Axis) -> String {
+    let unit = match scene.parameter(axis.key()).map(|parameter| parameter.kind) {
+        Ok(Kind::Number { dimension, .. }) => si_unit(dimension),
+        _ => "",
+    };
+    let unit = unit.replace([' ', '^'], "").replace('/', "_");
+    if unit.is_empty() { unit } else { format!("_{unit}") }
 }
 
 fn add<W: io::Write + io::Seek, T: ndarray_npy::WritableElement>(

@@ -8,11 +8,12 @@ use ndarray::{Array1, ArrayD, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
 use serde_json::{Map, Value as Json};
 
-use super::archive::{self, Archive, SHARD, Source};
+use super::archive::{Archive, ArchivedAxis, AxisValues, SHARD, Source, Target};
 use super::options;
+use super::word::Word;
 use crate::cli::Failure;
 use crate::cli::args::MergeArguments;
-use crate::files::{OutputFile, same_file};
+use crate::files::same_file;
 
 /// An open shard.
 struct OpenShard {
@@ -29,7 +30,6 @@ struct OpenShard {
 /// # Errors
 /// Files that are not shards, or not all shards of one sweep; the file system.
 pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
-    archive::check_ending(&arguments.out)?;
     let shards: Vec<&Path> = arguments.shards.iter().map(PathBuf::as_path).collect();
     if same_file(&arguments.out, &shards).is_some() {
         return Err(Failure::usage(format!(
@@ -37,7 +37,7 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
             arguments.out.display()
         )));
     }
-    let target = OutputFile::claim(&arguments.out, arguments.force)?;
+    let target = Target::claim(&arguments.out, arguments.force, false)?;
     let mut parts = Vec::new();
     for path in &arguments.shards {
         parts.push(OpenShard::open(path)?);
@@ -61,7 +61,7 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
     check_points(&parts, archive.count())?;
     let mut shards = Shards { names: archive.names(), parts };
     let summary = super::summarise(&archive, &mut shards)?;
-    archive.write(target, &mut shards)?;
+    target.write(&archive, &mut shards)?;
     super::report(&archive, &summary, &arguments.out, arguments.summary)
 }
 
@@ -133,15 +133,22 @@ impl OpenShard {
         Ok(part)
     }
 
-    /// Key and values of the varied parameters.
-    fn axes(&mut self) -> Result<Vec<(String, Vec<f64>)>, Failure> {
+    /// The varied parameters.
+    fn axes(&mut self) -> Result<Vec<ArchivedAxis>, Failure> {
         let vary = self.meta.get("vary").and_then(Json::as_array).cloned();
         let mut axes = Vec::new();
         for axis in vary.unwrap_or_default() {
             let key = axis.get("key").and_then(Json::as_str);
             let key = key.ok_or_else(|| no_shard(&self.path))?.to_owned();
-            let values: ArrayD<f64> = self.array(&key)?;
-            axes.push((key, values.iter().copied().collect()));
+            let unit = axis.get("unit").and_then(Json::as_str).unwrap_or_default().to_owned();
+            let values = if axis.get("words").is_some() {
+                let words: ArrayD<Word> = self.array(&key)?;
+                AxisValues::Words(words.iter().cloned().collect())
+            } else {
+                let values: ArrayD<f64> = self.array(&key)?;
+                AxisValues::Numbers(values.iter().copied().collect())
+            };
+            axes.push(ArchivedAxis { key, unit, values });
         }
         Ok(axes)
     }

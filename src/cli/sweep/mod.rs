@@ -1,9 +1,12 @@
 //! `sweep`: one scene at many parameter values, on all cores; `merge`: combines the shards of a sweep.
 
 mod archive;
+mod csv;
 mod merge;
 mod options;
 mod partial;
+mod request;
+mod word;
 
 pub(super) use archive::{Archive, Source};
 pub use merge::merge;
@@ -15,20 +18,22 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
 
+use self::archive::{Target, ZIPPED, unit_suffix};
 use self::options::Shard;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::{NearSingular, near_singular};
+use super::output::{RowsFile, check_distinct};
 use super::summary::count;
 use super::workers::run_jobs;
-use super::{Failure, interrupt, load, print, progress, threads, warn};
-use crate::analysis::drive::drive_period;
-use crate::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange};
+use super::{Failure, interrupt, print, progress, threads, warn};
+use crate::analysis::axis::Axis;
+use crate::analysis::design::{Arrangement, FOLLOW_BLOCK};
 use crate::analysis::layout::Status;
-use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
+use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Span};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
-use crate::files::OutputFile;
 use crate::machine::WarningKind;
+use crate::scene::Scene;
 use crate::simulate::Doubt;
 
 /// Steps between two checks for Ctrl-C.
@@ -39,23 +44,23 @@ const STEPS_BETWEEN_LOOKS: u32 = 4096;
 /// # Errors
 /// Bad input, before the sweep starts; later Ctrl-C or the file system.
 pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
-    archive::check_ending(&arguments.out)?;
-    let target = OutputFile::claim(&arguments.out, arguments.force)?;
-    let sweep = read(arguments)?;
-    let shard = match &arguments.shard {
-        Some(text) => Some(options::shard(text)?),
-        None => None,
-    };
+    let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
+    names.extend(arguments.points.iter().map(|path| ("--points".to_owned(), path.clone())));
+    names.extend(RowsFile::names("--out", &arguments.out));
+    check_distinct(&names)?;
+    let shard = arguments.shard.as_deref().map(options::shard).transpose()?;
+    let target = Target::claim(&arguments.out, arguments.force, shard.is_some())?;
+    let sweep = request::read(arguments)?;
     let archive = Archive::of_sweep(meta(&sweep), &sweep, shard.as_ref());
     let blocks: Vec<usize> =
-        (0..sweep.grid().blocks()).filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b))).collect();
+        (0..sweep.design().blocks()).filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b))).collect();
     if !arguments.quiet {
         warnings(&sweep).iter().for_each(|warning| warn(warning));
     }
     let mut partial = Partial::open(&arguments.out, archive.meta(), &sweep, &blocks)?;
     let todo: Vec<usize> = blocks.iter().copied().filter(|b| !partial.has(*b)).collect();
     let points = |blocks: &[usize]| -> u64 {
-        let lengths = blocks.iter().map(|&b| sweep.grid().block(b).len() as u64);
+        let lengths = blocks.iter().map(|&b| sweep.design().block(b).len() as u64);
         lengths.sum()
     };
     let (all, left) = (points(&blocks), points(&todo));
@@ -85,73 +90,84 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     }
     let mut summary = summarise(&archive, &mut partial)?;
     summary.insert("wall_s".into(), json!(wall));
-    archive.write(target, &mut partial)?;
+    target.write(&archive, &mut partial)?;
     partial.remove();
     report(&archive, &summary, &arguments.out, arguments.summary)
-}
-
-/// The sweep requested by the arguments.
-fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
-    let scene = load(&arguments.scene)?;
-    let usage = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
-    let axes = arguments.vary.iter().map(|text| ParameterRange::parse(&scene, text));
-    let axes = axes.collect::<Result<Vec<_>, _>>().map_err(|e| usage(&e))?;
-    let grid = Grid::new(&scene, axes, arguments.start).map_err(|e| usage(&e))?;
-    let plan = Plan {
-        periods: arguments.periods,
-        discard: arguments.discard,
-        phase: options::phase(&arguments.phase)?,
-        exponent: !arguments.no_exponent,
-    };
-    Sweep::new(scene, grid, plan).map_err(|e| usage(&e))
 }
 
 /// Provenance of the result: the same for the whole sweep and every shard of it.
 pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     let scene = sweep.scene();
-    let (grid, plan) = (sweep.grid(), sweep.plan());
+    let (design, protocol) = (sweep.design(), sweep.protocol());
     let mut meta = super::provenance::meta(scene);
     super::provenance::insert_texts(&mut meta, scene);
-    let axes = grid.axes().iter().map(|axis| {
-        json!({
-            "key": axis.key(),
-            "from": axis.value(0),
-            "to": axis.value(axis.count() - 1),
-            "count": axis.count(),
-        })
-    });
-    // A parameter that changes the period gives different periods at the ends of its range.
-    let [period, other] = [0, grid.points() - 1].map(|point| {
-        let scene = grid.scene(scene, point).ok()?;
-        drive_period(&scene).ok()
-    });
-    let period = period.filter(|_| period == other);
-    let mut words: Map<String, Json> =
-        Regime::ALL.iter().map(|regime| (regime.code().to_string(), json!(regime.word()))).collect();
-    words.insert("-1".to_owned(), json!("none"));
-    let own = json!({
-        "scene_crc32": format!("{:08x}", crc32fast::hash(scene.source.text.as_bytes())),
-        "vary": axes.collect::<Vec<_>>(),
-        "periods": plan.periods,
-        "discard": plan.discard,
-        "section": "phase",
-        "phase": plan.phase,
-        "period_s": period,
-        "start": grid.start().word(),
-        "follow_block": FOLLOW_BLOCK,
-        "exponent": plan.exponent,
-        "statuses": {
-            Status::Done.code().to_string(): "done",
-            Status::Diverged.code().to_string(): "diverged",
-            Status::NoStart.code().to_string(): "could not start",
-        },
-        "regimes": words,
-        "doubts": Doubt::KINDS.iter().enumerate().map(|(k, kind)| ((1_u32 << k).to_string(), json!(kind))).collect::<Map<_, _>>(),
-    });
-    if let Json::Object(own) = own {
-        meta.extend(own);
+    let mut add = |key: &str, value: Json| meta.insert(key.to_owned(), value);
+    add("scene_crc32", json!(format!("{:08x}", crc32fast::hash(scene.source.text.as_bytes()))));
+    add("vary", design.axes().iter().map(|axis| axis_meta(scene, axis)).collect());
+    add("arrangement", json!(if design.arrangement() == Arrangement::Zipped { ZIPPED } else { "crossed" }));
+    match &protocol.span {
+        Span::Sections { plan, .. } => {
+            // A parameter that changes the period gives different periods at the ends of its range.
+            let [period, other] = [0, design.points() - 1].map(|point| {
+                let scene = design.scene(scene, point).ok()?;
+                protocol.interval(&scene).ok()
+            });
+            add("periods", json!(plan.periods));
+            add("discard", json!(plan.discard));
+            add("section", json!("phase"));
+            add("phase", json!(plan.phase));
+            add("period_s", json!(period.filter(|_| period == other)));
+        }
+        Span::Duration { duration, from } => {
+            add("duration_s", json!(duration));
+            add("from_s", json!(from));
+        }
     }
+    let starts: Vec<&str> = design.starts().iter().map(|start| start.word()).collect();
+    add("start", if let [start] = starts[..] { json!(start) } else { json!(starts) });
+    add("follow_block", json!(FOLLOW_BLOCK));
+    if let Some(plan) = protocol.plan() {
+        add("exponent", json!(plan.exponent));
+    }
+    let statuses = json!({
+        Status::Done.code().to_string(): "done",
+        Status::Diverged.code().to_string(): "diverged",
+        Status::NoStart.code().to_string(): "could not start",
+    });
+    add("statuses", statuses);
+    if protocol.plan().is_some() {
+        let words = Regime::ALL.iter().map(|regime| (regime.code().to_string(), json!(regime.word())));
+        let none = ("-1".to_owned(), json!("none"));
+        add("regimes", Json::Object(words.chain([none]).collect()));
+    }
+    let doubts = Doubt::KINDS.iter().enumerate();
+    add("doubts", doubts.map(|(k, kind)| ((1_u32 << k).to_string(), json!(kind))).collect::<Map<_, _>>().into());
     meta
+}
+
+/// A varied parameter in `meta`. Listed values are in the arrays; a checksum of them tells sweeps apart.
+fn axis_meta(scene: &Scene, axis: &Axis) -> Json {
+    let mut own = Map::new();
+    let mut add = |key: &str, value: Json| own.insert(key.to_owned(), value);
+    add("key", json!(axis.key()));
+    if axis.is_listed() {
+        let mut checksum = crc32fast::Hasher::new();
+        for i in 0..axis.count() {
+            let value = scene.parameter(axis.key()).map(|parameter| parameter.write(&axis.value(i)));
+            checksum.update(format!("{}\n", value.unwrap_or_default()).as_bytes());
+        }
+        add("values_crc32", json!(format!("{:08x}", checksum.finalize())));
+    } else {
+        add("from", json!(axis.number(0)));
+        add("to", json!(axis.number(axis.count() - 1)));
+    }
+    add("count", json!(axis.count()));
+    add("spacing", json!(axis.spacing()));
+    if axis.words().is_some() {
+        add("words", json!(true));
+    }
+    add("unit", json!(unit_suffix(scene, axis)));
+    Json::Object(own)
 }
 
 /// Largest number of points examined for warnings, spread over the ranges, so that the check stays fast.
@@ -168,10 +184,10 @@ enum Kind {
 fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
     let mut kinds = HashSet::new();
-    let last = sweep.grid().points() - 1;
-    let step = sweep.grid().points().div_ceil(MOST_WARNED);
+    let last = sweep.design().points() - 1;
+    let step = sweep.design().points().div_ceil(MOST_WARNED);
     for point in (0..last).step_by(step).chain([last]) {
-        let Ok(scene) = sweep.grid().scene(sweep.scene(), point) else {
+        let Ok(scene) = sweep.design().scene(sweep.scene(), point) else {
             continue;
         };
         let of_scene = scene.machine.warnings().into_iter();
@@ -186,9 +202,9 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
             }
         }
     }
-    let plan = sweep.plan();
-    let kept = plan.periods.saturating_sub(plan.discard);
-    if kept < FEWEST {
+    let protocol = sweep.protocol();
+    let kept = protocol.kept();
+    if protocol.plan().is_some() && kept < FEWEST {
         all.push(format!(
             "{} of each point: with fewer than {FEWEST} no regime can be classified and all are reported as unclear; \
              raise --periods or lower --discard.",
@@ -197,7 +213,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     }
     let solver = &sweep.scene().machine.solver;
     let loose = solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
-    if loose && sweep.plan().exponent {
+    if loose && protocol.plan().is_some_and(|plan| plan.exponent) {
         all.push(format!(
             "solver.tolerance {:e}: at this tolerance the integration error is too large, so exponents and the \
              regimes classified from them are unreliable; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
@@ -241,16 +257,13 @@ fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, 
     summary.insert("points".into(), json!(statuses.len()));
     summary.insert("diverged".into(), json!(with(&statuses, Status::Diverged.code())));
     summary.insert("no_start".into(), json!(with(&statuses, Status::NoStart.code())));
-    let words = archive.meta().get("regimes").and_then(Json::as_object);
-    let counts: Map<String, Json> = words
-        .into_iter()
-        .flatten()
-        .filter_map(|(code, word)| {
+    if let Some(words) = archive.meta().get("regimes").and_then(Json::as_object) {
+        let count = |(code, word): (&String, &Json)| {
             let number = with(&regimes, code.parse().ok()?);
             (number > 0).then(|| (word.as_str().unwrap_or_default().to_owned(), json!(number)))
-        })
-        .collect();
-    summary.insert("regimes".into(), Json::Object(counts));
+        };
+        summary.insert("regimes".into(), Json::Object(words.iter().filter_map(count).collect()));
+    }
     let doubts = archive.values("doubts", source)?;
     let words = archive.meta().get("doubts").and_then(Json::as_object);
     let of_kind = words.into_iter().flatten().filter_map(|(bit, word)| {
@@ -285,13 +298,12 @@ fn report(
             text += &format!(", {} {what}", number(key));
         }
     }
-    let regimes = summary.get("regimes").and_then(Json::as_object);
-    let mut regimes: Vec<String> =
-        regimes.into_iter().flatten().map(|(word, number)| format!("{number} {word}")).collect();
-    if regimes.is_empty() {
-        // Happens in a shard of a sweep with fewer points than shards.
-        regimes.push("none".to_owned());
-    }
+    let regimes = summary.get("regimes").and_then(Json::as_object).map_or_else(String::new, |regimes| {
+        let regimes: Vec<String> = regimes.iter().map(|(word, number)| format!("{number} {word}")).collect();
+        // A shard of a sweep with fewer points than shards may have none.
+        let words = if regimes.is_empty() { "none".to_owned() } else { regimes.join(", ") };
+        format!("\nRegimes           {words}")
+    });
     let of_kind = summary.get("doubts").and_then(Json::as_object).into_iter().flatten();
     let of_kind: Vec<String> = of_kind.map(|(word, number)| format!("{number} {word}")).collect();
     let doubtful = match number("doubtful") {
@@ -301,8 +313,7 @@ fn report(
     let wall = summary.get("wall_s").and_then(Json::as_f64);
     let wall = wall.map_or_else(String::new, |wall| format!("\nWall time         {wall:.1} s"));
     text += &format!(
-        "\nRegimes           {}{doubtful}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
-        regimes.join(", "),
+        "{regimes}{doubtful}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
         count(number("points"), "point"),
         out.display(),
         crate::VERSION

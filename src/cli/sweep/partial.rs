@@ -60,11 +60,11 @@ impl Partial {
             // On a file system without locks, the user must avoid two runs with the same output.
             Err(TryLockError::Error(error)) => log::warn!("no lock: {error}"),
         }
-        let grid = sweep.grid();
-        let mut place = vec![usize::MAX; grid.points()];
+        let design = sweep.design();
+        let mut place = vec![usize::MAX; design.points()];
         let mut next = 0;
         for &b in blocks {
-            for point in grid.block(b) {
+            for point in design.block(b) {
                 place[point] = next;
                 next += 1;
             }
@@ -73,8 +73,8 @@ impl Partial {
             file,
             start: 0,
             end: 0,
-            points: (0..grid.blocks()).map(|b| grid.block(b)).collect(),
-            done: vec![false; grid.blocks()],
+            points: (0..design.blocks()).map(|b| design.block(b)).collect(),
+            done: vec![false; design.blocks()],
             record: sweep.layout().record_length(),
             place,
             path,
@@ -328,7 +328,8 @@ fn read_u32(reader: &mut impl Read) -> std::io::Result<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::grid::{Grid, ParameterRange, Start};
+    use crate::analysis::axis::Axis;
+    use crate::analysis::design::{Design, Start};
     use crate::analysis::point::Plan;
     use crate::scene::Scene;
 
@@ -338,10 +339,10 @@ mod tests {
         let out = folder.path().join("a.npz");
         let path = Partial::path_of(&out);
         let scene = Scene::load("spcmm", &[]).unwrap();
-        let axis = ParameterRange::parse(&scene, "contact.clearance=0.2mm..0.3mm:3").unwrap();
-        let grid = Grid::new(&scene, vec![axis], Start::Cold).unwrap();
+        let axis = Axis::parse(&scene, "contact.clearance=0.2mm..0.3mm:3").unwrap();
+        let design = Design::crossed(&scene, vec![axis], &[Start::Cold]).unwrap();
         let plan = Plan { periods: 1, discard: 0, phase: 0.0, exponent: false };
-        let sweep = Sweep::new(scene, grid, plan).unwrap();
+        let sweep = Sweep::new(scene, design, plan).unwrap();
         let mut settings = Map::new();
         settings.insert("periods".into(), 1.into());
         let open = || Partial::open(&out, &settings, &sweep, &[0, 1, 2]);

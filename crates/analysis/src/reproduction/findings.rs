@@ -20,7 +20,7 @@ impl Report {
 
     /// Total simulated time of all runs, without twins, s.
     pub fn simulated(&self) -> f64 {
-        let of_sweep = |data: &SweepData| data.sweep.plan().periods * data.sweep.grid().points();
+        let of_sweep = |data: &SweepData| data.plan.periods * data.sweep.design().points();
         let of_run = |run: &RecordedRun| if run.settled.is_some() { 1 + self.extent.settle + 2 } else { 1 };
         let of_model = |found: &Findings| {
             found.runs.iter().map(of_run).sum::<usize>() + found.sweeps.iter().map(of_sweep).sum::<usize>()

@@ -1,6 +1,7 @@
 //! Records of the runs, settled curves and sweeps of a report.
 
 use crate::paper::{Case, Coordinate, Variant};
+use crate::point::Plan;
 use crate::regime::Regime;
 use crate::response::{Observation, Response};
 use crate::sweep::Sweep;
@@ -191,6 +192,8 @@ pub struct SweepData {
     pub variant: &'static Variant,
     /// Name used in file names.
     pub name: &'static str,
+    /// Periods of each point.
+    pub plan: Plan,
     /// The sweep.
     pub sweep: Sweep,
     /// One record per point, concatenated; empty until its blocks are added.
@@ -218,7 +221,7 @@ impl SweepData {
 
     /// Reads [`Self::points`] from the records.
     pub(super) fn read_points(&mut self) {
-        let [axis] = self.sweep.grid().axes() else {
+        let [axis] = self.sweep.design().axes() else {
             return;
         };
         // Clearances in mm.
@@ -230,7 +233,7 @@ impl SweepData {
         let errors = column("exponent_standard_error_per_s");
         let (x, beta) = (column("section_x_m"), column("section_beta_rad"));
         let part = |all: &[f64], k: usize| all[k * kept..(k + 1) * kept].to_vec();
-        let points = axis.values().enumerate().map(|(k, value)| SettledPoint {
+        let points = axis.numbers().enumerate().map(|(k, value)| SettledPoint {
             value: value * factor,
             regime: Regime::of_code(regimes[k] as i64, periods[k] as usize),
             exponent: (exponents[k], errors[k]),

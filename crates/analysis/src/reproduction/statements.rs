@@ -341,7 +341,7 @@ mod tests {
             }
             ReportJob::Block(s, b) => {
                 let sweep = &work.sweeps()[s].sweep;
-                let values = sweep.grid().block(b).len() * sweep.layout().record_length();
+                let values = sweep.design().block(b).len() * sweep.layout().record_length();
                 Outcome::Block(vec![0.0; values])
             }
         };

@@ -3,7 +3,7 @@
 mod choice;
 mod table;
 
-pub use choice::{Listed, NoChannel, channels_of, chosen_columns};
+pub use choice::{Listed, NoChannel, channels_of, chosen_columns, matching};
 use table::TIME;
 pub use table::{PLOT_WORDS, PlotKind, Quantity};
 
@@ -249,7 +249,7 @@ fn has(machine: &Machine, first: Option<&Frame>, signal: &Signal, part: usize, f
         Take::Given(..) | Take::Taken(..) => {
             known(machine.solver.energy_ledger) && (!signal.of_elements || !machine.elements.is_empty())
         }
-        Take::ProbeError => known(machine.output.probe.is_some()),
+        Take::ProbeError | Take::ProbeDistance => known(machine.output.probe.is_some()),
         Take::Element(_) => known(true),
         Take::ElementValue(_) => machine.elements[part].is_between_points(),
         _ => true,

@@ -36,6 +36,17 @@ impl Listed {
         }
     }
 
+    /// Where a frame has its value.
+    pub fn reading(&self) -> Reading {
+        self.reading
+    }
+
+    /// Column name of its `statistic`, with the unit last: `S1_normal_max_N`.
+    pub fn column_of(&self, statistic: &str) -> String {
+        let unit = UNITS.iter().find(|(end, _)| self.column.ends_with(end)).map_or("", |(end, _)| end);
+        format!("{}_{statistic}{unit}", &self.column[..self.column.len() - unit.len()])
+    }
+
     /// Whether `pattern` matches its name, a prefix of the name that ends before a dot, or its column.
     pub fn is_chosen_by(&self, pattern: &str) -> bool {
         self.names().any(|name| matches(pattern, name)) || matches(pattern, &self.column)
@@ -56,6 +67,19 @@ pub struct NoChannel {
     pub pattern: String,
     /// The nearest name, in brackets; or empty.
     near: String,
+}
+
+/// The channels of `list` that match `pattern`.
+///
+/// # Errors
+/// A pattern without a match.
+pub fn matching<'a>(list: &'a [Listed], pattern: &str) -> Result<Vec<&'a Listed>, NoChannel> {
+    let chosen: Vec<&Listed> = list.iter().filter(|channel| channel.is_chosen_by(pattern)).collect();
+    if chosen.is_empty() {
+        let near = nearest(pattern, list.iter().flat_map(Listed::names));
+        return Err(NoChannel { pattern: pattern.to_owned(), near });
+    }
+    Ok(chosen)
 }
 
 /// Every channel of `machine` in order: the columns that `run` writes by default, then the others. `first` as in
@@ -99,12 +123,7 @@ pub fn chosen_columns(
 ) -> Result<(Vec<String>, Vec<Reading>), NoChannel> {
     let list = channels_of(machine, first);
     for pattern in patterns {
-        if !list.iter().any(|channel| channel.is_chosen_by(pattern)) {
-            return Err(NoChannel {
-                near: nearest(pattern, list.iter().flat_map(Listed::names)),
-                pattern: pattern.clone(),
-            });
-        }
+        matching(&list, pattern)?;
     }
     let chosen = |channel: &&Listed| channel.name == TIME || patterns.iter().any(|p| channel.is_chosen_by(p));
     Ok(list.iter().filter(chosen).map(|channel| (channel.column.clone(), channel.reading)).unzip())

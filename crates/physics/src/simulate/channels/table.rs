@@ -4,8 +4,8 @@
 use Quantity as Q;
 use Take::{
     Angles, Axes, BodyAxes, ChildTurn, Closing, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
-    JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn, Slide, SlideCoordinate, Taken, Turn, TurnRate,
-    Whole,
+    JointAxes, OtherAngles, OtherAxes, ProbeDistance, ProbeError, Reaction, SecondTurn, Slide, SlideCoordinate, Taken,
+    Turn, TurnRate, Whole,
 };
 
 use crate::machine::Vec3;
@@ -289,6 +289,8 @@ pub(super) enum Take {
     Taken(&'static str, fn(&Ledger) -> f64),
     /// Error of the probe tip: x, y, z.
     ProbeError,
+    /// Its size.
+    ProbeDistance,
     /// Vector of each force element that reports it: x, y, z.
     Element(fn(&ElementReport) -> Option<Vec3>),
     /// Value of each force element between two points.
@@ -332,7 +334,7 @@ impl Take {
             BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
             SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => Each::Coordinate,
             Reaction(_) => Each::Holding,
-            Whole(..) | Given(..) | Taken(..) | ProbeError => Each::Once,
+            Whole(..) | Given(..) | Taken(..) | ProbeError | ProbeDistance => Each::Once,
         }
     }
 
@@ -378,6 +380,7 @@ impl Take {
             Slide | Hinge | Turn | ChildTurn => frame.actuators.get(part).copied(),
             Given(_, of) | Taken(_, of) => frame.ledger.as_ref().map(of),
             ProbeError => frame.probe_error.map(|error| error[component]),
+            ProbeDistance => frame.probe_error.map(|error| error.norm()),
             Element(of) => frame.elements.get(part).and_then(of).map(|v| v[component]),
             ElementValue(of) => frame.elements.get(part).map(of),
         }
@@ -509,6 +512,8 @@ pub(super) const TABLE: &[Signal] = &[
     asked("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
 
     asked("@.length", "@_length_m", ElementValue(|element| (element.points[1] - element.points[0]).norm()), "distance of the element's points"),
+
+    asked("tip_error", "probe_error_m", ProbeDistance, "distance of the probe tip from where the ideal mechanism has it"),
 ];
 
 /// Channel name of the time, the first column of every row.

@@ -1,0 +1,327 @@
+//! Statistics of channels over the kept part of a run: `S1.normal:max`, `*.force:mean`.
+
+use jointplay_physics::machine::Machine;
+use jointplay_physics::simulate::{Frame, Listed, NoChannel, Reading, Simulation, StartError, channels_of, matching};
+use jointplay_physics::suggest::nearest;
+use jointplay_physics::words::{Words, words};
+use jointplay_scene::Scene;
+
+/// A number that summarises the values of a channel over time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Statistic {
+    /// Largest value.
+    Max,
+    /// Smallest value.
+    Min,
+    /// Time average.
+    Mean,
+    /// Root of the time average of the square.
+    Rms,
+    /// Standard deviation in time.
+    Std,
+    /// Largest less smallest value.
+    Range,
+    /// Last value.
+    End,
+}
+
+words!(Statistic {
+    Max => "max",
+    Min => "min",
+    Mean => "mean",
+    Rms => "rms",
+    Std => "std",
+    Range => "range",
+    End => "end",
+});
+
+/// Why a list of channels with statistics is invalid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StatisticError {
+    /// Malformed.
+    #[error("{text}: expected CHANNEL:STATISTIC, e.g. S1.normal:max; statistics: {}", Statistic::WORDS.join(", "))]
+    Form {
+        /// As written.
+        text: String,
+    },
+    /// An unknown statistic.
+    #[error("{text}: `{word}` is no statistic{near}; allowed: {}", Statistic::WORDS.join(", "))]
+    Unknown {
+        /// As written.
+        text: String,
+        /// The unknown word.
+        word: String,
+        /// The nearest word, in brackets; or empty.
+        near: String,
+    },
+    /// An unknown channel.
+    #[error("{text}: {error}")]
+    Channel {
+        /// As written.
+        text: String,
+        /// What is wrong.
+        error: NoChannel,
+    },
+    /// The scene whose channels are needed does not start.
+    #[error("the scene does not start, so its channels are unknown: {0}")]
+    Start(#[from] StartError),
+}
+
+/// A statistic of one channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChannelStatistic {
+    channel: String,
+    statistic: Statistic,
+    column: String,
+}
+
+impl ChannelStatistic {
+    /// Parses `CHANNEL:STATISTIC,…` for `scene`. A channel may be a pattern, as in `run --channels`, and stands for all
+    /// channels that match it. Repetitions count once.
+    ///
+    /// # Errors
+    /// A malformed entry, an unknown channel or statistic; a scene that does not start.
+    pub fn parse_list(scene: &Scene, text: &str) -> Result<Vec<Self>, StatisticError> {
+        let list = channels(&scene.machine, &mut Simulation::new(&scene.machine)?);
+        let mut found: Vec<Self> = Vec::new();
+        for entry in text.split(',').map(str::trim) {
+            let own = || entry.to_owned();
+            let (pattern, word) = entry.rsplit_once(':').ok_or_else(|| StatisticError::Form { text: own() })?;
+            let (pattern, word) = (pattern.trim(), word.trim());
+            let statistic = Statistic::of_word(word).ok_or_else(|| {
+                let near = nearest(word, Statistic::WORDS.iter().copied());
+                StatisticError::Unknown { text: own(), word: word.to_owned(), near }
+            })?;
+            let chosen = matching(&list, pattern);
+            for channel in chosen.map_err(|error| StatisticError::Channel { text: own(), error })? {
+                let next =
+                    Self { channel: channel.name.clone(), statistic, column: channel.column_of(statistic.word()) };
+                if !found.contains(&next) {
+                    found.push(next);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// Name of its column in a file, with the SI unit: `S1_normal_max_N`.
+    pub fn column(&self) -> &str {
+        &self.column
+    }
+
+    /// Index of the ball joint whose largest normal force in continuous time it is, if it is one.
+    fn peak_of(&self, machine: &Machine) -> Option<usize> {
+        let name = self.channel.strip_suffix(".normal").filter(|_| self.statistic == Statistic::Max)?;
+        machine.ball_joints.iter().position(|joint| joint.name == name)
+    }
+}
+
+/// All channels of a simulation at its start.
+fn channels(machine: &Machine, simulation: &mut Simulation) -> Vec<Listed> {
+    let mut first = Frame { reactions: Some(Vec::new()), ..Frame::default() };
+    simulation.sample(simulation.time(), &mut first);
+    channels_of(machine, &first)
+}
+
+/// Values of one channel seen so far.
+#[derive(Clone, Debug)]
+struct Tally {
+    reading: Option<Reading>,
+    /// The first value: deviations from it keep their digits in a small spread about a large mean.
+    first: f64,
+    latest: f64,
+    least: f64,
+    largest: f64,
+    /// Time integrals of the deviation from the first value and of its square, by the trapezoidal rule.
+    deviation: f64,
+    square: f64,
+}
+
+impl Tally {
+    fn begin(&mut self, value: f64) {
+        let reading = self.reading;
+        *self =
+            Self { reading, first: value, latest: value, least: value, largest: value, deviation: 0.0, square: 0.0 };
+    }
+
+    fn add(&mut self, value: f64, h: f64) {
+        let (before, now) = (self.latest - self.first, value - self.first);
+        self.deviation += 0.5 * h * (before + now);
+        self.square += 0.5 * h * (before * before + now * now);
+        self.latest = value;
+        // A value that is unknown once makes the statistics unknown.
+        self.least = if value < self.least || value.is_nan() { value } else { self.least };
+        self.largest = if value > self.largest || value.is_nan() { value } else { self.largest };
+    }
+
+    fn value(&self, statistic: Statistic, span: f64) -> f64 {
+        let (mean, square) = if span > 0.0 { (self.deviation / span, self.square / span) } else { (0.0, 0.0) };
+        let variance = square - mean * mean;
+        // Rounding can make it negative; NaN stays.
+        let variance = if variance < 0.0 { 0.0 } else { variance };
+        match statistic {
+            Statistic::Max => self.largest,
+            Statistic::Min => self.least,
+            Statistic::Mean => self.first + mean,
+            Statistic::Rms => ((self.first + mean) * (self.first + mean) + variance).sqrt(),
+            Statistic::Std => variance.sqrt(),
+            Statistic::Range => self.largest - self.least,
+            Statistic::End => self.latest,
+        }
+    }
+}
+
+/// Statistics being accumulated: one tally for each requested [`ChannelStatistic`].
+#[derive(Debug)]
+pub(super) struct Accumulator {
+    wanted: Vec<ChannelStatistic>,
+    tallies: Vec<Tally>,
+    frame: Frame,
+    /// Largest time between two samples, s.
+    interval: f64,
+    latest: f64,
+    span: f64,
+}
+
+impl Accumulator {
+    /// An accumulator of `wanted`, with samples at every end of a step and at most `interval`, s, apart. Channels that the
+    /// simulation does not have stay unknown.
+    pub(super) fn new(wanted: &[ChannelStatistic], simulation: &mut Simulation, interval: f64) -> Self {
+        let machine = simulation.machine().clone();
+        let list = if wanted.is_empty() { Vec::new() } else { channels(&machine, simulation) };
+        let unknown = f64::NAN;
+        let tally = |of: &ChannelStatistic| Tally {
+            reading: list.iter().find(|channel| channel.name == of.channel).map(Listed::reading),
+            first: unknown,
+            latest: unknown,
+            least: unknown,
+            largest: unknown,
+            deviation: unknown,
+            square: unknown,
+        };
+        let tallies: Vec<Tally> = wanted.iter().map(tally).collect();
+        let mut frame = Frame::default();
+        tallies.iter().filter_map(|tally| tally.reading).for_each(|reading| reading.ask(&mut frame));
+        Self { wanted: wanted.to_vec(), tallies, frame, interval, latest: simulation.time(), span: 0.0 }
+    }
+
+    /// Starts over at the latest state.
+    pub(super) fn begin(&mut self, simulation: &mut Simulation) {
+        if self.tallies.is_empty() {
+            return;
+        }
+        (self.latest, self.span) = (simulation.time(), 0.0);
+        simulation.sample(self.latest, &mut self.frame);
+        for tally in &mut self.tallies {
+            let value = tally.reading.and_then(|reading| reading.read(&self.frame));
+            tally.begin(value.unwrap_or(f64::NAN));
+        }
+    }
+
+    /// Adds the latest step.
+    pub(super) fn look(&mut self, simulation: &mut Simulation) {
+        if self.tallies.is_empty() {
+            return;
+        }
+        let (start, end) = (self.latest, simulation.time());
+        let samples = ((end - start) / self.interval).ceil().max(1.0) as u64;
+        for k in 1..=samples {
+            let time = if k == samples { end } else { start + (end - start) * k as f64 / samples as f64 };
+            let h = time - self.latest;
+            simulation.sample(time, &mut self.frame);
+            for tally in &mut self.tallies {
+                let value = tally.reading.and_then(|reading| reading.read(&self.frame));
+                tally.add(value.unwrap_or(f64::NAN), h);
+            }
+            self.span += h;
+            self.latest = time;
+        }
+    }
+
+    /// The statistics, in the requested order. `peaks` are the largest normal forces of the ball joints of `machine` in
+    /// continuous time over the same span, N.
+    pub(super) fn values(&self, machine: &Machine, peaks: impl Fn(usize) -> f64) -> Vec<f64> {
+        let value = |(of, tally): (&ChannelStatistic, &Tally)| match of.peak_of(machine) {
+            Some(joint) => peaks(joint),
+            None => tally.value(of.statistic, self.span),
+        };
+        self.wanted.iter().zip(&self.tallies).map(value).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> Scene {
+        Scene::load("slider-crank-driven", &[]).expect("built in")
+    }
+
+    #[test]
+    fn patterns_choose_channels_and_columns_have_the_unit_last() {
+        let columns = |text: &str| {
+            let found = ChannelStatistic::parse_list(&scene(), text).expect(text);
+            found.iter().map(|of| of.column().to_owned()).collect::<Vec<_>>().join(" ")
+        };
+        for (text, found) in [
+            ("B.normal:max, B.normal:rms", "B_normal_max_N B_normal_rms_N"),
+            ("*.force:mean", "B_force_x_mean_N B_force_y_mean_N B_force_z_mean_N"),
+            ("crank.angle:end,crank.rate:std", "crank_angle_end_rad crank_rate_std_rad_s"),
+            ("B.state:mean", "B_state_mean"),
+            ("crank.*ng*:max,crank.angle:max", "crank_angle_max_rad"),
+        ] {
+            let found: Vec<&str> = found.split(' ').collect();
+            let own = columns(text);
+            assert!(found.iter().all(|column| own.split(' ').any(|own| own == *column)), "{text}: {own}");
+        }
+        let twice = columns("B.normal:max,B.normal:max");
+        assert_eq!(twice, "B_normal_max_N");
+        for (text, fragment) in [
+            ("B.normal", "expected CHANNEL:STATISTIC"),
+            ("", "expected CHANNEL:STATISTIC"),
+            ("B.normal:maks", "`maks` is no statistic (did you mean `max`?)"),
+            ("B.nromal:max", "did you mean `B.normal`?"),
+        ] {
+            let error = ChannelStatistic::parse_list(&scene(), text).expect_err(text).to_string();
+            assert!(error.contains(fragment), "{text}: {error}");
+        }
+    }
+
+    /// A sine about a large mean, sampled at unequal intervals.
+    #[test]
+    fn statistics_of_a_sine_are_the_known_ones() {
+        let unknown = f64::NAN;
+        let mut tally = Tally {
+            reading: None,
+            first: unknown,
+            latest: unknown,
+            least: unknown,
+            largest: unknown,
+            deviation: unknown,
+            square: unknown,
+        };
+        let (mean, amplitude, samples) = (1e6, 2.0, 4000);
+        // Two periods; the intervals alternate between one and three parts of four.
+        let time = |k: usize| (k as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / samples as f64;
+        let value = |t: f64| mean + amplitude * (2.0 * std::f64::consts::TAU * t).sin();
+        tally.begin(value(0.0));
+        (1..=samples).for_each(|k| tally.add(value(time(k)), time(k) - time(k - 1)));
+        for (statistic, expected) in [
+            (Statistic::Max, mean + amplitude),
+            (Statistic::Min, mean - amplitude),
+            (Statistic::Mean, mean),
+            (Statistic::Rms, (mean * mean + amplitude * amplitude / 2.0).sqrt()),
+            (Statistic::Std, amplitude / 2.0_f64.sqrt()),
+            (Statistic::Range, 2.0 * amplitude),
+            (Statistic::End, mean),
+        ] {
+            // The trapezoidal rule errs by (2 pi h)^2 / 12 of the amplitude, h the longest interval in periods: 1e-6.
+            let error = tally.value(statistic, 1.0) - expected;
+            assert!(error.abs() < 1e-5, "{statistic}: {error}");
+        }
+        tally.add(f64::NAN, 1e-3);
+        tally.add(mean, 1e-3);
+        // All but the last value.
+        assert!(Statistic::ALL[..6].iter().all(|statistic| tally.value(*statistic, 1.0).is_nan()));
+    }
+}
