@@ -185,14 +185,14 @@ pub struct SweepArguments {
     /// Drive periods per point, including those discarded.
     #[arg(long, value_name = "P", value_parser = periods, required_unless_present = "duration", requires = "discard")]
     pub periods: Option<usize>,
-    /// Initial periods to discard as the transient.
-    #[arg(long, value_name = "D", value_parser = periods, requires = "periods")]
+    /// Initial periods or crossings to discard as the transient.
+    #[arg(long, value_name = "D", value_parser = periods)]
     pub discard: Option<usize>,
     /// Time between two sections, where the drives have no common period or none at all [default: the common period].
     #[arg(long, value_name = "TIME", requires = "periods")]
     pub period: Option<String>,
     /// Length of each point's run, e.g. `2s`, in place of periods: any scene, without sections, regimes and exponents.
-    #[arg(long, value_name = "TIME", conflicts_with_all = ["periods", "discard", "section", "phase"])]
+    #[arg(long, value_name = "TIME", conflicts_with_all = ["periods", "phase"])]
     pub duration: Option<String>,
     /// End of the transient of `--duration`: statistics begin there [default: 0].
     #[arg(long, value_name = "TIME", requires = "duration")]
@@ -201,9 +201,13 @@ pub struct SweepArguments {
     /// statistics: max, min, mean, rms, std, range, end [default: the forces and impacts of the ball joints, and the tip error].
     #[arg(long, value_name = "LIST")]
     pub keep: Option<String>,
-    /// Where the sections are taken.
-    #[arg(long, value_enum, value_name = "WHERE", default_value = "phase")]
-    pub section: SectionChoice,
+    /// Where the sections are taken: at one phase of the drive, or where a channel crosses a value, as in
+    /// `crank.angle=90deg:up` or `slider.position=0:down`; then with --crossings, --discard and --duration.
+    #[arg(long, value_name = "phase|CHANNEL=VALUE[:up|:down]", default_value = "phase")]
+    pub section: String,
+    /// Crossings of --section per point, including those discarded; --duration ends the search for them.
+    #[arg(long, value_name = "N", value_parser = periods, requires_all = ["section", "discard", "duration"])]
+    pub crossings: Option<usize>,
     /// Drive phase of the sections: a fraction of the period, or an angle such as `90deg`.
     #[arg(long, value_name = "PHASE", default_value = "0", allow_hyphen_values = true)]
     pub phase: String,
@@ -248,13 +252,6 @@ pub struct MergeArguments {
     /// Replace an existing file.
     #[arg(long)]
     pub force: bool,
-}
-
-/// Where the sections of a sweep are taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SectionChoice {
-    /// At one phase of the drive.
-    Phase,
 }
 
 /// Form of the summary.

@@ -364,6 +364,15 @@ fn bad_input_is_refused_before_anything_runs() {
         (format!("{SMALL} --phase 2 --out a.npz"), 2, "--phase 2"),
         (format!("{SMALL} --threads 0 --out a.npz"), 2, "--threads"),
         (format!("{SMALL} --section zero --out a.npz"), 2, "phase"),
+        (format!("{SMALL} --section S1.normal=1N --out a.npz"), 2, "--crossings N"),
+        (format!("{PENDULUM} --section S1.normal=1N --out a.npz"), 2, "--crossings N"),
+        (format!("{PENDULUM} --section S1.normal=1 --crossings 2 --discard 1 --out a.npz"), 2, "needs a unit"),
+        (
+            format!("{PENDULUM} --section S1.normal=1N --crossings 2 --discard 2 --out a.npz"),
+            2,
+            "less than --crossings",
+        ),
+        (format!("{PENDULUM} --discard 2 --out a.npz"), 2, "--from ends the transient"),
     ] {
         let outcome = jointplay(folder.path(), &line).expect(code);
         assert!(outcome.stderr.contains(fragment), "{line}: {}", outcome.stderr);
@@ -496,6 +505,41 @@ fn points_of_a_file_zipped_and_crossed_are_the_same_points() {
     let refused =
         jointplay(folder.path(), "sweep pendulum --points points.csv --duration 1ms --out points.csv --force");
     assert!(refused.expect(2).stderr.contains("the same file"), "the points are not overwritten");
+}
+
+#[test]
+fn sections_at_crossings_lie_at_the_value_and_repeat_with_the_drive() {
+    let folder = folder();
+    let line = "sweep slider-crank-driven --vary contact.clearance=0.1mm..0.2mm:2 --section crank.angle=90deg:up --crossings 4 \
+                --discard 2 --duration 10s --keep crank.angle:end --out a.npz";
+    jointplay(folder.path(), line).expect(0);
+    let (arrays, meta) = archive(&folder.path().join("a.npz"));
+    assert_eq!(meta["section"], "crank.angle=90deg:up");
+    let scene = Scene::load("slider-crank-driven", &[]).unwrap();
+    let period = jointplay::analysis::drive::drive_period(&scene).unwrap();
+    assert_eq!(arrays["section_time_s"].shape(), [2, 2]);
+    for point in 0..2 {
+        let time = |k: usize| arrays["section_time_s"][[point, k]];
+        assert_eq!(arrays["crossings"][[point]], 4.0);
+        // The drive turns the crank at a constant rate.
+        assert!((time(1) - time(0) - period).abs() < 1e-9 * period, "{} {period}", time(1) - time(0));
+        let run = jointplay(
+            folder.path(),
+            &format!(
+                "run slider-crank-driven --set contact.clearance={}mm --duration {}s --every {}s --channels crank.angle,x_m \
+                 --out run.json --force --quiet",
+                [0.1, 0.2][point],
+                time(1),
+                time(1)
+            ),
+        );
+        run.expect(0);
+        let rows: Json = serde_json::from_slice(&fs::read(folder.path().join("run.json")).unwrap()).unwrap();
+        let last = |name: &str| rows["columns"][name][1].as_f64().unwrap();
+        let turns = (last("crank_angle_rad") - std::f64::consts::FRAC_PI_2) / std::f64::consts::TAU;
+        assert!((turns - turns.round()).abs() < 1e-9, "{turns}");
+        assert!((last("x_m") - arrays["section_x_m"][[point, 1]]).abs() < 1e-6);
+    }
 }
 
 #[test]

@@ -250,7 +250,8 @@ impl Design {
     }
 
     /// Points to be tried before anything runs. Of crossed axes: every value of each with the others at their ends, and a
-    /// lattice inside, which covers every point of a small map. Of zipped ones: all, or some spread over the rows.
+    /// lattice inside, which covers every point of a small map; of more than two axes at most [`MOST_TRIED`] of these. Of zipped
+    /// ones: all, or as many spread over the rows.
     pub(super) fn tried(&self) -> Vec<usize> {
         let sets = self.sets();
         if self.arrangement == Arrangement::Zipped {
@@ -265,7 +266,10 @@ impl Design {
             let ends = along().filter(|&of| is_end(of)).count();
             ends + 1 >= indices.len() || along().all(|(axis, i)| i % axis.count().div_ceil(most_within) == 0)
         };
-        (0..sets).filter(tried).collect()
+        let all: Vec<usize> = (0..sets).filter(tried).collect();
+        // The border of more than two ranges grows with a power of two.
+        let stride = if self.axes.len() > 2 { all.len().div_ceil(MOST_TRIED) } else { 1 };
+        all.into_iter().step_by(stride).collect()
     }
 
     /// Number of blocks. A block is computed in one piece, independently of threads and shards.

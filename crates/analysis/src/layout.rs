@@ -47,7 +47,9 @@ pub struct Layout {
     probe: bool,
     /// Number of statistics of channels.
     statistics: usize,
+    /// Whether there are sections at all, and whether they are at crossings of a channel.
     has_sections: bool,
+    of_crossings: bool,
     kept: usize,
 }
 
@@ -104,7 +106,8 @@ impl Layout {
         let mut add = |name: &str, whole: bool, per_section: bool| {
             columns.push(Column { name: name.to_owned(), whole, per_section });
         };
-        let has_sections = protocol.plan().is_some();
+        let has_sections = protocol.sections().is_some();
+        let of_crossings = has_sections && protocol.plan().is_none();
         for (name, whole, _) in of_point(has_sections) {
             add(name, *whole, false);
         }
@@ -122,13 +125,26 @@ impl Layout {
             add("probe_error_rms_um", false, false);
         }
         protocol.keep.iter().for_each(|of| add(of.column(), false, false));
-        if has_sections {
+        if of_crossings {
+            add("crossings", true, false);
+            add("section_time_s", false, true);
+        } else if has_sections {
             add("exponent_running_per_s", false, true);
+        }
+        if has_sections {
             for observable in OBSERVABLES {
                 add(&format!("section_{observable}"), false, true);
             }
         }
-        Self { columns, joints, probe, statistics: protocol.keep.len(), has_sections, kept: protocol.kept() }
+        Self {
+            columns,
+            joints,
+            probe,
+            statistics: protocol.keep.len(),
+            has_sections,
+            of_crossings,
+            kept: protocol.kept(),
+        }
     }
 
     /// Arrays in order.
@@ -180,10 +196,18 @@ impl Layout {
             record.extend([largest * 1e6, rms * 1e6]);
         }
         record.extend((0..self.statistics).map(|i| result.statistics.get(i).copied().unwrap_or(f64::NAN)));
+        if self.of_crossings {
+            record.push(result.crossings as f64);
+        }
+        let mut per_section = |values: &[f64]| {
+            record.extend((0..self.kept).map(|k| values.get(k).copied().unwrap_or(f64::NAN)));
+        };
+        if self.of_crossings {
+            per_section(&result.times);
+        } else if self.has_sections {
+            per_section(result.evidence.exponent.as_ref().map_or(&[][..], |e| &e.running));
+        }
         if self.has_sections {
-            let exponent = result.evidence.exponent.as_ref();
-            let running = exponent.map_or(&[][..], |e| &e.running);
-            record.extend((0..self.kept).map(|k| running.get(k).copied().unwrap_or(f64::NAN)));
             let width = OBSERVABLES.len();
             for i in 0..width {
                 let value = |k: usize| result.sections.get(k * width + i).copied();

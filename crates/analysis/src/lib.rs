@@ -1,7 +1,7 @@
 //! Results computed from whole runs. The crate starts no threads, and the caller supplies its clock ([`RunContext`]).
 //!
-//! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`] and [`statistic`] record the results;
-//!   [`sweep_task`] and [`task`] are the same as plain data for a thread or a worker.
+//! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record the
+//!   results; [`sweep_task`] and [`task`] are the same as plain data for a thread or a worker.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
@@ -41,6 +41,7 @@ pub mod axis;
 pub mod beginning;
 mod cost;
 pub mod distribution;
+pub mod crossing;
 pub mod design;
 pub mod drive;
 pub mod exponent;

@@ -1,5 +1,6 @@
 //! One point of a sweep: the run of a scene through its periods, and the recorded results.
 
+use super::crossing::{Crossing, CrossingRun};
 use super::drive::{NoPeriod, OBSERVABLES, ObservedError, ObservedRun, drive_period};
 use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
@@ -40,7 +41,7 @@ pub struct Plan {
 }
 
 /// Length of the run of each point, and its observed part.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Span {
     /// Periods with a section in each.
     Sections {
@@ -55,6 +56,17 @@ pub enum Span {
         duration: f64,
         /// End of the transient, s, 0 <= from < duration.
         from: f64,
+    },
+    /// A number of crossings of a channel, with a section at each.
+    Crossings {
+        /// The channel and its value.
+        crossing: Crossing,
+        /// Number of crossings, including those discarded.
+        count: usize,
+        /// Initial crossings that are a transient.
+        discard: usize,
+        /// Longest time for them, s, from the point's start.
+        duration: f64,
     },
 }
 
@@ -72,13 +84,22 @@ impl Protocol {
     pub fn plan(&self) -> Option<&Plan> {
         match &self.span {
             Span::Sections { plan, .. } => Some(plan),
+            Span::Duration { .. } | Span::Crossings { .. } => None,
+        }
+    }
+
+    /// Number of sections per point, and how many of them are discarded; `None` for a duration without sections.
+    pub fn sections(&self) -> Option<(usize, usize)> {
+        match &self.span {
+            Span::Sections { plan, .. } => Some((plan.periods, plan.discard)),
+            Span::Crossings { count, discard, .. } => Some((*count, *discard)),
             Span::Duration { .. } => None,
         }
     }
 
     /// Number of sections recorded per point.
     pub fn kept(&self) -> usize {
-        self.plan().map_or(0, |plan| plan.periods.saturating_sub(plan.discard))
+        self.sections().map_or(0, |(all, discard)| all.saturating_sub(discard))
     }
 
     /// Time between two sections of `scene`, or the observed time, s.
@@ -89,13 +110,16 @@ impl Protocol {
         match self.span {
             Span::Sections { interval, .. } => interval.map_or_else(|| drive_period(scene), Ok),
             Span::Duration { duration, from } => Ok(duration - from),
+            Span::Crossings { duration, .. } => Ok(duration),
         }
     }
 
-    /// Times of the sections of a run that starts cold at t = 0 or, with `follows`, continues a run at the time given there, s.
+    /// The run of a simulation that starts cold at t = 0 or, if it `follows` another point, continues that.
     /// A duration is a transient that ends at a first, discarded section, and one interval to a second.
-    fn schedule(&self, interval: f64, follows: Option<f64>) -> Schedule {
-        match self.span {
+    fn watch(&self, machine: ObservedRun, interval: f64, separation: Option<f64>, follows: bool) -> Watch {
+        let now = machine.time();
+        let follows = follows.then_some(now);
+        let schedule = match &self.span {
             Span::Sections { plan, .. } => {
                 // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
                 let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
@@ -103,11 +127,15 @@ impl Protocol {
                 Schedule { first, interval, sections: plan.periods, discard: plan.discard }
             }
             Span::Duration { duration, from } => {
-                let discard = usize::from(from > 0.0);
-                let first = follows.unwrap_or(0.0) + if from > 0.0 { from } else { duration };
+                let discard = usize::from(*from > 0.0);
+                let first = now + if *from > 0.0 { *from } else { *duration };
                 Schedule { first, interval, sections: 1 + discard, discard }
             }
-        }
+            Span::Crossings { crossing, count, discard, duration } => {
+                return Watch::Crossings(CrossingRun::new(machine, crossing, (*count, *discard), now + duration));
+            }
+        };
+        Watch::Sections(SectionRun::new(machine, schedule, separation))
     }
 }
 
@@ -158,13 +186,61 @@ pub struct PointResult {
     pub residual: f64,
     /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
     pub sections: Vec<f64>,
+    /// Number of sections, including discarded ones.
+    pub crossings: usize,
+    /// Times of the kept crossings of a channel, s from the point's start; empty for sections at a phase.
+    pub times: Vec<f64>,
     /// Values of [`Protocol::keep`], SI; NaN where unknown.
     pub statistics: Vec<f64>,
 }
 
+/// A run through the sections of a point.
+enum Watch {
+    Sections(SectionRun<ObservedRun>),
+    Crossings(CrossingRun),
+}
+
+impl Watch {
+    fn orbit(&self) -> &ObservedRun {
+        match self {
+            Self::Sections(run) => run.orbit(),
+            Self::Crossings(run) => run.orbit(),
+        }
+    }
+
+    fn orbit_mut(&mut self) -> &mut ObservedRun {
+        match self {
+            Self::Sections(run) => run.orbit_mut(),
+            Self::Crossings(run) => run.orbit_mut(),
+        }
+    }
+
+    fn taken(&self) -> usize {
+        match self {
+            Self::Sections(run) => run.taken(),
+            Self::Crossings(run) => run.taken(),
+        }
+    }
+
+    fn discard(&self) -> usize {
+        match self {
+            Self::Sections(run) => run.schedule().discard,
+            Self::Crossings(run) => run.discard(),
+        }
+    }
+
+    fn sections(&self) -> &[f64] {
+        match self {
+            Self::Sections(run) => run.sections(),
+            Self::Crossings(run) => run.sections(),
+        }
+    }
+}
+
 /// A point being computed.
 pub struct PointRun {
-    watch: SectionRun<ObservedRun>,
+    watch: Watch,
+    interval: f64,
     resolution: Vec<f64>,
     started: f64,
     impacts_at_start: Vec<u64>,
@@ -181,7 +257,7 @@ impl PointRun {
     /// # Errors
     /// A scene that cannot start.
     pub fn cold(scene: &Scene, protocol: &Protocol, interval: f64) -> Result<Self, ObservedError> {
-        Ok(Self::begin(ObservedRun::new(scene)?, protocol, protocol.schedule(interval, None)))
+        Ok(Self::begin(ObservedRun::new(scene)?, protocol, interval, false))
     }
 
     /// Continues from the latest section of another point as `machine`; `None` if a running simulation cannot change to that.
@@ -189,15 +265,14 @@ impl PointRun {
         if run.simulation_mut().adopt(machine) != Ok(Effect::Now) {
             return None;
         }
-        let schedule = protocol.schedule(interval, Some(run.time()));
-        Some(Self::begin(run, protocol, schedule))
+        Some(Self::begin(run, protocol, interval, true))
     }
 
-    fn begin(mut machine: ObservedRun, protocol: &Protocol, schedule: Schedule) -> Self {
+    fn begin(mut machine: ObservedRun, protocol: &Protocol, interval: f64, follows: bool) -> Self {
         let solver = machine.simulation().machine().solver;
         let tolerance = tolerance_of(&solver);
         let samples = if protocol.plan().is_some() { SAMPLES } else { SAMPLES_OF_DURATION };
-        let sample_interval = schedule.interval / samples;
+        let sample_interval = interval / samples;
         // The motion of a purely kinematic scene has no neighbours.
         let exponent = protocol.plan().is_some_and(|plan| plan.exponent);
         let twin = exponent && !machine.simulation().mechanism().is_kinematic();
@@ -214,22 +289,26 @@ impl PointRun {
             resolution: resolution(simulation.machine(), tolerance),
             means: Means::new(joints, sample_interval),
             statistics: Accumulator::new(&protocol.keep, simulation, sample_interval),
-            watch: SectionRun::new(machine, schedule, separation),
+            watch: protocol.watch(machine, interval, separation, follows),
+            interval,
             started,
             impacts_at_discard: impacts.clone(),
             impacts_at_start: impacts,
             peaks,
             transient_peaks: vec![0.0; joints],
         };
-        if schedule.discard == 0 {
+        if run.watch.discard() == 0 {
             run.begin_keeping();
         }
         run
     }
 
-    /// Time of the first section, including discarded ones, s.
+    /// Time of the first section at a phase of the drive, including discarded ones, s; NaN for crossings.
     pub fn first(&self) -> f64 {
-        self.watch.schedule().first
+        match &self.watch {
+            Watch::Sections(run) => run.schedule().first,
+            Watch::Crossings(_) => f64::NAN,
+        }
     }
 
     /// Whether it started from the scene's own initial state.
@@ -239,7 +318,10 @@ impl PointRun {
 
     /// Whether all periods have been run.
     pub fn is_done(&self) -> bool {
-        self.watch.is_done()
+        match &self.watch {
+            Watch::Sections(run) => run.is_done(),
+            Watch::Crossings(run) => run.is_done(),
+        }
     }
 
     /// Number of sections taken, including discarded ones.
@@ -262,8 +344,11 @@ impl PointRun {
     /// # Errors
     /// The divergence guard: the point has diverged.
     pub fn step(&mut self) -> Result<(), ObservedError> {
-        let at_section = self.watch.step()?;
-        let discard = self.watch.schedule().discard;
+        let at_section = match &mut self.watch {
+            Watch::Sections(run) => run.step()?,
+            Watch::Crossings(run) => run.step()?,
+        };
+        let discard = self.watch.discard();
         if self.watch.taken() < discard {
             return Ok(());
         }
@@ -314,13 +399,32 @@ impl PointRun {
             .collect();
         let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
         let probe = known.map(|_| (self.means.probe_largest, (self.means.probe_square / span).sqrt()));
-        let exponent = self.watch.exponent().and_then(|benettin| benettin.result());
         let sections = self.watch.sections().to_vec();
-        let (regime, evidence) = classify(&sections, &self.resolution, self.watch.schedule().interval, exponent);
+        let crossings = self.watch.taken();
+        let (exponent, times) = match &self.watch {
+            Watch::Sections(run) => (run.exponent().and_then(|benettin| benettin.result()), Vec::new()),
+            Watch::Crossings(run) => (None, run.times().iter().map(|time| time - self.started).collect()),
+        };
+        let (regime, evidence) = classify(&sections, &self.resolution, self.interval, exponent);
         let statistics = statistics_of_channels;
-        let result =
-            PointResult { stopped: None, joints, probe, regime, evidence, doubts, residual, sections, statistics };
-        (result, self.watch.into_orbit())
+        let result = PointResult {
+            stopped: None,
+            joints,
+            probe,
+            regime,
+            evidence,
+            doubts,
+            residual,
+            sections,
+            crossings,
+            times,
+            statistics,
+        };
+        let machine = match self.watch {
+            Watch::Sections(run) => run.into_orbit(),
+            Watch::Crossings(run) => run.into_orbit(),
+        };
+        (result, machine)
     }
 
     /// Result of a point that the divergence guard stopped: only the time.
@@ -333,17 +437,18 @@ impl PointResult {
     /// A result without known values.
     pub fn unknown() -> Self {
         let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
-        let (joints, sections, statistics) = (Vec::new(), Vec::new(), Vec::new());
         Self {
             stopped: None,
-            joints,
+            joints: Vec::new(),
             probe: None,
             regime,
             evidence,
             doubts: 0,
             residual: f64::NAN,
-            sections,
-            statistics,
+            sections: Vec::new(),
+            crossings: 0,
+            times: Vec::new(),
+            statistics: Vec::new(),
         }
     }
 }

@@ -117,7 +117,7 @@ impl ChannelStatistic {
 }
 
 /// All channels of a simulation at its start.
-fn channels(machine: &Machine, simulation: &mut Simulation) -> Vec<Listed> {
+pub(super) fn channels(machine: &Machine, simulation: &mut Simulation) -> Vec<Listed> {
     let mut first = Frame { reactions: Some(Vec::new()), ..Frame::default() };
     simulation.sample(simulation.time(), &mut first);
     channels_of(machine, &first)

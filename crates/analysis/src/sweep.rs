@@ -4,7 +4,7 @@
 use super::design::{Design, Start};
 use super::drive::{NoPeriod, ObservedRun};
 use super::layout::Layout;
-use super::point::{Plan, PointResult, PointRun, Protocol};
+use super::point::{PointResult, PointRun, Protocol};
 use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
 use jointplay_scene::{Scene, SceneError, Value};
 
@@ -16,12 +16,14 @@ const MOST_SECTIONS: usize = 1 << 26;
 pub enum SweepError {
     /// No kept periods.
     #[error(
-        "--periods {periods} --discard {discard}: the periods include those discarded, so --discard must be less than --periods"
+        "{option} {all} --discard {discard}: they include those discarded, so --discard must be less than {option}"
     )]
     NothingKept {
-        /// Periods.
-        periods: usize,
-        /// Discarded periods.
+        /// Option with the number of periods or crossings.
+        option: &'static str,
+        /// Periods or crossings.
+        all: usize,
+        /// Discarded ones.
         discard: usize,
     },
     /// More numbers than a result can hold.
@@ -53,7 +55,7 @@ pub enum SweepError {
         most: usize,
     },
     /// No drive phase.
-    #[error("{0}; give the length of each point with --duration instead, or the time between sections with --period")]
+    #[error("{0}; sections at a drive phase need a driven scene such as spcmm or slider-crank-driven")]
     NoPeriod(#[from] NoPeriod),
     /// A point that the scene does not accept, or that cannot start.
     #[error("the scene cannot start at {point}: {error}")]
@@ -82,9 +84,10 @@ impl Sweep {
     /// No kept periods, no drive phase where sections need one, or a value at which the scene cannot start.
     pub fn new(scene: Scene, design: Design, protocol: impl Into<Protocol>) -> Result<Self, SweepError> {
         let protocol = protocol.into();
-        if let Some(&Plan { periods, discard, .. }) = protocol.plan() {
-            if discard >= periods {
-                return Err(SweepError::NothingKept { periods, discard });
+        if let Some((all, discard)) = protocol.sections() {
+            if discard >= all {
+                let option = if protocol.plan().is_some() { "--periods" } else { "--crossings" };
+                return Err(SweepError::NothingKept { option, all, discard });
             }
             let (points, kept) = (design.points(), protocol.kept());
             if kept > MOST_SECTIONS / points {
@@ -237,7 +240,7 @@ impl BlockRun<'_> {
 mod tests {
     use super::*;
     use crate::axis::Axis;
-    use crate::point::Span;
+    use crate::point::{Plan, Span};
     use crate::statistic::ChannelStatistic;
     use jointplay_physics::simulate::Frame;
 

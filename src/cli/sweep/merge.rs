@@ -8,8 +8,9 @@ use ndarray::{Array1, ArrayD, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
 use serde_json::{Map, Value as Json};
 
-use super::archive::{Archive, ArchivedAxis, AxisValues, SHARD, Source, Target};
+use super::archive::{Archive, ArchivedAxis, AxisValues, SHARD, Source};
 use super::options;
+use super::target::Target;
 use super::word::Word;
 use crate::cli::Failure;
 use crate::cli::args::MergeArguments;

@@ -6,6 +6,7 @@ mod merge;
 mod options;
 mod partial;
 mod request;
+mod target;
 mod word;
 
 pub(super) use archive::{Archive, Source};
@@ -18,8 +19,9 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
 
-use self::archive::{Target, ZIPPED, unit_suffix};
+use self::archive::{ZIPPED, unit_suffix};
 use self::options::Shard;
+use self::target::Target;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::{NearSingular, near_singular};
 use super::output::{RowsFile, check_distinct};
@@ -122,6 +124,12 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
             add("duration_s", json!(duration));
             add("from_s", json!(from));
         }
+        Span::Crossings { crossing, count, discard, duration } => {
+            add("crossings", json!(count));
+            add("discard", json!(discard));
+            add("section", json!(crossing.text()));
+            add("duration_s", json!(duration));
+        }
     }
     let starts: Vec<&str> = design.starts().iter().map(|start| start.word()).collect();
     add("start", if let [start] = starts[..] { json!(start) } else { json!(starts) });
@@ -135,7 +143,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
         Status::NoStart.code().to_string(): "could not start",
     });
     add("statuses", statuses);
-    if protocol.plan().is_some() {
+    if protocol.sections().is_some() {
         let words = Regime::ALL.iter().map(|regime| (regime.code().to_string(), json!(regime.word())));
         let none = ("-1".to_owned(), json!("none"));
         add("regimes", Json::Object(words.chain([none]).collect()));
@@ -204,11 +212,12 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     }
     let protocol = sweep.protocol();
     let kept = protocol.kept();
-    if protocol.plan().is_some() && kept < FEWEST {
+    if protocol.sections().is_some() && kept < FEWEST {
         all.push(format!(
             "{} of each point: with fewer than {FEWEST} no regime can be classified and all are reported as unclear; \
-             raise --periods or lower --discard.",
-            count(kept as u64, "section")
+             raise --{} or lower --discard.",
+            count(kept as u64, "section"),
+            if protocol.plan().is_some() { "periods" } else { "crossings" }
         ));
     }
     let solver = &sweep.scene().machine.solver;

@@ -2,15 +2,18 @@
 
 use super::options;
 use crate::analysis::axis::Axis;
+use crate::analysis::crossing::Crossing;
 use crate::analysis::design::Design;
 use crate::analysis::point::{Plan, Protocol, Span};
 use crate::analysis::read_points;
 use crate::analysis::statistic::ChannelStatistic;
-use crate::analysis::sweep::Sweep;
+use crate::analysis::sweep::{Sweep, SweepError};
 use crate::cli::args::SweepArguments;
 use crate::cli::{Failure, load, quantity};
 use crate::scene::Scene;
 
+/// Word for sections at a phase of the drive.
+const PHASE: &str = "phase";
 /// Size limit of the file of points, in bytes.
 const LARGEST_POINTS: u64 = 64 << 20;
 
@@ -22,7 +25,12 @@ pub(super) fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
     let scene = load(&arguments.scene)?;
     let design = design(arguments, &scene)?;
     let protocol = protocol(arguments, &scene)?;
-    Sweep::new(scene, design, protocol).map_err(usage)
+    Sweep::new(scene, design, protocol).map_err(|error| match error {
+        SweepError::NoPeriod(_) => usage(format!(
+            "{error}; or give the length of each point with --duration, or the time between two sections with --period"
+        )),
+        other => usage(other),
+    })
 }
 
 fn usage(error: impl std::fmt::Display) -> Failure {
@@ -54,7 +62,26 @@ fn protocol(arguments: &SweepArguments, scene: &Scene) -> Result<Protocol, Failu
         usage(format!("--keep {error}; `jointplay check {} --channels` lists the channels", name.display()))
     })?;
     let span = match &arguments.duration {
-        Some(text) => duration(text, arguments.from.as_deref())?,
+        Some(text) if arguments.section != PHASE => crossings(arguments, scene, text)?,
+        Some(_) if arguments.discard.is_some() => {
+            return Err(usage(
+                "--discard counts periods or crossings; with --duration alone, --from ends the transient",
+            ));
+        }
+        Some(text) => {
+            let (duration, from) = times(text, arguments.from.as_deref())?;
+            Span::Duration { duration, from }
+        }
+        None if arguments.section != PHASE => {
+            // An unknown word deserves its own error.
+            let crossing =
+                Crossing::parse(scene, &arguments.section).map_err(|error| usage(format!("--section {error}")))?;
+            return Err(usage(format!(
+                "--section {}: give the number of crossings with --crossings N --discard D, and --duration to end the search for \
+                 them, in place of --periods",
+                crossing.text()
+            )));
+        }
         None => Span::Sections {
             plan: Plan {
                 periods: arguments.periods.unwrap_or_default(),
@@ -68,8 +95,24 @@ fn protocol(arguments: &SweepArguments, scene: &Scene) -> Result<Protocol, Failu
     Ok(Protocol { span, keep: keep.unwrap_or_default() })
 }
 
-/// Reads `--duration` and `--from`.
-fn duration(text: &str, from: Option<&str>) -> Result<Span, Failure> {
+/// Reads `--section CHANNEL=VALUE`, `--crossings`, `--discard` and `--duration`.
+fn crossings(arguments: &SweepArguments, scene: &Scene, text: &str) -> Result<Span, Failure> {
+    let crossing = Crossing::parse(scene, &arguments.section).map_err(|error| usage(format!("--section {error}")))?;
+    let Some((count, discard)) = arguments.crossings.zip(arguments.discard) else {
+        return Err(usage(format!(
+            "--section {}: give the number of crossings with --crossings N --discard D",
+            crossing.text()
+        )));
+    };
+    if let Some(from) = &arguments.from {
+        return Err(usage(format!("--from {from}: with --section, --discard ends the transient")));
+    }
+    let (duration, _) = times(text, None)?;
+    Ok(Span::Crossings { crossing, count, discard, duration })
+}
+
+/// Reads `--duration` and `--from`, s.
+fn times(text: &str, from: Option<&str>) -> Result<(f64, f64), Failure> {
     let duration = quantity::duration("--duration", text)?;
     let end = from.map_or(Ok(0.0), |from| quantity::duration("--from", from))?;
     if duration <= end {
@@ -78,7 +121,7 @@ fn duration(text: &str, from: Option<&str>) -> Result<Span, Failure> {
             None => format!("--duration {text}: the time must be above 0"),
         }));
     }
-    Ok(Span::Duration { duration, from: end })
+    Ok((duration, end))
 }
 
 /// Reads `--period`.

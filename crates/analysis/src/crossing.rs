@@ -1,0 +1,301 @@
+//! Sections of a motion where a channel crosses a value: `crank.angle=90deg:up`.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::drive::{OBSERVABLES, ObservedError, ObservedRun, observed};
+use super::statistic::channels;
+use jointplay_physics::simulate::{Frame, NoChannel, Reading, Simulation, StartError, matching};
+use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity};
+use jointplay_scene::Scene;
+
+/// Instants per step at which the channel is read: a value that it crosses twice between two of them counts as not crossed.
+const LOOKS: u32 = 4;
+/// Largest number of bisections: enough to reach neighbouring times.
+const BISECTIONS: u32 = 60;
+
+/// Why a condition for sections is invalid.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CrossingError {
+    /// Malformed.
+    #[error("{text}: expected phase or CHANNEL=VALUE[:up|:down], e.g. crank.angle=90deg:up")]
+    Form {
+        /// As written.
+        text: String,
+    },
+    /// An unknown channel.
+    #[error("{text}: {error}")]
+    Channel {
+        /// As written.
+        text: String,
+        /// What is wrong.
+        error: NoChannel,
+    },
+    /// A pattern of several channels.
+    #[error("{text}: the section needs one channel, and these match: {}", .names.join(", "))]
+    Several {
+        /// As written.
+        text: String,
+        /// The channels.
+        names: Vec<String>,
+    },
+    /// Not a value of the channel.
+    #[error("{text}: {value} {error}")]
+    Value {
+        /// As written.
+        text: String,
+        /// The value as written.
+        value: String,
+        /// What is wrong.
+        error: QuantityError,
+    },
+    /// The scene whose channels are needed does not start.
+    #[error("the scene does not start, so its channels are unknown: {0}")]
+    Start(#[from] StartError),
+}
+
+/// Sense of a crossing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sense {
+    Up,
+    Down,
+    Either,
+}
+
+/// A value of a channel whose crossing is a section. An angle crosses its value once per turn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crossing {
+    text: String,
+    channel: String,
+    value: f64,
+    is_angle: bool,
+    sense: Sense,
+}
+
+impl Crossing {
+    /// Parses `CHANNEL=VALUE[:up|:down]` for `scene`.
+    ///
+    /// # Errors
+    /// A malformed text, no such channel or several, a value without its unit; a scene that does not start.
+    pub fn parse(scene: &Scene, text: &str) -> Result<Self, CrossingError> {
+        let own = || text.to_owned();
+        let (pattern, rest) = text.split_once('=').ok_or_else(|| CrossingError::Form { text: own() })?;
+        let (value, sense) = match rest.split_once(':').map(|(value, sense)| (value, sense.trim())) {
+            None => (rest, Sense::Either),
+            Some((value, "up")) => (value, Sense::Up),
+            Some((value, "down")) => (value, Sense::Down),
+            Some(_) => return Err(CrossingError::Form { text: own() }),
+        };
+        let list = channels(&scene.machine, &mut Simulation::new(&scene.machine)?);
+        let pattern = pattern.trim();
+        let chosen = matching(&list, pattern).map_err(|error| CrossingError::Channel { text: own(), error })?;
+        // The exact name, or else the only match.
+        let exact = chosen.iter().find(|channel| channel.name == pattern);
+        let channel = match (exact, &chosen[..]) {
+            (Some(channel), _) | (None, [channel]) => *channel,
+            _ => {
+                let names = chosen.iter().map(|channel| channel.name.clone()).collect();
+                return Err(CrossingError::Several { text: own(), names });
+            }
+        };
+        let number = parse_quantity(value, dimension_of(channel.unit)).map_err(|error| {
+            let value = value.trim().to_owned();
+            CrossingError::Value { text: own(), value, error }
+        })?;
+        let is_angle = channel.unit == "rad";
+        Ok(Self { text: own(), channel: channel.name.clone(), value: number, is_angle, sense })
+    }
+
+    /// As written.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Deviation of `value` from the crossed one; for an angle that of the nearest turn.
+    fn deviation(&self, value: f64) -> f64 {
+        let off = value - self.value;
+        if self.is_angle { off - TAU * (off / TAU).round() } else { off }
+    }
+
+    /// Whether the channel crosses its value between two deviations.
+    fn is_between(&self, before: f64, after: f64) -> bool {
+        // Between half a turn above and below, an angle jumps without a crossing.
+        let near = !self.is_angle || before.abs().max(after.abs()) < FRAC_PI_2;
+        let up = before < 0.0 && after >= 0.0 && self.sense != Sense::Down;
+        let down = before > 0.0 && after <= 0.0 && self.sense != Sense::Up;
+        near && (up || down)
+    }
+}
+
+/// Dimension of a channel's unit; a pure number where scenes have no such unit.
+fn dimension_of(unit: &str) -> Dimension {
+    let plain = |text: &str| text.replace([' ', '^'], "");
+    let same = |(name, _, size): &(&str, Dimension, f64)| *size == 1.0 && plain(name) == plain(unit);
+    all_units().find(same).map_or(Dimension::None, |(_, dimension, _)| dimension)
+}
+
+/// A run whose sections are the crossings of a channel.
+pub(super) struct CrossingRun {
+    orbit: ObservedRun,
+    crossing: Crossing,
+    reading: Option<Reading>,
+    frame: Frame,
+    /// Deviation at the end of the latest step.
+    latest: f64,
+    /// Crossings to take, discarded ones included, and how many of them to discard.
+    count: usize,
+    discard: usize,
+    /// End of the run, s, whether or not all crossings are taken.
+    end: f64,
+    taken: usize,
+    kept: Vec<f64>,
+    times: Vec<f64>,
+}
+
+impl CrossingRun {
+    /// Observes `orbit` from now to `count` crossings, but not beyond time `end`, s.
+    pub(super) fn new(mut orbit: ObservedRun, crossing: &Crossing, (count, discard): (usize, usize), end: f64) -> Self {
+        let machine = orbit.simulation().machine().clone();
+        let list = channels(&machine, orbit.simulation_mut());
+        let reading = list.iter().find(|channel| channel.name == crossing.channel).map(|channel| channel.reading());
+        let mut frame = Frame::default();
+        reading.iter().for_each(|reading| reading.ask(&mut frame));
+        let (kept, times) = (Vec::new(), Vec::new());
+        let crossing = crossing.clone();
+        let mut run = Self { orbit, crossing, reading, frame, latest: 0.0, count, discard, end, taken: 0, kept, times };
+        run.latest = run.deviation_at(run.orbit.simulation().time());
+        run
+    }
+
+    pub(super) fn orbit(&self) -> &ObservedRun {
+        &self.orbit
+    }
+
+    pub(super) fn orbit_mut(&mut self) -> &mut ObservedRun {
+        &mut self.orbit
+    }
+
+    pub(super) fn into_orbit(self) -> ObservedRun {
+        self.orbit
+    }
+
+    pub(super) fn taken(&self) -> usize {
+        self.taken
+    }
+
+    pub(super) fn discard(&self) -> usize {
+        self.discard
+    }
+
+    pub(super) fn is_done(&self) -> bool {
+        self.taken >= self.count || self.orbit.simulation().time() >= self.end
+    }
+
+    /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
+    pub(super) fn sections(&self) -> &[f64] {
+        &self.kept
+    }
+
+    /// Times of the kept sections, s.
+    pub(super) fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Takes one step; returns `true` if it contains a crossing.
+    pub(super) fn step(&mut self) -> Result<bool, ObservedError> {
+        let start = self.orbit.simulation().time();
+        self.orbit.simulation_mut().step_until(self.end)?;
+        let step = self.orbit.simulation().time() - start;
+        let (mut crossed, mut before) = (false, start);
+        for k in 1..=LOOKS {
+            let now = if k == LOOKS { start + step } else { start + step * f64::from(k) / f64::from(LOOKS) };
+            let deviation = self.deviation_at(now);
+            if self.taken < self.count && self.crossing.is_between(self.latest, deviation) {
+                crossed = true;
+                self.take(before, now);
+            }
+            (before, self.latest) = (now, deviation);
+        }
+        Ok(crossed)
+    }
+
+    /// Records the crossing between two times, s.
+    fn take(&mut self, mut before: f64, mut after: f64) {
+        let mut below = self.latest;
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (before + after);
+            if middle <= before || middle >= after {
+                break;
+            }
+            let deviation = self.deviation_at(middle);
+            if self.crossing.is_between(below, deviation) {
+                after = middle;
+            } else {
+                (before, below) = (middle, deviation);
+            }
+        }
+        self.taken += 1;
+        if self.taken > self.discard {
+            self.deviation_at(after);
+            self.kept.extend(observed(&self.frame.pose));
+            self.times.push(after);
+        }
+        debug_assert_eq!(self.kept.len(), OBSERVABLES.len() * self.times.len());
+    }
+
+    /// Samples the latest step at `time`, s.
+    fn deviation_at(&mut self, time: f64) -> f64 {
+        self.orbit.simulation_mut().sample(time, &mut self.frame);
+        let value = self.reading.and_then(|reading| reading.read(&self.frame));
+        value.map_or(f64::NAN, |value| self.crossing.deviation(value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> Scene {
+        Scene::load("slider-crank-driven", &[]).expect("built in")
+    }
+
+    #[test]
+    fn conditions_that_are_none_say_why() {
+        for (text, fragment) in [
+            ("zero", "expected phase or CHANNEL=VALUE"),
+            ("crank.angle=90deg:round", "expected phase or CHANNEL=VALUE"),
+            ("crank.angle=90", "90 needs a unit"),
+            ("crank.angel=90deg", "did you mean `crank.angle`?"),
+            ("B.force=1N", "B.force.x, B.force.y, B.force.z"),
+        ] {
+            let error = Crossing::parse(&scene(), text).expect_err(text).to_string();
+            assert!(error.contains(fragment), "{text}: {error}");
+        }
+        let kinetic = Crossing::parse(&scene(), "energy.kinetic=0.5:up").expect("a number in J");
+        assert_eq!((kinetic.value, kinetic.is_angle), (0.5, false));
+    }
+
+    /// The crank turns at a constant rate, so that its crossings are known.
+    #[test]
+    fn a_turning_crank_crosses_an_angle_once_per_turn() {
+        let scene = scene();
+        let period = crate::drive::drive_period(&scene).expect("driven");
+        for (text, per_turn) in
+            [("crank.angle=90deg", 1.0), ("crank.angle=90deg:up", 1.0), ("crank.angle=90deg:down", 1.0)]
+        {
+            let crossing = Crossing::parse(&scene, text).expect("a section");
+            let orbit = ObservedRun::new(&scene).expect("starts");
+            let mut run = CrossingRun::new(orbit, &crossing, (4, 1), 3.2 * period);
+            while !run.is_done() {
+                run.step().expect("runs");
+            }
+            let turns =
+                |times: &[f64]| times.windows(2).all(|w| ((w[1] - w[0]) * per_turn / period - 1.0).abs() < 1e-9);
+            // The crank turns one way: the other sense never occurs.
+            assert!(run.taken() == 0 || (run.taken() >= 3 && turns(run.times())), "{text}: {:?}", run.times());
+            assert_eq!(run.sections().len(), 12 * run.times().len());
+            if text == "crank.angle=90deg" {
+                assert!(run.taken() >= 3);
+            }
+        }
+    }
+}
