@@ -132,10 +132,11 @@ impl Protocol {
                 Schedule { first, interval, sections: 1 + discard, discard }
             }
             Span::Crossings { crossing, count, discard, duration } => {
-                return Watch::Crossings(CrossingRun::new(machine, crossing, (*count, *discard), now + duration));
+                let run = CrossingRun::new(machine, crossing, (*count, *discard), now + duration);
+                return Watch::Crossings(Box::new(run));
             }
         };
-        Watch::Sections(SectionRun::new(machine, schedule, separation))
+        Watch::Sections(Box::new(SectionRun::new(machine, schedule, separation)))
     }
 }
 
@@ -196,8 +197,8 @@ pub struct PointResult {
 
 /// A run through the sections of a point.
 enum Watch {
-    Sections(SectionRun<ObservedRun>),
-    Crossings(CrossingRun),
+    Sections(Box<SectionRun<ObservedRun>>),
+    Crossings(Box<CrossingRun>),
 }
 
 impl Watch {

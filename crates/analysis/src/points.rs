@@ -48,7 +48,7 @@ pub enum PointsError {
         /// As written.
         value: String,
         /// What is wrong and what is allowed.
-        error: ValueError,
+        error: Box<ValueError>,
     },
     /// Points that do not go together.
     #[error("{file}: {error}")]
@@ -56,7 +56,7 @@ pub enum PointsError {
         /// Name of the file.
         file: String,
         /// What is wrong.
-        error: RangeError,
+        error: Box<RangeError>,
     },
 }
 
@@ -85,7 +85,7 @@ pub fn read_points(scene: &Scene, file: &str, text: &str, starts: &[Start]) -> R
         for (j, cell) in row.iter().enumerate() {
             let value = parameters[j].read(cell).map_err(|error| {
                 let (key, value) = (keys[j].clone(), brief(cell));
-                PointsError::Value { file: own(), line, key, value, error }
+                PointsError::Value { file: own(), line, key, value, error: Box::new(error) }
             })?;
             columns[j].push(value);
         }
@@ -96,7 +96,7 @@ pub fn read_points(scene: &Scene, file: &str, text: &str, starts: &[Start]) -> R
     let axes = keys.iter().zip(columns).map(|(key, values)| Axis::listed(scene, key, values));
     let axes: Result<Vec<_>, _> = axes.collect();
     let design = axes.and_then(|axes| Design::zipped(scene, axes, starts));
-    design.map_err(|error| PointsError::Together { file: own(), error })
+    design.map_err(|error| PointsError::Together { file: own(), error: Box::new(error) })
 }
 
 /// The cells of a line, without quotes and surrounding blanks.
