@@ -1,6 +1,6 @@
 //! The points of a sweep: the varied parameters, how their values combine, and the blocks in which the points are computed.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -115,11 +115,11 @@ impl Design {
         if axes.is_empty() {
             return wrong("a sweep varies at least one parameter: add --vary KEY=A..B:N".to_owned());
         }
-        let mut keys = HashSet::new();
+        let mut keys = BTreeSet::new();
         if let Some(twice) = axes.iter().find(|axis| !keys.insert(axis.key())) {
             return wrong(format!("--vary {} is given twice", twice.key()));
         }
-        let mut known = HashSet::new();
+        let mut known = BTreeSet::new();
         match starts.iter().find(|start| !known.insert(start.word())) {
             Some(twice) => return wrong(format!("--start: {} is given twice", twice.word())),
             None if starts.is_empty() => return wrong("--start: give at least one start".to_owned()),
@@ -242,11 +242,24 @@ impl Design {
     /// # Errors
     /// Values that the scene does not accept together.
     pub fn scene(&self, base: &Scene, point: usize) -> Result<Scene, SceneError> {
-        let mut scene = base.clone();
-        for (key, value) in self.settings(point) {
-            scene.set_value(key, &value)?;
-        }
-        Ok(scene)
+        let settings = self.settings(point);
+        let one_by_one = || {
+            let mut scene = base.clone();
+            for (key, value) in &settings {
+                scene.set_value(key, value)?;
+            }
+            Ok(scene)
+        };
+        // On the way there may be values that the scene accepts only together, such as a large clearance and a larger ball.
+        let together = |error| {
+            let write = |key: &str, value| base.parameter(key).map(|parameter| parameter.write(value));
+            let written = settings.iter().map(|(key, value)| Ok(((*key).to_owned(), write(key, value)?)));
+            let changes: Result<Vec<_>, SceneError> = base.changes.iter().cloned().map(Ok).chain(written).collect();
+            let source = &base.source;
+            let scene = Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, &changes?);
+            scene.map_err(|_| error)
+        };
+        one_by_one().or_else(together)
     }
 
     /// Points to be tried before anything runs. Of crossed axes: every value of each with the others at their ends, and a
@@ -374,6 +387,11 @@ mod tests {
         assert!((0..3).all(|point| table.scene(&scene, point) == design.scene(&scene, point)));
         let short = Design::table(&scene, &keys, &[vec![Value::Number(0.1)]], &[Start::Cold]);
         assert!(short.expect_err("one value").to_string().contains("1 values for 2 keys"));
+        // A clearance above the ball radius of the scene, with a larger ball.
+        let keys = ["contact.clearance", "contact.ball_radius"].map(str::to_owned);
+        let loose = Design::table(&scene, &keys, &[vec![Value::Number(0.012), Value::Number(0.05)]], &[Start::Cold]);
+        let loose = loose.map(|table| table.scene(&scene, 0).expect("accepted together"));
+        assert_eq!(loose.map(|scene| scene.machine.contact.clearance), Ok(0.012));
         let outside = Design::table(&scene, &keys[..1], &[vec![Value::Number(-1.0)]], &[Start::Cold]);
         assert!(outside.expect_err("negative").to_string().contains("out of range"));
     }
