@@ -23,6 +23,7 @@ mod known_systems;
 mod ledger;
 mod limits;
 mod live_changes;
+mod loads;
 mod loop_joints;
 mod machines;
 mod many_joints;

@@ -155,15 +155,17 @@ fn built(text: &str, files: &Texts) -> String {
 /// A force element with any values, on a slide or a hinge.
 fn elements() -> impl Strategy<Value = String> {
     let tables: Vec<&FileTable> = file_tables().into_iter().filter(|table| is_element(table)).collect();
-    (0..tables.len(), any::<bool>()).prop_flat_map(move |(place, hinge)| {
+    (0..tables.len(), any::<[bool; 2]>()).prop_flat_map(move |(place, [hinge, swings])| {
         let table = tables[place];
         let points = table.keys.iter().filter(|key| key.table().is_some_and(|of| of.name == "point"));
         let points: Vec<&str> = points.map(|key| key.name).collect();
         // Of a number with another key on a hinge, the right one.
         let other = if hinge { "force" } else { "torque" };
         let on_joint = table.key("joint", None).is_some();
-        let skip: Vec<&str> =
-            ["name"].into_iter().chain(points.iter().copied()).chain(on_joint.then_some(other)).collect();
+        // A load varies by a frequency or by a factor.
+        let law: &[&str] = if swings { &["factor"] } else { &["frequency", "phase"] };
+        let skip: Vec<&str> = [&["name"], law, &points].concat();
+        let skip: Vec<&str> = skip.into_iter().chain(on_joint.then_some(other)).collect();
         filled(table, None, hinge, &skip).prop_map(move |keys| {
             let bodies = ["base", "rod"].into_iter().rev();
             let points = points.iter().zip(bodies);

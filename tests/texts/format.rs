@@ -32,6 +32,11 @@ file = "coil.csv"
 name = "buffer"
 joint = "j"
 file = "coil.csv"
+[[load]]
+name = "pull"
+on = { body = "leg" }
+force = "0 0 1 N"
+factor = { law = "table", file = "pull.csv" }
 [[body]]
 name = "base"
 mass = "1 kg"
@@ -57,6 +62,7 @@ fn beside() -> Texts {
         ("leg.toml", leg),
         ("bump.csv", "t_s,z_mm\n0,0\n1,1\n"),
         ("coil.csv", "length_mm,force_N\n-1,-5\n0,0\n1,8\n"),
+        ("pull.csv", "t_s,factor\n0,0\n1,1\n"),
         ("corner.stl", corner),
     ];
     files.map(|(name, text)| (name.to_owned(), text.into())).into()

@@ -1,4 +1,5 @@
-//! Drive laws: one row per law, and the reader of `drive`. The motion is computed in `mechanism/drives`.
+//! Drive laws: one row per law, and the reader of `drive` and of the factor of a load, which follows the same laws. The motion is
+//! computed in `mechanism/drives`.
 
 use super::document::{Node, Section};
 use super::formula::read_formula;
@@ -11,6 +12,8 @@ use std::sync::LazyLock;
 pub(super) const FASTEST_DRIVE: f64 = 1e4;
 /// Error message for the law spcmm on a coordinate that is not a slide.
 pub(super) const SLIDERS_ONLY: &str = "the law spcmm drives prismatic joints only";
+/// Word of the law that follows the closed form of the machine.
+const CLOSED_FORM: &str = "spcmm";
 /// Maximum number of terms in a sum of harmonics.
 const MOST_TERMS: usize = 100;
 
@@ -48,7 +51,7 @@ pub struct DriveLaw {
 /// All drive laws. On a hinge, lengths become angles, and speeds angular speeds.
 pub static DRIVE_LAWS: [DriveLaw; 8] = [
     DriveLaw {
-        word: "spcmm",
+        word: CLOSED_FORM,
         help: "slider of the paper's machine; places the joint itself",
         keys: &[key("slider", ValueType::Whole(1, 3), "1", "which slider: 1, 2 or 3")],
     },
@@ -149,7 +152,45 @@ pub(super) static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
         .by(Variants::Word("law", ""))
 });
 
-/// Reads the drive of a coordinate, which is an angle if `turns`.
+static FACTOR_TERMS: LazyLock<FileTable> = LazyLock::new(|| {
+    let keys = TERM.each_ref().map(pure).to_vec();
+    FileTable::new("factor_term", "a term of a factor", TERMS.help, keys.leak())
+});
+
+/// Table of the `factor` of a load: the laws of drives, for pure numbers.
+pub(super) static FACTOR: LazyLock<FileTable> = LazyLock::new(|| {
+    let words: &[&str] = DRIVE.words().iter().copied().filter(|word| *word != CLOSED_FORM).collect::<Vec<_>>().leak();
+    let kept = |key: &&FileKey| key.of != [CLOSED_FORM] && key.name != "unit";
+    let row = |key: &FileKey| match key.takes {
+        ValueType::Word(_) => FileKey { takes: ValueType::Word(words), ..*key },
+        _ => pure(key),
+    };
+    let keys: Vec<FileKey> = DRIVE.keys.iter().filter(kept).map(row).collect();
+    FileTable::new("factor", "a factor", "a number as a function of time", keys.leak()).by(Variants::Word("law", ""))
+});
+
+/// A row of a drive for pure numbers in place of lengths, and numbers per second in place of speeds.
+fn pure(key: &FileKey) -> FileKey {
+    use Dimension::{Frequency, Length, None, Speed};
+    let (takes, like) = match key.takes {
+        ValueType::Number(Length, range) => (ValueType::Number(None, range), "0.5"),
+        ValueType::Number(Speed, range) => (ValueType::Number(Frequency, range), "\"0.5 1/s\""),
+        ValueType::Pairs([time, _], many) => (ValueType::Pairs([time, None], many), "[[\"0 s\", 0], [\"1 s\", 0.5]]"),
+        ValueType::List(_, many) => {
+            (ValueType::List(&FACTOR_TERMS, many), "[{ amplitude = 0.5, frequency = \"1 Hz\" }]")
+        }
+        ValueType::File => (key.takes, "\"pull.csv\""),
+        takes => (takes, key.like),
+    };
+    let help = match key.name {
+        "points" => "time and factor, in the order of time, at least two",
+        "file" => "the points: two columns under a header that names the unit of the time, `time_s,factor`",
+        _ => key.help,
+    };
+    FileKey { takes, like, help, on_hinge: Option::None, ..*key }
+}
+
+/// Reads the drive of a coordinate, which is an angle if `turns`, or a factor, if the row of `node` has that table.
 pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<Drive, SceneError> {
     let mut node = node.clone();
     node.document.on_hinge = turns;
@@ -157,7 +198,7 @@ pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<
     let law = section.require("law")?;
     let number = |name: &str| section.number(name);
     Ok(match law.choice()? {
-        "spcmm" => read_slider(&section, &law, scene)?,
+        CLOSED_FORM => read_slider(&section, &law, scene)?,
         "constant" => Drive::Constant { position: number("position")?, velocity: number("velocity")? },
         "harmonic" => Drive::Harmonic { mean: number("mean")?, terms: vec![read_term(&section)?] },
         "harmonics" => Drive::Harmonic { mean: number("mean")?, terms: read_terms(&section)? },
@@ -179,9 +220,10 @@ pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<
     })
 }
 
-/// Dimension of the joint's coordinate.
+/// Dimension of the joint's coordinate, or of a factor.
 fn coordinate(section: &Section<'_>) -> Dimension {
     match section.document.on_hinge {
+        _ if section.rows.name == FACTOR.name => Dimension::None,
         true => Dimension::Angle,
         false => Dimension::Length,
     }
@@ -234,7 +276,8 @@ fn read_table(section: &Section<'_>) -> Result<Drive, SceneError> {
 
 fn read_law_of_formula(section: &Section<'_>) -> Result<Drive, SceneError> {
     let node = section.require("formula")?;
-    let unit = section.get("unit");
+    // A factor has no unit.
+    let unit = section.rows.key("unit", None).and_then(|_| section.get("unit"));
     let (program, scale) = read_formula(&node, unit.as_ref(), coordinate(section))?;
     Ok(Drive::Formula { program, scale, resolve: section.number("resolve")? })
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use super::document::{Node, Section};
-use super::drives::{DRIVE, FASTEST_DRIVE, read_drive};
+use super::drives::{DRIVE, FACTOR, FASTEST_DRIVE, read_drive};
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, key, many, number};
 use super::pattern_instance::PatternInstance;
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
@@ -13,8 +13,8 @@ use super::points::{Axis, Graph, MOST_POINTS, read_file, read_points};
 use super::read_joints::read_coordinate;
 use super::*;
 use jointplay_physics::machine::{
-    Bushing, Drive, Elastic, Element, ElementKind, JointCoordinate, JointSpring, Load, LoadAxes, Motor, Quat, Spring,
-    SpringSide, Stop, Tyre, Vec3,
+    Bushing, Drive, Elastic, Element, ElementKind, Harmonic, JointCoordinate, JointSpring, Load, LoadAxes, Motor, Quat,
+    Spring, SpringSide, Stop, Tyre, Vec3,
 };
 use jointplay_physics::units::Dimension as D;
 use jointplay_physics::words::Words;
@@ -153,27 +153,42 @@ static SPRING: FileTable = FileTable::new(
     ],
 );
 
-static LOAD: FileTable = FileTable::new(
-    "load",
-    "[[load]]",
-    "force and torque from outside on a body, constant or times sin(2π frequency t + phase)",
-    &[
-        NAME,
-        point("on"),
-        key("frequency", ValueType::Number(D::Frequency, (0.0, FASTEST_DRIVE)), "\"2 Hz\"", "0 for a constant load")
+static LOAD: LazyLock<FileTable> = LazyLock::new(|| {
+    FileTable::new(
+        "load",
+        "[[load]]",
+        "force and torque from outside on a body, constant, times sin(2π frequency t + phase), or times another function of time",
+        vec![
+            NAME,
+            point("on"),
+            key(
+                "frequency",
+                ValueType::Number(D::Frequency, (0.0, FASTEST_DRIVE)),
+                "\"2 Hz\"",
+                "0 for a constant load",
+            )
             .zero(),
-        key("phase", number(D::Angle), "\"90 deg\"", "phase at t = 0; not used where the load is constant").zero(),
-        vector("force", D::Force, "force at the point"),
-        vector("torque", D::Torque, "torque"),
-        key(
-            "axes",
-            ValueType::Word(LoadAxes::WORDS),
-            "",
-            "whether force and torque keep to the world's axes or turn with the body",
-        )
-        .absent(LoadAxes::World.word()),
-    ],
-);
+            key("phase", number(D::Angle), "\"90 deg\"", "phase at t = 0; not used where the load is constant").zero(),
+            key(
+                "factor",
+                ValueType::Table(&FACTOR),
+                "{ law = \"ramp\", to = 1, duration = \"0.5 s\" }",
+                "factor of force and torque over time, by the laws of drives, in place of `frequency` and `phase`",
+            )
+            .absent("1, or that of `frequency`"),
+            vector("force", D::Force, "force at the point"),
+            vector("torque", D::Torque, "torque"),
+            key(
+                "axes",
+                ValueType::Word(LoadAxes::WORDS),
+                "",
+                "whether force and torque keep to the world's axes or turn with the body",
+            )
+            .absent(LoadAxes::World.word()),
+        ]
+        .leak(),
+    )
+});
 
 static JOINT_SPRING: FileTable = FileTable::new(
     "joint_spring",
@@ -423,14 +438,20 @@ fn read_load(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         let vector = place.section.vector(name)?;
         Ok(copy.map_or(vector, |copy| copy.direction(vector)))
     };
-    let load = Load {
-        on: place.points[0],
-        frequency: place.number("frequency")?,
-        phase: place.number("phase")?,
-        force: vector("force")?,
-        torque: vector("torque")?,
-        axes,
+    let factor = match place.law("factor")? {
+        Some(law) => {
+            for key in ["frequency", "phase"] {
+                place.section.refuse(key, "`factor` says how the load varies")?;
+            }
+            Some(law)
+        }
+        None => {
+            let [frequency, phase] = [place.number("frequency")?, place.number("phase")?];
+            let term = Harmonic { amplitude: 1.0, frequency, phase };
+            (frequency > 0.0).then(|| Drive::Harmonic { mean: 0.0, terms: vec![term] })
+        }
     };
+    let load = Load { on: place.points[0], force: vector("force")?, torque: vector("torque")?, axes, factor };
     place.must_act(load.force != Vec3::zeros() || load.torque != Vec3::zeros(), "force, torque")?;
     Ok(ElementKind::Load(load))
 }

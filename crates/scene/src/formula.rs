@@ -1,11 +1,12 @@
-//! Drive formulas: a prescribed coordinate as a function of time.
+//! Formulas of drives and loads: a prescribed coordinate or a factor as a function of time.
 
 use super::document::Node;
 use super::{Dimension, SceneError, parse_quantity};
 use jointplay_physics::expression::Program;
 use jointplay_physics::jet::Jet;
 
-/// Reads a drive formula in `t` for a coordinate of `dimension`; returns the compiled program and the size of its `unit`, SI.
+/// Reads a formula in `t` for a coordinate of `dimension`, or for a factor, which has none; returns the compiled program and the
+/// size of its `unit`, SI.
 pub(super) fn read_formula(
     node: &Node<'_>,
     unit: Option<&Node<'_>>,
@@ -19,9 +20,12 @@ pub(super) fn read_formula(
         .map_err(|error| within(node, text, error.at(), &error.to_string()))?;
     if let Some(function) = program.kink() {
         let at = text.find(function).unwrap_or(0);
+        let why = match dimension {
+            Dimension::None => "no step would end there",
+            _ => "a drive would need an infinite force there",
+        };
         let message = format!(
-            "`{function}` has no second derivative where it turns: a drive would need an infinite force there; \
-             smoothstep(x) rises smoothly from 0 to 1"
+            "`{function}` has no second derivative where it turns: {why}; smoothstep(x) rises smoothly from 0 to 1"
         );
         return Err(within(node, text, at, &message));
     }
@@ -40,7 +44,10 @@ pub(super) fn read_formula(
     let start = program.eval(&[Jet::new(0.0, 1.0, 0.0)]);
     let finite = [start.value, start.rate, start.acceleration].map(f64::is_finite);
     if finite != [true; 3] {
-        let what = ["position", "speed", "acceleration"];
+        let what = match dimension {
+            Dimension::None => ["value", "derivative", "second derivative"],
+            _ => ["position", "speed", "acceleration"],
+        };
         let lacks = finite.iter().position(|fine| !fine).unwrap_or(0);
         return Err(node.error(format!("has no finite {} at t = 0", what[lacks])));
     }

@@ -22,8 +22,8 @@ enum PointsFault {
     Count { count: usize, least: usize },
     #[error("{name}s must rise, by at least {least} from one point to the next")]
     NotRising { name: &'static str, least: &'static str },
-    #[error("repeats, so the last position must be the first")]
-    NotClosed,
+    #[error("repeats, so the last {0} must be the first")]
+    NotClosed(&'static str),
     #[error(
         "the first line must name the columns with their units, as in `{}`; units {}",
         header(*.0),
@@ -45,6 +45,7 @@ fn header(dimension: Dimension) -> &'static str {
         Dimension::Angle => "angle_deg",
         Dimension::Force => "force_N",
         Dimension::Torque => "torque [N m]",
+        Dimension::None => "factor",
         _ => "position_mm",
     }
 }
@@ -77,14 +78,11 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// A motion whose coordinate has this dimension.
+    /// A motion whose coordinate has this dimension, or a factor, which has none.
     pub fn motion(dimension: Dimension, repeats: bool) -> Self {
         let axis = |name, dimension| Axis { name, dimension, most: MAX_SI };
-        Self {
-            axes: [axis("time", Dimension::Time), axis("position", dimension)],
-            rise: (SHORTEST_PART, "1 us"),
-            repeats,
-        }
+        let value = if dimension == Dimension::None { "factor" } else { "position" };
+        Self { axes: [axis("time", Dimension::Time), axis(value, dimension)], rise: (SHORTEST_PART, "1 us"), repeats }
     }
 
     /// Checks that the latest point is far enough after the previous one.
@@ -119,7 +117,7 @@ pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, Scen
         let risen = graph.check_rise(&points);
         risen.map_err(|fault| x.error(fault.to_string()))?;
     }
-    let closed = close(&mut points, graph.repeats);
+    let closed = close(&mut points, graph);
     closed.map_err(|fault| node.error(fault.to_string()))?;
     Ok(points)
 }
@@ -175,7 +173,7 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
         let risen = graph.check_rise(&points);
         risen.map_err(|fault| file.error(x.clone(), "", None, fault.to_string()))?;
     }
-    let closed = close(&mut points, graph.repeats);
+    let closed = close(&mut points, graph);
     closed.map_err(|fault| node.error(fault.to_string()))?;
     Ok(points)
 }
@@ -202,9 +200,12 @@ struct Column<'t> {
 }
 
 impl<'t> Column<'t> {
-    /// Takes the unit from the header: in brackets, or after the last underscore.
+    /// Takes the unit from the header: in brackets, or after the last underscore. A pure number has none.
     fn new(header: &'t str, axis: Axis) -> Result<Self, PointsFault> {
         let dimension = axis.dimension;
+        if dimension == Dimension::None && header.parse::<f64>().is_err() {
+            return Ok(Self { header, unit: "", axis });
+        }
         let bracketed = |open: char, close: char| {
             let inner = header.strip_suffix(close)?;
             Some(inner.rsplit_once(open)?.1.trim())
@@ -229,18 +230,18 @@ impl<'t> Column<'t> {
 }
 
 /// Checks the number of points. The ends of a period must match, and are then made equal.
-fn close(points: &mut Points, repeats: bool) -> Result<(), PointsFault> {
-    let least = if repeats { 3 } else { 2 };
+fn close(points: &mut Points, graph: &Graph) -> Result<(), PointsFault> {
+    let least = if graph.repeats { 3 } else { 2 };
     if points.len() < least {
         let count = points.len();
         return Err(PointsFault::Count { count, least });
     }
-    if repeats {
+    if graph.repeats {
         let places = || points.iter().map(|point| point[1]);
         let range = places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
         let (first, last) = (points[0][1], points[points.len() - 1][1]);
         if !((last - first).abs() <= CLOSED * range) {
-            return Err(PointsFault::NotClosed);
+            return Err(PointsFault::NotClosed(graph.axes[1].name));
         }
         if let Some(end) = points.last_mut() {
             end[1] = first;

@@ -2,8 +2,8 @@
 
 use crate::expression::Program;
 
-/// Prescribed function of time, for a joint coordinate, a motor's target or a tyre's ground. On a hinge, lengths are angles (rad)
-/// and speeds angular speeds (rad/s).
+/// Prescribed function of time, for a joint coordinate, a motor's target, a tyre's ground or the factor of a load. On a hinge,
+/// lengths are angles (rad) and speeds angular speeds (rad/s); of a factor, they are pure numbers and numbers per second.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
     /// Coordinate of the machine's closed form, by index from 0.

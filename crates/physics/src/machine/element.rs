@@ -72,21 +72,19 @@ pub struct Spring {
     pub side: SpringSide,
 }
 
-/// An external load: constant if the frequency is 0, otherwise times sin(2 pi frequency t + phase).
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// An external load, constant or times a function of time.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     /// Point of application, on a body.
     pub on: Attachment,
-    /// Force at its point, N.
+    /// Force at its point where the factor is 1, N.
     pub force: Vec3,
-    /// Torque, N m.
+    /// Torque where the factor is 1, N m.
     pub torque: Vec3,
     /// Axes of both.
     pub axes: LoadAxes,
-    /// Frequency, Hz.
-    pub frequency: f64,
-    /// Phase, rad.
-    pub phase: f64,
+    /// Factor of both over time, a pure number; `None` for a constant load.
+    pub factor: Option<Drive>,
 }
 
 /// Force or torque on the child, towards lower coordinates: `elastic` + `damping` dq/dt.
@@ -283,13 +281,12 @@ impl Element {
     /// The time law that it follows, if any.
     pub fn law(&self) -> Option<&Drive> {
         match &self.kind {
+            ElementKind::Load(load) => load.factor.as_ref(),
             ElementKind::Motor(motor) => motor.target.as_ref(),
             ElementKind::Tyre(tyre) => tyre.ground.as_ref(),
-            ElementKind::Spring(_)
-            | ElementKind::Load(_)
-            | ElementKind::JointSpring(_)
-            | ElementKind::Stop(_)
-            | ElementKind::Bushing(_) => None,
+            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
+                None
+            }
         }
     }
 

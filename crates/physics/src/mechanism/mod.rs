@@ -375,8 +375,8 @@ impl Mechanism {
 
     /// Maximum step if the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
-        let loads = self.elements.iter().map(|element| element.period());
-        loads.fold(self.model.shortest_period, f64::min) / 50.0
+        let laws = self.elements.iter().filter_map(|element| element.law());
+        laws.map(|law| law.swing()).fold(self.model.shortest_period, f64::min) / 50.0
     }
 
     /// Whether derivatives of prescribed motions jump at ends of steps.
@@ -386,8 +386,8 @@ impl Mechanism {
 
     /// Latest end of an adaptive step that starts at `t`, s.
     pub fn step_end(&self, t: f64) -> f64 {
-        let of_elements = self.elements.iter().map(|element| element.step_end(t));
-        of_elements.fold(self.model.step_end(t), f64::min)
+        let laws = self.elements.iter().filter_map(|element| element.law());
+        laws.map(|law| law.step_end(t)).fold(self.model.step_end(t), f64::min)
     }
 
     /// If the motion is a function of time alone: whether the determinant of the loops' Jacobian is positive. Its sign changes

@@ -17,9 +17,9 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use crate::jet::Jet;
-use crate::machine::{Drive, ElementKind, Joint, Machine};
+use crate::machine::{Drive, Joint, Machine};
 
-/// A coordinate, m or rad, as a function of time, s. Allocates nothing.
+/// A coordinate, m or rad, or a factor as a function of time, s. Allocates nothing.
 pub trait Law: Debug + Send + Sync {
     /// Coordinate, rate and acceleration at `t`. The rate is continuous.
     fn at(&self, t: f64) -> Jet;
@@ -78,20 +78,16 @@ pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
     })
 }
 
-/// Periods of joint drives, of the drive laws of force elements and of loads, s; infinite if one does not repeat or nothing
-/// moves.
+/// Periods of joint drives and of the time laws of force elements, s; infinite if one does not repeat or nothing moves.
 pub fn periods_of(machine: &Machine) -> impl Iterator<Item = f64> {
     let drives = machine.joints.iter().flat_map(Joint::drives);
     let of_drives = drives.map(|(freedom, drive)| {
         let trajectory = trajectory_of(drive, freedom.turns());
         trajectory.law().map_or_else(|| closed_period(machine), |law| law.period())
     });
-    let of_elements = machine.elements.iter().map(|element| match &element.kind {
-        ElementKind::Load(load) => 1.0 / load.frequency,
-        _ => element.law().map_or(f64::INFINITY, |law| {
-            let trajectory = trajectory_of(law, element.is_on_hinge());
-            trajectory.law().map_or(f64::INFINITY, |law| law.period())
-        }),
+    let of_elements = machine.elements.iter().filter_map(|element| {
+        let trajectory = trajectory_of(element.law()?, element.is_on_hinge());
+        Some(trajectory.law().map_or(f64::INFINITY, |law| law.period()))
     });
     of_drives.chain(of_elements)
 }

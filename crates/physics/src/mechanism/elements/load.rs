@@ -1,8 +1,11 @@
-//! External force and torque on a body, constant or harmonic, in world or body axes.
+//! External force and torque on a body, constant or times a function of time, in world or body axes.
 
-use super::{At, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use std::sync::Arc;
+
+use super::{At, ElementReport, ForceElement, Loads, SceneElement, law_of, point_of, push};
 use crate::machine::{self, LoadAxes, Vec3};
 use crate::mechanism::Powers;
+use crate::mechanism::drives::Law;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 
@@ -11,9 +14,7 @@ struct Load {
     force: Vec3,
     torque: Vec3,
     turns: bool,
-    /// Angular frequency, rad/s; 0 for a constant load.
-    omega: f64,
-    phase: f64,
+    factor: Option<Arc<dyn Law>>,
 }
 
 pub(super) fn make(load: &machine::Load, on: Anchor) -> Box<dyn SceneElement> {
@@ -22,16 +23,15 @@ pub(super) fn make(load: &machine::Load, on: Anchor) -> Box<dyn SceneElement> {
         force: load.force,
         torque: load.torque,
         turns: load.axes == LoadAxes::Body,
-        omega: std::f64::consts::TAU * load.frequency,
-        phase: load.phase,
+        factor: law_of(load.factor.as_ref(), false),
     })
 }
 
 impl Load {
     /// Force and torque at `t`, world axes.
     fn at(&self, t: f64, motion: &[Kinematics]) -> (Vec3, Vec3) {
-        let size = if self.omega > 0.0 { libm::sin(self.omega * t + self.phase) } else { 1.0 };
-        let (force, torque) = (self.force * size, self.torque * size);
+        let factor = self.factor.as_ref().map_or(1.0, |law| law.at(t).value);
+        let (force, torque) = (self.force * factor, self.torque * factor);
         if self.turns {
             let rotation = &motion[self.on.body].rotation;
             (rotation * force, rotation * torque)
@@ -59,8 +59,8 @@ impl ForceElement for Load {
 }
 
 impl SceneElement for Load {
-    fn period(&self) -> f64 {
-        std::f64::consts::TAU / self.omega
+    fn law(&self) -> Option<&Arc<dyn Law>> {
+        self.factor.as_ref()
     }
 
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {

@@ -230,14 +230,9 @@ pub(super) trait ForceElement: Send {
 
 /// An element of the scene's own list. Ball joints are reported as joints instead, with or without clearance.
 pub(super) trait SceneElement: ForceElement {
-    /// Period of its explicit time dependence, s; infinite if it has none.
-    fn period(&self) -> f64 {
-        f64::INFINITY
-    }
-
-    /// Latest end of an adaptive step that starts at `t`, s, to resolve features of its time law.
-    fn step_end(&self, _t: f64) -> f64 {
-        f64::INFINITY
+    /// Its explicit dependence on time, if any.
+    fn law(&self) -> Option<&Arc<dyn Law>> {
+        None
     }
 
     /// Depth of contact, and the smaller of that and an indicator that falls to 0 when contact is lost while still compressed; in

@@ -80,14 +80,8 @@ impl ForceElement for Motor {
 }
 
 impl SceneElement for Motor {
-    fn period(&self) -> f64 {
-        let swing = |law: &Arc<dyn Law>| law.swing();
-        self.target.as_ref().map_or(f64::INFINITY, swing)
-    }
-
-    fn step_end(&self, t: f64) -> f64 {
-        let end = |law: &Arc<dyn Law>| law.step_end(t);
-        self.target.as_ref().map_or(f64::INFINITY, end)
+    fn law(&self) -> Option<&Arc<dyn Law>> {
+        self.target.as_ref()
     }
 
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {

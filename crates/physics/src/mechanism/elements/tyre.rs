@@ -103,14 +103,8 @@ impl ForceElement for Tyre {
 }
 
 impl SceneElement for Tyre {
-    fn period(&self) -> f64 {
-        let swing = |law: &Arc<dyn Law>| law.swing();
-        self.ground.as_ref().map_or(f64::INFINITY, swing)
-    }
-
-    fn step_end(&self, t: f64) -> f64 {
-        let end = |law: &Arc<dyn Law>| law.step_end(t);
-        self.ground.as_ref().map_or(f64::INFINITY, end)
+    fn law(&self) -> Option<&Arc<dyn Law>> {
+        self.ground.as_ref()
     }
 
     /// Contact is lost where k d + c dd/dt falls to 0.
