@@ -169,7 +169,8 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
         ValueType::Pairs([first, second], many) => {
             format!("list of pairs, {} and {}, at most {}", dimension(first), number(second), many.most)
         }
-        ValueType::Files(_) => "list of names of files".to_owned(),
+        ValueType::Files(of, _) => format!("list of names of files, or {}", called(of)),
+        ValueType::Values => "table of quantities".to_owned(),
     }
 }
 

@@ -180,7 +180,10 @@ fn of_value(key: &FileKey) -> Json {
                 "type": "array", "items": [part(first), part(second)], "minItems": 2, "maxItems": 2
             }))
         }
-        ValueType::Files(_) => list(text()),
+        ValueType::Files(of, _) => list(json!({ "anyOf": [text(), reference(of)] })),
+        ValueType::Values => {
+            json!({ "type": "object", "additionalProperties": { "type": ["string", "number"] } })
+        }
     }
 }
 

@@ -15,7 +15,14 @@ use crate::scene_corpus::{Numbers, mutate};
 use toml_edit::{DocumentMut, Item, Value};
 
 /// A scene with a file beside it for each key that names one.
-const WITH_FILES: &str = r##"include = ["leg.toml"]
+const WITH_FILES: &str = r##"include = [
+    "leg.toml",
+    { file = "arm.toml", name = "left", values = { weight = "2 kg" }, position = "0 0 1 m", rotation = { axis = [1, 0, 0], angle = "9 deg" } },
+]
+[[joint]]
+name = "left"
+kind = "fixed"
+child = "left.leg"
 [[joint]]
 name = "j"
 kind = "prismatic"
@@ -56,10 +63,11 @@ rotation = { axis = [1, 0, 0], angle = "90 deg" }
 "##;
 
 fn beside() -> Texts {
-    let leg = "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n";
+    let leg = "[[parameter]]\nname = \"weight\"\nvalue = \"1 kg\"\n[[body]]\nname = \"leg\"\nmass = \"weight\"\ninertia = \"1 1 1 kg m^2\"\n";
     let corner = "solid corner\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\nendloop\nendfacet\nendsolid corner\n";
     let files = [
         ("leg.toml", leg),
+        ("arm.toml", leg),
         ("bump.csv", "t_s,z_mm\n0,0\n1,1\n"),
         ("coil.csv", "length_mm,force_N\n-1,-5\n0,0\n1,8\n"),
         ("pull.csv", "t_s,factor\n0,0\n1,1\n"),
@@ -138,12 +146,15 @@ impl Found {
             self.keys.push((path.clone(), row, word));
             match row.takes {
                 ValueType::Table(rows) => self.walk(inner, rows, path),
-                ValueType::List(rows, _) => {
+                ValueType::List(rows, _) | ValueType::Files(rows, _) => {
                     let count = inner.as_array().map(|list| list.len());
                     let count = count.or_else(|| Some(inner.as_array_of_tables()?.len()));
                     for place in 0..count.expect("a list") {
                         let path = [&path[..], &[Step::Place(place)]].concat();
-                        self.walk(&inner[place], rows, path);
+                        // A name of a file has no keys.
+                        if !inner[place].is_str() {
+                            self.walk(&inner[place], rows, path);
+                        }
                     }
                 }
                 _ => {}

@@ -89,11 +89,13 @@ impl Scene {
         if balls.iter().any(|joint| joint.name == name) {
             return format!("unknown key{}", nearest(part, parts.iter().copied()));
         }
-        let first = name.split('.').next().unwrap_or(name);
-        let mut others = self.machine.joints.iter().chain(&self.machine.closing_joints);
-        if !others.any(|joint| joint.name == first) {
+        // The name of a joint in an included file has dots.
+        let begins = |joint: &&Joint| {
+            name.strip_prefix(&*joint.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let Some(first) = self.machine.kinematic_joints().find(begins).map(|joint| &*joint.name) else {
             return no_ball_joint(name, balls);
-        }
+        };
         // Its numbers are keys only if they are in the file.
         let own = format!("joint.{first}.");
         let given: Vec<&str> = numbers.filter(|key| key.starts_with(&own)).collect();

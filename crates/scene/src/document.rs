@@ -3,9 +3,10 @@
 use super::assets::AssetResolver;
 use super::error::place_of;
 use super::given::{FileNumber, Place};
+use super::include::Include;
+use super::instance::Instance;
 use super::key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, MAX_SI, ValueType, Variants};
 use super::parameters::{Kind, ValueFault};
-use super::pattern_instance::PatternInstance;
 use super::reading::Reading;
 use super::visible::visible_line;
 use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
@@ -13,6 +14,7 @@ use jointplay_physics::suggest::{brief, nearest};
 use jointplay_physics::units::{all_units, same_unit, split_unit};
 use jointplay_physics::words::Words;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -28,10 +30,10 @@ pub(super) struct Document<'d> {
     pub file: Option<&'d str>,
     pub text: &'d str,
     pub reading: &'d Reading<'d>,
-    /// Whether another file includes it.
-    pub included: bool,
-    /// Pattern copy that the values belong to.
-    pub copy: Option<&'d PatternInstance>,
+    /// How another file includes it, if one does.
+    pub include: Option<&'d Include<'d>>,
+    /// Innermost group that the values belong to, if any.
+    pub instance: Option<&'d Instance<'d>>,
     /// Whether the values belong to a hinge, which changes some dimensions.
     pub on_hinge: bool,
     /// Resolver of the files it names.
@@ -324,7 +326,7 @@ impl<'d> Node<'d> {
     /// Location of this value in the scene's text.
     fn place_of(&self, here: fn(Range<usize>) -> Place) -> Place {
         match &self.written {
-            _ if self.document.included => Place::Included,
+            _ if self.document.include.is_some() => Place::Included,
             Some(written) => here(written.clone()),
             None => Place::DefaultRule,
         }
@@ -334,7 +336,7 @@ impl<'d> Node<'d> {
     fn evaluated(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
         let reading = self.document.reading;
         let value =
-            reading.evaluate(text, dimension, self.document.copy).map_err(|error| self.error(error.to_string()))?;
+            reading.evaluate(text, dimension, self.document.instance).map_err(|error| self.error(error.to_string()))?;
         self.limit(value, dimension)?;
         reading.record(&self.key, FileNumber::new(value, dimension, place, text));
         Ok(value)
@@ -405,7 +407,7 @@ impl<'d> Node<'d> {
             _ => (0, u32::MAX),
         };
         let allowed = format!("allowed {least} to {most}; a whole number, no unit");
-        let number = self.document.reading.evaluate(self.scalar()?, Dimension::None, self.document.copy);
+        let number = self.document.reading.evaluate(self.scalar()?, Dimension::None, self.document.instance);
         let number = number.map_err(|why| self.error(format!("{why}; {allowed}")))?;
         if number.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&number) {
             return Ok(number as u32);
@@ -433,35 +435,45 @@ impl<'d> Node<'d> {
         Ok(T::of_word(word).expect("the row has the words of the enum"))
     }
 
-    /// A name: letters, digits, `_` and `-`, because keys and column names are built from it; numbered in a pattern copy.
+    /// A name: letters, digits, `_` and `-`, because keys and column names are built from it; in full, with the number of
+    /// a pattern copy and after the name of an included file.
     pub fn name(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
         let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
         if !name.is_empty() && name.len() <= 40 && name.chars().all(fine) {
-            return Ok(self.numbered(name));
+            return Ok(self.full(name));
         }
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
     }
 
-    /// The name of a body, numbered in a copy of a pattern that has this body.
+    /// The full name of a body: numbered in a copy of a pattern that has it, after the name of an included file that has it.
     pub fn body(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
-        let copy = self.document.copy;
-        Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.body(name)))
+        Ok(self.document.instance.map_or(Cow::Borrowed(name), |instance| instance.body(name)))
     }
 
-    /// The name of a joint, numbered like [`Self::body`].
+    /// The full name of a joint, like [`Self::body`].
     pub fn joint(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
-        let copy = self.document.copy;
-        Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.joint(name)))
+        Ok(self.document.instance.map_or(Cow::Borrowed(name), |instance| instance.joint(name)))
     }
 
-    fn numbered(&self, name: &'d str) -> Cow<'d, str> {
-        match self.document.copy {
-            Some(copy) => Cow::Owned(copy.name(name)),
+    /// Full name of a part that the text here calls `name`.
+    fn full(&self, name: &'d str) -> Cow<'d, str> {
+        match self.document.instance {
+            Some(instance) => Cow::Owned(instance.name(name)),
             None => Cow::Borrowed(name),
         }
+    }
+
+    /// The values of a table with any names.
+    pub fn named_values(&self) -> Result<BTreeMap<&'d str, Node<'d>>, SceneError> {
+        let table = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        let node = |(name, value): (&'d Spanned<Cow<'d, str>>, &'d Spanned<DeValue<'d>>)| {
+            let name = &**name.get_ref();
+            Some((name, Node::new(self.document, format!("{}.{name}", self.key), self.row, Some(value))?))
+        };
+        Ok(table.iter().filter_map(node).collect())
     }
 
     /// The entries of a list, like [`Self::elements`], limited in number by its row.
@@ -574,7 +586,7 @@ impl<'d> Node<'d> {
     /// Path of the table's keys: `prefix` and its name, or its array index if it has none.
     pub fn title(&self, prefix: &str) -> String {
         let name = self.value.get_ref().get("name").and_then(|name| name.get_ref().as_str());
-        let title = |name| format!("{prefix}.{}", self.numbered(name));
+        let title = |name| format!("{prefix}.{}", self.full(name));
         name.map_or_else(|| self.key.clone(), title)
     }
 
@@ -594,7 +606,7 @@ impl<'d> Node<'d> {
         match read {
             Err(error) if matches!(error.fault, ValueFault::Quantity(_)) => {
                 // Not a quantity: it may be an expression.
-                let value = self.document.reading.evaluate(text, dimension, self.document.copy);
+                let value = self.document.reading.evaluate(text, dimension, self.document.instance);
                 let value = value.map_err(|why| self.error(format!("{why}; {}", error.allowed)))?;
                 let value = super::Value::Number(value);
                 let checked = parameter.check(&value);

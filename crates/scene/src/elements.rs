@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 
 use super::document::{Node, Section};
 use super::drives::{DRIVE, FACTOR, FASTEST_DRIVE, read_drive};
+use super::instance::Instance;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, key, many, number};
-use super::pattern_instance::PatternInstance;
 use super::placement::{ATTACHMENT, ROTATION, read_attachment, read_rotation};
 use super::points::{Axis, Graph, MOST_POINTS, read_file, read_points};
 use super::read_joints::read_coordinate;
@@ -157,7 +157,7 @@ static LOAD: LazyLock<FileTable> = LazyLock::new(|| {
     FileTable::new(
         "load",
         "[[load]]",
-        "force and torque from outside on a body, constant, times sin(2π frequency t + phase), or times another function of time",
+        "force and torque from outside on a body, constant, times sin(2π frequency t + phase), or times another law of time",
         vec![
             NAME,
             point("on"),
@@ -357,12 +357,15 @@ impl Place<'_, '_> {
         node.map(|node| read_drive(&node, self.on_hinge(), self.scene)).transpose()
     }
 
-    /// The pattern copy being read, unless attachment `place` (0 or 1) is on a body of that copy.
-    fn copy_outside(&self, place: usize) -> Option<&PatternInstance> {
-        let copy = self.section.document.copy?;
-        let body = self.points.get(place).and_then(|point| point.body);
-        let own = body.is_some_and(|body| copy.made(&self.scene.machine.bodies[body].name));
-        (!own).then_some(copy)
+    /// Name of the body of attachment `place` (0 or 1); `None` for the world.
+    fn body(&self, place: usize) -> Option<&str> {
+        let body = self.points.get(place)?.body?;
+        Some(&self.scene.machine.bodies[body].name)
+    }
+
+    /// The group that the element belongs to, if any.
+    fn instance(&self) -> Option<&Instance<'_>> {
+        self.section.document.instance
     }
 
     /// Elastic law of a spring: a line, or a curve whose `axes` have these names and dimensions.
@@ -429,14 +432,13 @@ fn read_spring(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
 
 fn read_load(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
     let axes = place.word("axes")?;
-    // A vector in axes outside the pattern rotates with the copies.
-    let copy = match axes {
-        LoadAxes::World => place.section.document.copy,
-        LoadAxes::Body => place.copy_outside(0),
+    let frame = match axes {
+        LoadAxes::World => None,
+        LoadAxes::Body => place.body(0),
     };
     let vector = |name: &str| {
         let vector = place.section.vector(name)?;
-        Ok(copy.map_or(vector, |copy| copy.direction(vector)))
+        Ok(place.instance().map_or(vector, |instance| instance.direction(frame, vector)))
     };
     let factor = match place.law("factor")? {
         Some(law) => {
@@ -507,22 +509,17 @@ fn read_bushing(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
     let vector = |name: &str| place.section.vector(name);
     let [stiffness, damping] = [vector("stiffness")?, vector("damping")?];
     let [turning_stiffness, turning_damping] = [vector("turning_stiffness")?, vector("turning_damping")?];
-    // An orientation relative to a body outside the pattern rotates with the copies; a translation does not change it.
-    let outside = |at| place.copy_outside(at).filter(|copy| !copy.keeps_axes());
-    if outside(0).is_none() && outside(1).is_some() {
-        let why = "a body outside the pattern does not turn with its copies: make it that of `from`";
-        return Err(place.section.error("to", why));
-    }
     let rotation = |name: &str| -> Result<Quat, SceneError> {
         let rotation = read_rotation(place.section.get(name))?;
-        Ok(outside(0).map_or(rotation, |copy| copy.rotation(rotation)))
+        Ok(place.instance().map_or(rotation, |instance| instance.rotation(place.body(0), rotation)))
     };
     let [from, to] = place.two_points();
+    let rest = rotation("rotation")?;
     let bushing = Bushing {
         from,
         to,
         axes: rotation("axes")?,
-        rotation: rotation("rotation")?,
+        rotation: place.instance().map_or(rest, |instance| instance.rotation_of(place.body(1), rest)),
         stiffness,
         damping,
         turning_stiffness,
@@ -564,13 +561,18 @@ fn read_tyre(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
             place.section.error("up", why)
         })?,
     };
-    let own = place.section.get("up").and(place.section.document.copy);
+    // Against gravity, it does not turn with the scene.
+    let up = match (place.section.get("up"), place.instance()) {
+        (Some(_), Some(instance)) => instance.direction(None, up),
+        _ => up,
+    };
     let tyre = Tyre {
         on: place.points[0],
         radius: place.number("radius")?,
         stiffness: place.number("stiffness")?,
         damping: place.number("damping")?,
-        up: own.map_or(up, |copy| copy.direction(up)),
+        up,
+        height: place.instance().map_or(0.0, |instance| up.dot(&instance.point(None, Vec3::zeros()))),
         ground: place.law("ground")?,
     };
     place.must_act(tyre.stiffness != 0.0, "stiffness")?;

@@ -81,20 +81,56 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
         ),
         key(
             "include",
-            ValueType::Files(many(MOST_FILES, "files")),
+            ValueType::Files(&INCLUDE, many(MOST_FILES, "files")),
             "[\"leg.toml\"]",
             "files beside this one, whose lists are added to the scene",
         ),
     ]
     .map(|key| key.absent("none"));
+    let place = place("the scene");
     let joints =
         [list_of(&JOINT_CONTACT, many(MOST_BALL_JOINTS, "ball joints"), "{ name = \"J2\", clearance = \"0.1 mm\" }")];
     FileTable::new(
         "scene",
         "the file",
         "a machine, and how it is simulated and shown",
-        joined(&[&names, &sections, &others, &lists(), &joints]),
+        joined(&[&names, &sections, &place, &others, &lists(), &joints]),
     )
+});
+
+/// Where the scene or an included file lies.
+fn place(what: &str) -> [FileKey; 2] {
+    let help = |text: String| -> &'static str { text.leak() };
+    [
+        key(
+            "position",
+            vector(D::Length),
+            "\"0 0 100 mm\"",
+            help(format!("by which {what} is shifted, after its turn; gravity is not changed")),
+        )
+        .zero()
+        .frame(WORLD),
+        key(
+            "rotation",
+            ValueType::Table(&ROTATION),
+            "{ axis = [0, 0, 1], angle = \"90 deg\" }",
+            help(format!("by which {what} is turned about the world's origin; gravity is not changed")),
+        )
+        .zero()
+        .frame(WORLD),
+    ]
+}
+
+static INCLUDE: LazyLock<FileTable> = LazyLock::new(|| {
+    let own = [
+        key("file", ValueType::File, "\"leg.toml\"", "the file, beside this one"),
+        key("name", ValueType::Name, "\"left\"", "begins the names of its parts: `leg` becomes `left.leg`")
+            .absent("names stay as in the file"),
+        key("values", ValueType::Values, "{ length = \"0.3 m\" }", "values of its parameters, by their names in it")
+            .absent("as in the file"),
+    ];
+    let keys = joined(&[&own, &place("the file")]);
+    FileTable::new("include", "[[include]]", "a file whose lists are added to the scene", keys)
 });
 
 /// Top-level table of an included file.

@@ -16,7 +16,7 @@ pub(super) fn read_formula(
     let document = node.document;
     let (program, of_quantities) = document
         .reading
-        .formula(text, dimension, document.copy)
+        .formula(text, dimension, document.instance)
         .map_err(|error| within(node, text, error.at(), &error.to_string()))?;
     if let Some(function) = program.kink() {
         let at = text.find(function).unwrap_or(0);

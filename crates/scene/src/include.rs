@@ -1,37 +1,153 @@
-//! Files included by a scene file: `include = ["leg.toml"]`.
+//! Files included by a scene file: `include = ["leg.toml"]`, or with a name, values and a place, as `[[include]]`.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
-use super::document::{Document, Section};
+use super::document::{Document, Node, Section, lists};
 use super::format::{FILE, INCLUDED};
+use super::instance::{Group, Instance, Names, PREVIOUS, Placement};
+use super::placement::read_placement;
 use super::*;
+use jointplay_physics::suggest::nearest;
 
-/// Names and texts of the files included by `top`, in the order listed.
-///
-/// # Errors
-/// `include` is not a list of names, lists a file twice or names the scene's own file, or a file cannot be read.
-pub(super) fn included_texts<'d>(top: &Section<'d>) -> Result<Vec<(&'d str, Arc<str>)>, SceneError> {
-    let mut texts: Vec<(&str, Arc<str>)> = Vec::new();
-    let nodes = top.get("include").map(|node| node.entries());
-    for node in nodes.transpose()?.unwrap_or_default() {
-        let name = node.text()?;
-        if texts.iter().any(|(other, _)| *other == name) {
-            return Err(node.error("this file is included already"));
-        }
-        let text = node.document.beside.text(name).map_err(|fault| node.error(fault.to_string()))?;
-        if *text == *node.document.text {
-            return Err(node.error("this is the scene's own file, which cannot include itself; name another or none"));
-        }
-        texts.push((name, text));
-    }
-    Ok(texts)
+/// An included file.
+pub(super) struct Include<'d> {
+    /// Its name, and that of its parts in the scene; the second is empty if they keep theirs.
+    pub file: &'d str,
+    prefix: String,
+    pub text: Arc<str>,
+    /// Its entry, if that is a table.
+    entry: Option<Section<'d>>,
+    /// Values of its parameters, by name.
+    pub values: BTreeMap<&'d str, Node<'d>>,
 }
 
-/// The document of an included file.
-pub(super) fn document<'d>(of: Document<'d>, name: &'d str, text: &'d str) -> Document<'d> {
-    Document { file: Some(name), text, included: true, ..of }
+/// Reads the list of files that `top` includes.
+///
+/// # Errors
+/// An invalid entry, a file that is listed twice without names, the scene's own file, or a file that cannot be read.
+pub(super) fn read_includes<'d>(top: &Section<'d>) -> Result<Vec<Include<'d>>, SceneError> {
+    let mut includes: Vec<Include<'d>> = Vec::new();
+    let nodes = top.get("include").map(|node| node.entries());
+    for node in nodes.transpose()?.unwrap_or_default() {
+        let entry = match node.value.get_ref() {
+            DeValue::String(_) => None,
+            _ => Some(node.section_as(node.title("include"))?),
+        };
+        let file = entry.as_ref().map_or(Ok(node.clone()), |entry| entry.require("file"))?;
+        let name = entry.as_ref().and_then(|entry| entry.get("name"));
+        let prefix = name.as_ref().map_or(Ok(String::new()), read_prefix)?;
+        if let Some(other) = includes.iter().find(|other| other.file == file.text().unwrap_or_default())
+            && (other.prefix.is_empty() || prefix.is_empty())
+        {
+            return Err(
+                file.error("this file is included already; a file that is included twice needs a `name` each time")
+            );
+        }
+        let first = includes.iter().filter(|_| !prefix.is_empty()).find(|other| other.prefix == prefix);
+        if let (Some(node), Some(first)) = (&name, first.and_then(|first| first.entry.as_ref()?.get("name"))) {
+            return Err(node.repeats(&first, "file", node.text()?));
+        }
+        let text = file.document.beside.text(file.text()?).map_err(|fault| file.error(fault.to_string()))?;
+        if *text == *node.document.text {
+            return Err(file.error("this is the scene's own file, which cannot include itself; name another or none"));
+        }
+        let values = entry.as_ref().and_then(|entry| entry.get("values"));
+        let values = values.map_or(Ok(BTreeMap::new()), |node| node.named_values())?;
+        includes.push(Include { file: file.text()?, prefix, text, entry, values });
+    }
+    Ok(includes)
+}
+
+/// Beginning of the names in a file with this `name`.
+fn read_prefix(name: &Node<'_>) -> Result<String, SceneError> {
+    let own = name.name()?;
+    let reserved = *own == *"world" || PREVIOUS.strip_suffix('.') == Some(&*own) || FILE.key(&own, None).is_some();
+    match reserved {
+        true => Err(name.error("is a word of scene files; choose another name")),
+        false => Ok(format!("{own}.")),
+    }
+}
+
+impl<'d> Include<'d> {
+    /// The document of the file.
+    pub fn document(&'d self, of: Document<'d>) -> Document<'d> {
+        Document { file: Some(self.file), text: &self.text, include: Some(self), ..of }
+    }
+
+    /// The group of its parts, not yet placed; `None` if the scene names the file and nothing more.
+    pub fn named(&self, parsed: &Spanned<DeTable<'_>>) -> Option<Instance<'d>> {
+        self.entry.as_ref()?;
+        let names = Arc::new(names_of(parsed.get_ref()));
+        let group = Group::File { prefix: self.prefix.clone(), names };
+        Some(Instance { group, placement: Placement::identity(), outer: None })
+    }
+
+    /// The group `named` at its place in the `outer` one.
+    ///
+    /// # Errors
+    /// An invalid place.
+    pub fn placed(
+        &self,
+        named: Option<&Instance<'d>>,
+        outer: Option<&'d Instance<'d>>,
+    ) -> Result<Option<Instance<'d>>, SceneError> {
+        let (Some(named), Some(entry)) = (named, &self.entry) else {
+            return Ok(outer.cloned());
+        };
+        let placement = read_placement(entry)?.unwrap_or(Placement::identity());
+        Ok(Some(Instance { group: named.group.clone(), placement, outer }))
+    }
+
+    /// Checks that every value is one of the parameters in `file`, its section.
+    ///
+    /// # Errors
+    /// A value for no parameter.
+    pub fn check_values(&self, file: &Section<'d>) -> Result<(), SceneError> {
+        let nodes = lists(std::slice::from_ref(file), "parameter", Vec::new())?;
+        let named = |node: &Node<'d>| node.value.get_ref().get("name")?.get_ref().as_str();
+        let names: Vec<&str> = nodes.iter().filter_map(named).collect();
+        let unknown = self.values.iter().filter(|(name, _)| !names.contains(name));
+        match unknown.min_by_key(|(_, node)| node.place()) {
+            None => Ok(()),
+            Some((name, node)) => {
+                let near = nearest(name, names.iter().copied());
+                let file = visible_line(self.file);
+                let allowed = match names.is_empty() {
+                    true => "it has none".to_owned(),
+                    false => format!("allowed {}", names.join(", ")),
+                };
+                Err(node.error(format!("is no parameter of {file}{near}; {allowed}")))
+            }
+        }
+    }
+}
+
+/// Names of bodies and joints in a file.
+fn names_of(table: &DeTable<'_>) -> Names {
+    let mut names = Names::default();
+    add_names(table, &mut names.bodies, &mut names.joints);
+    for pattern in tables(table, "pattern") {
+        let (mut bodies, mut joints) = Default::default();
+        add_names(pattern, &mut bodies, &mut joints);
+        names.repeated.extend(bodies.into_iter().chain(joints));
+    }
+    names
+}
+
+/// Adds the names of the bodies and joints in the lists of `table`.
+pub(super) fn add_names(table: &DeTable<'_>, bodies: &mut BTreeSet<String>, joints: &mut BTreeSet<String>) {
+    let named = |list| tables(table, list).filter_map(|entry| entry.get("name")?.get_ref().as_str()).map(str::to_owned);
+    bodies.extend(named("body"));
+    joints.extend(named("joint").chain(named("ball_joint")));
+}
+
+/// Tables in the list `name` of `table`.
+fn tables<'a>(table: &'a DeTable<'_>, name: &str) -> impl Iterator<Item = &'a DeTable<'a>> {
+    let list = table.get(name).and_then(|list| list.get_ref().as_array());
+    list.into_iter().flat_map(|list| list.iter()).filter_map(|entry| entry.get_ref().as_table())
 }
 
 /// Top-level section of an included file.

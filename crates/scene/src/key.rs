@@ -105,8 +105,10 @@ pub enum ValueType {
     Vectors(Dimension, ListLimit),
     /// A list of pairs of quantities.
     Pairs([Dimension; 2], ListLimit),
-    /// A list of file names, beside the scene.
-    Files(ListLimit),
+    /// A list of file names, beside the scene, or of tables that name them.
+    Files(&'static FileTable, ListLimit),
+    /// A table of quantities of any dimension, by any names.
+    Values,
 }
 
 /// Maximum length of a list, and the noun for its entries.
@@ -245,7 +247,7 @@ impl FileKey {
     /// Table of its value, or of the entries of its list.
     pub fn table(&self) -> Option<&'static FileTable> {
         match self.takes {
-            ValueType::Table(table) | ValueType::List(table, _) => Some(table),
+            ValueType::Table(table) | ValueType::List(table, _) | ValueType::Files(table, _) => Some(table),
             _ => None,
         }
     }
@@ -285,7 +287,7 @@ impl FileKey {
             | ValueType::Vectors(_, many)
             | ValueType::Pairs(_, many)
             | ValueType::Words(_, many)
-            | ValueType::Files(many) => Some(many),
+            | ValueType::Files(_, many) => Some(many),
             _ => None,
         }
     }

@@ -1,6 +1,8 @@
 //! User-defined parameters of a scene file.
 
 use super::document::{Node, Section, lists};
+use super::error::place_of;
+use super::instance::Instance;
 use super::numbers::{LARGEST, row_of_file};
 use super::*;
 use jointplay_physics::units::{all_units, same_unit, split_unit};
@@ -11,6 +13,9 @@ use jointplay_physics::units::{all_units, same_unit, split_unit};
 /// An invalid or repeated parameter.
 pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>, SceneError> {
     let mut all: Vec<(&Parameter, bool)> = Vec::new();
+    for file in files {
+        file.document.include.map_or(Ok(()), |include| include.check_values(file))?;
+    }
     let nodes = lists(files, "parameter", Vec::new())?;
     for (i, node) in nodes.iter().enumerate() {
         let own = read_parameter(node, files[0].rows)
@@ -28,7 +33,7 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>,
 
 /// The error for a value that uses a parameter defined later; `None` if it uses none.
 fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
-    let named = |node: &Node<'_>| Some(node.section().ok()?.require("name").ok()?.name().ok()?.to_string());
+    let named = |node: &Node<'_>| Some(node.section().ok()?.require("name").ok()?.text().ok()?.to_owned());
     let value = node.section_as(node.title("parameter")).ok()?.require("value").ok()?;
     let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let words: Vec<&str> = value.scalar().ok()?.split(|c| !letters(c)).collect();
@@ -39,11 +44,13 @@ fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
 /// Reads a `[[parameter]]` of a file with the keys `file`: its row, and whether it is adjustable.
 fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Parameter, bool), SceneError> {
     let title = node.title("parameter");
+    let document = node.document;
     let section = node.section_as(title.clone())?;
     let name_node = section.require("name")?;
-    let name = name_node.name()?;
+    let full = name_node.name()?;
+    let name = name_node.text()?;
     let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let reserved = ["i", "pi", "e", "t"].contains(&&*name)
+    let reserved = ["i", "pi", "e", "t"].contains(&name)
         || all_units().any(|(unit, ..)| unit == name)
         || name.starts_with(|c: char| c.is_ascii_digit());
     if reserved || !name.chars().all(letters) {
@@ -52,11 +59,14 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
              pi, e, t or a unit",
         ));
     }
-    let value_node = section.require("value")?;
+    let own_node = section.require("value")?;
+    let passed = document.include.and_then(|include| include.values.get(name));
+    let value_node = passed.unwrap_or(&own_node);
     let text = value_node.scalar()?;
     let unit = section.get("unit").map(|node| node.text()).transpose()?;
-    // The dimension is that of `unit`, or else of the unit written in the value.
-    let wanted = unit.unwrap_or_else(|| split_unit(text));
+    // The dimension is that of `unit`, or else of the unit written in the value of this file.
+    let own_text = own_node.scalar()?;
+    let wanted = unit.unwrap_or_else(|| split_unit(own_text));
     let found = all_units().find(|(of, ..)| same_unit(of, wanted));
     let (unit, dimension) = match found {
         Some((unit, dimension, _)) => (unit, dimension),
@@ -65,14 +75,16 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
             let (at, key) = match section.get("unit") {
                 Some(node) => (node, "unknown unit"),
                 None => (
-                    value_node,
+                    own_node,
                     "its unit cannot be told from an expression: give it with `unit`, for example `unit = \"mm\"`",
                 ),
             };
             return Err(at.error(key));
         }
     };
-    let key = section.get("key").map_or(Ok(title.clone()), |node| read_key(&node, file))?;
+    let prefix = document.instance.map_or("", Instance::prefix);
+    let key = section.get("key").map(|node| Ok(format!("{prefix}{}", read_key(&node, file)?)));
+    let key = key.unwrap_or(Ok(title))?;
     let whole = section.get("whole").map_or(Ok(false), |node| node.flag())?;
     if let (true, Some(node), false) = (whole, section.get("whole"), dimension == Dimension::None) {
         return Err(node.error("a whole number has no unit"));
@@ -80,7 +92,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let value_node = value_node.retitled(key.clone());
     let value = value_node.quantity(dimension)?;
     let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
-    let label = words("label")?.unwrap_or(&name);
+    let label = words("label")?.unwrap_or(&full);
     let help = words("help")?.unwrap_or("A parameter of this scene.");
     let range = match section.get("range") {
         None => None,
@@ -106,8 +118,15 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let given = default.map_or(Value::Unset, |default| kind.value_of(default));
     let row = row_of_file([&key, &visible_line(label), &visible_line(help)], kind, given);
     let checked = if whole { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
-    checked.map_err(|error| value_node.error(error.to_string()))?;
-    section.document.reading.own(&name, value, dimension);
+    checked.map_err(|error| {
+        let place = passed.map(|_| {
+            let (line, _) = place_of(document.text, section.place());
+            let file = document.file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
+            format!("; the parameter is defined in line {line}{file}")
+        });
+        value_node.error(format!("{error}{}", place.unwrap_or_default()))
+    })?;
+    document.reading.own(&full, value, dimension);
     // An expression without a range is an ordinary number, not an adjustable parameter.
     Ok((row, default.is_some() || range.is_some()))
 }

@@ -1,18 +1,19 @@
 //! Patterns: a group of bodies, joints and elements of a scene file, repeated about an axis or along a line.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use toml::de::DeValue;
 
 use super::document::{Node, Section, lists};
+use super::include::add_names;
+use super::instance::{Group, Instance, Names, PREVIOUS, Placement};
 use super::key::ValueType;
-use super::pattern_instance::{PREVIOUS, PatternInstance};
 use super::*;
 
 /// A `[[pattern]]` with its copies.
 pub(super) struct Pattern<'d> {
     section: Section<'d>,
-    copies: Vec<PatternInstance>,
+    copies: Vec<Instance<'d>>,
 }
 
 /// Reads the patterns of all files of a scene.
@@ -25,7 +26,7 @@ pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>
     for node in lists(files, "pattern", Vec::new())? {
         let pattern = read_pattern(&node)?;
         let name = pattern.section.require("name")?;
-        if let Some(first) = names.insert(name.text()?, name.clone()) {
+        if let Some(first) = names.insert(name.name()?, name.clone()) {
             return Err(name.repeats(&first, "pattern", name.text()?));
         }
         patterns.push(pattern);
@@ -63,23 +64,9 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
     section.require("name")?.name()?;
     let count_node = section.require("count")?;
     let count = count_node.whole()?;
-    let (mut bodies, mut joints) = (BTreeSet::new(), BTreeSet::new());
-    let mut size = 0;
-    for name in &lists {
-        let Some(list) = section.get(name) else {
-            continue;
-        };
-        size += values(list.value.get_ref());
-        let names = list.entries()?.into_iter().filter_map(|entry| {
-            let name = entry.value.get_ref().get("name")?.get_ref().as_str()?;
-            Some(name.to_owned())
-        });
-        match *name {
-            "body" => bodies.extend(names),
-            "joint" | "ball_joint" => joints.extend(names),
-            _ => {}
-        }
-    }
+    let mut names = Names::default();
+    add_names(section.table, &mut names.bodies, &mut names.joints);
+    let size: usize = lists.iter().filter_map(|name| section.get(name)).map(|list| values(list.value.get_ref())).sum();
     if size == 0 {
         let message = format!("nothing to repeat; allowed here: {}", lists.join(", "));
         return Err(section.error("", message));
@@ -110,15 +97,16 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
         None => Vec3::zeros(),
         Some(node) => node.vector()?,
     };
-    let (bodies, joints) = (Arc::new(bodies), Arc::new(joints));
+    let names = Arc::new(names);
     let copies = (0..count)
-        .map(|index| PatternInstance {
-            number: index + 1,
-            centre,
-            turn: turned(axis, angle * f64::from(index)),
-            shift: step * f64::from(index),
-            bodies: bodies.clone(),
-            joints: joints.clone(),
+        .map(|index| Instance {
+            group: Group::Copy { number: index + 1, names: names.clone() },
+            placement: Placement {
+                centre,
+                turn: turned(axis, angle * f64::from(index)),
+                shift: step * f64::from(index),
+            },
+            outer: section.document.instance,
         })
         .collect();
     Ok(Pattern { section, copies })
@@ -141,9 +129,10 @@ impl<'d> Pattern<'d> {
             let entries = list.entries()?;
             for copy in &self.copies {
                 // The first copy has no previous one.
-                for entry in entries.iter().filter(|entry| copy.number > 1 || !names_previous(entry.value.get_ref())) {
+                let first = copy.number() == Some(1);
+                for entry in entries.iter().filter(|entry| !first || !names_previous(entry.value.get_ref())) {
                     let mut node = entry.clone();
-                    node.document.copy = Some(copy);
+                    node.document.instance = Some(copy);
                     nodes.push(node);
                 }
             }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::document::{Node, Section};
 use super::error::no_body;
+use super::instance::Placement;
 use super::key::{FileTable, ValueType, Variants, key, number, vector};
 use super::*;
 use jointplay_physics::units::Dimension as D;
@@ -98,6 +99,17 @@ pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> 
     }
 }
 
+/// Reads where the parts in `section` lie: a turn by its `rotation` about the origin, then a shift by its `position`; `None` if it
+/// has neither.
+pub(super) fn read_placement(section: &Section<'_>) -> Result<Option<Placement>, SceneError> {
+    let (position, rotation) = (section.get("position"), section.get("rotation"));
+    if position.is_none() && rotation.is_none() {
+        return Ok(None);
+    }
+    let shift = position.map_or(Ok(Vec3::zeros()), |node| node.vector())?;
+    Ok(Some(Placement { turn: read_rotation(rotation)?, shift, ..Placement::identity() }))
+}
+
 /// Reads a point on a body or the world from `key`; `bodies` maps names to indices in the sorted scene.
 pub(super) fn read_attachment(
     section: &Section<'_>,
@@ -116,9 +128,8 @@ pub(super) fn read_attachment(
             return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
         }
     };
-    let mut point = part.vector("at")?;
-    if let Some(copy) = section.document.copy.filter(|copy| !copy.made(wanted)) {
-        point = copy.point(point);
-    }
+    let point = part.vector("at")?;
+    let on = body.map(|_| wanted);
+    let point = section.document.instance.map_or(point, |instance| instance.point(on, point));
     Ok(Attachment { body, point })
 }

@@ -5,9 +5,11 @@ use super::document::{Document, Node, Section, lists};
 use super::elements::{ELEMENTS, read_element};
 use super::error::{no_ball_joint, no_body};
 use super::format::FILE;
-use super::include::{self, included_texts};
+use super::include::{self, read_includes};
+use super::instance::{Group, Instance};
 use super::own::read_own;
 use super::pattern::{Pattern, read_patterns};
+use super::placement::read_placement;
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, read_own_contact, sort_forest};
 use super::reading::Reading;
@@ -78,7 +80,7 @@ impl Scene {
         let of_text = changes.iter().filter(|(key, _)| is_of_text(key));
         let reading = Reading::new(of_text);
         let document =
-            Document { file, text, reading: &reading, beside: &beside, included: false, copy: None, on_hinge: false };
+            Document { file, text, reading: &reading, beside: &beside, include: None, instance: None, on_hinge: false };
         let mut scene = Self::read_document(document, changes, keeps)?;
         scene.source.beside = beside.into_texts();
         Ok(scene)
@@ -95,16 +97,26 @@ impl Scene {
         }
         let parsed = document.parse()?;
         let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &FILE)?;
-        let texts = included_texts(&top)?;
-        let documents = texts.iter().map(|(name, text)| include::document(document, name, text));
-        let documents: Vec<Document<'_>> = documents.collect();
+        let includes = read_includes(&top)?;
+        let documents: Vec<Document<'_>> = includes.iter().map(|include| include.document(document)).collect();
         let tables = documents.iter().map(Document::parse);
         let tables = tables.collect::<Result<Vec<_>, _>>()?;
-        let included = documents.iter().zip(&tables);
-        let included = included.map(|(document, table)| include::section(*document, table));
+        // The places of the files may depend on parameters, whose names depend on the file.
+        let named = includes.iter().zip(&tables).map(|(include, table)| include.named(table));
+        let named: Vec<Option<Instance<'_>>> = named.collect();
+        let included = documents.iter().zip(&tables).zip(&named).map(|((document, table), instance)| {
+            include::section(Document { instance: instance.as_ref(), ..*document }, table)
+        });
         let files = std::iter::once(Ok(top.clone())).chain(included);
         let files = files.collect::<Result<Vec<_>, _>>()?;
         let own = read_own(&files)?;
+        let whole = read_whole(&top)?;
+        let placed = includes.iter().zip(&named).map(|(include, named)| include.placed(named.as_ref(), whole.as_ref()));
+        let placed = placed.collect::<Result<Vec<_>, _>>()?;
+        let instances = std::iter::once(whole.as_ref()).chain(placed.iter().map(Option::as_ref));
+        let files = files.into_iter().zip(instances);
+        let files = files.map(|(file, instance)| Section { document: Document { instance, ..file.document }, ..file });
+        let files: Vec<Section<'_>> = files.collect();
         let patterns = read_patterns(&files)?;
         let mut scene = read_settings(&top)?;
         let mut places = read_parameters(&top, &mut scene)?;
@@ -132,6 +144,20 @@ impl Scene {
         })?;
         Ok(scene)
     }
+}
+
+/// The scene as a group with a place of its own, if the file gives one.
+///
+/// # Errors
+/// An invalid place, or one for a machine whose closed form has its place.
+fn read_whole<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, SceneError> {
+    let placement = read_placement(top)?;
+    if placement.is_some() && top.get("spcmm").is_some() {
+        for key in ["position", "rotation"] {
+            top.refuse(key, "the closed form of [spcmm] has its own place")?;
+        }
+    }
+    Ok(placement.map(|placement| Instance { group: Group::Scene, placement, outer: None }))
 }
 
 /// Whether a change of a key replaces a value of the text, which is read again: a number of the text, the parameter that places
@@ -298,7 +324,7 @@ fn read_mechanism<'d>(
     (scene.machine.bodies, scene.machine.joints) = sort_forest(bodies, joints, &body_sections)?;
     let by_name = indices_by_name(&scene.machine.bodies);
     for JointText { section, joint, .. } in closing {
-        if !section.document.included {
+        if section.document.include.is_none() {
             let title = format!("joint.{}", joint.name);
             scene.source.places.insert(title, section.place());
         }
@@ -313,7 +339,7 @@ fn read_mechanism<'d>(
         let BallJointText { joint, section, places: own } = read_ball_joint(&node, scene, &by_name)?;
         joint_names.add(&section, "joint", &joint.name)?;
         let title = format!("joint.{}", joint.name);
-        if !section.document.included {
+        if section.document.include.is_none() {
             scene.source.places.insert(title, section.place());
         }
         scene.overrides.push(own.keys().copied().collect());

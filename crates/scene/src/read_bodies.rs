@@ -2,8 +2,8 @@
 
 use super::assets::NoMesh;
 use super::document::{Document, Node, Section};
+use super::instance::Instance;
 use super::mesh::{Fault, Format};
-use super::pattern_instance::PatternInstance;
 use super::placement::read_rotation;
 use super::*;
 use jointplay_physics::machine::{Solid, fill};
@@ -190,8 +190,8 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) ->
     };
     let mut shape = Shape { geometry, role, colour };
     // Shapes of a body move with it.
-    if let Some(copy) = node.document.copy.filter(|_| fixed) {
-        place_shape(&mut shape, copy, &form_node)?;
+    if let Some(instance) = node.document.instance.filter(|_| fixed) {
+        place_shape(&mut shape, instance);
     }
     Ok(shape)
 }
@@ -283,29 +283,30 @@ fn read_shift(section: &Section<'_>, spcmm: Option<&Spcmm>) -> Result<Vec3, Scen
     }
 }
 
-/// Transforms a fixed shape to a pattern copy.
-fn place_shape(shape: &mut Shape, copy: &PatternInstance, form: &Node<'_>) -> Result<(), SceneError> {
+/// Transforms a fixed shape of the group `instance`. A box that turns becomes the plate of its shape.
+fn place_shape(shape: &mut Shape, instance: &Instance<'_>) {
+    let point = |point: Vec3| instance.point(None, point);
     match &mut shape.geometry {
         Geometry::Capsule { from, to, .. } | Geometry::Cylinder { from, to, .. } | Geometry::Cone { from, to, .. } => {
-            *from = copy.point(*from);
-            *to = copy.point(*to);
+            *from = point(*from);
+            *to = point(*to);
         }
-        Geometry::Sphere { centre, .. } => *centre = copy.point(*centre),
+        Geometry::Sphere { centre, .. } => *centre = point(*centre),
         Geometry::Plate { corners, .. } => {
             for corner in corners {
-                *corner = copy.point(*corner);
+                *corner = point(*corner);
             }
         }
-        Geometry::Box { centre, .. } if copy.keeps_axes() => *centre = copy.point(*centre),
+        Geometry::Box { centre, .. } if instance.keeps_axes() => *centre = point(*centre),
         Geometry::Mesh { position, rotation, .. } => {
-            *position = copy.point(*position);
-            *rotation = copy.rotation(*rotation);
+            *position = point(*position);
+            *rotation = instance.rotation(None, *rotation);
         }
-        Geometry::Box { .. } => {
-            return Err(form.error(
-                "a fixed box keeps to the world's axes and cannot turn with a pattern; allowed here: capsule, cylinder, cone, sphere, plate, mesh",
-            ));
+        Geometry::Box { centre, size } => {
+            let corner = |[x, y]: [f64; 2]| point(*centre + 0.5 * Vec3::new(x * size.x, y * size.y, 0.0));
+            let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner).to_vec();
+            let triangles = vec![[0, 1, 2], [0, 2, 3]];
+            shape.geometry = Geometry::Plate { corners, triangles, thickness: size.z };
         }
     }
-    Ok(())
 }

@@ -3,7 +3,7 @@
 use super::document::{Node, Section};
 use super::drives::{SLIDERS_ONLY, read_drive};
 use super::error::no_body;
-use super::pattern_instance::PatternInstance;
+use super::instance::Instance;
 use super::placement::{read_attachment, read_rotation};
 use super::table::contact_rows;
 use super::*;
@@ -83,13 +83,11 @@ pub(super) fn read_joint<'d>(
             read_two_degrees(&section, scene, &mut joint)?;
         }
     }
-    let own = |copy: &PatternInstance| parent.is_some_and(|parent| copy.made(&bodies[parent]));
-    if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
-        place_parent_side(&mut joint, copy);
-    }
-    let outside = |copy: &&PatternInstance| closes_loop && !copy.made(&bodies[child]);
-    if let Some(copy) = node.document.copy.filter(outside) {
-        place_child_side(&mut joint, copy);
+    if let Some(instance) = node.document.instance {
+        place_parent_side(&mut joint, instance, parent.map(|parent| &*bodies[parent]));
+        if closes_loop {
+            place_child_side(&mut joint, instance, &bodies[child]);
+        }
     }
     Ok(JointText { name, section, joint, closes_loop })
 }
@@ -112,23 +110,23 @@ fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError>
     section.refuse("start", start)
 }
 
-/// Transforms the child's side of a joint to a pattern copy, for a child outside the pattern.
-fn place_child_side(joint: &mut Joint, copy: &PatternInstance) {
-    joint.child_point = copy.point(joint.child_point);
-    joint.child_axis = copy.direction(joint.child_axis);
-    joint.rotation *= copy.turn.inverse();
+/// Transforms the child's side of a joint of the group `instance`.
+fn place_child_side(joint: &mut Joint, instance: &Instance<'_>, child: &str) {
+    joint.child_point = instance.point(Some(child), joint.child_point);
+    joint.child_axis = instance.direction(Some(child), joint.child_axis);
+    joint.rotation = instance.rotation_of(Some(child), joint.rotation);
 }
 
-/// Transforms the parent's side of a joint to a pattern copy, for a parent outside the pattern.
-fn place_parent_side(joint: &mut Joint, copy: &PatternInstance) {
-    joint.parent_point = copy.point(joint.parent_point);
-    joint.axis = copy.direction(joint.axis);
-    joint.rotation = copy.rotation(joint.rotation);
+/// Transforms the parent's side of a joint of the group `instance`.
+fn place_parent_side(joint: &mut Joint, instance: &Instance<'_>, parent: Option<&str>) {
+    joint.parent_point = instance.point(parent, joint.parent_point);
+    joint.axis = instance.direction(parent, joint.axis);
+    joint.rotation = instance.rotation(parent, joint.rotation);
     if let JointStart::Pose { position, rotation, velocity, angular_velocity } = &mut joint.start {
-        *position = copy.point(*position);
-        *rotation = copy.rotation(*rotation);
-        *velocity = copy.direction(*velocity);
-        *angular_velocity = copy.direction(*angular_velocity);
+        *position = instance.point(parent, *position);
+        *rotation = instance.rotation(parent, *rotation);
+        *velocity = instance.direction(parent, *velocity);
+        *angular_velocity = instance.direction(parent, *angular_velocity);
     }
 }
 
@@ -348,11 +346,9 @@ pub(super) fn read_ball_joint<'d>(
     if socket.body == ball.body {
         return Err(section.error("ball", "socket and ball are on the same body: a ball joint needs two"));
     }
-    let mut opening = section.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
-    let own = |copy: &PatternInstance| socket.body.is_some_and(|body| copy.made(&scene.machine.bodies[body].name));
-    if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
-        opening = copy.direction(opening);
-    }
+    let opening = section.get("opening").map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let on = socket.body.map(|body| &*scene.machine.bodies[body].name);
+    let opening = node.document.instance.map_or(opening, |instance| instance.direction(on, opening));
     let mut joint = BallJoint { name, socket, ball, opening, contact: scene.machine.contact };
     let places = read_own_contact(&section, &mut joint)?;
     Ok(BallJointText { joint, section, places })

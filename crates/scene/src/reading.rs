@@ -7,7 +7,7 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::given::FileNumber;
-use super::pattern_instance::PatternInstance;
+use super::instance::Instance;
 use super::quantity::{DimensionError, Quantity};
 use jointplay_physics::expression::{ExpressionError, Number as _, Program};
 use jointplay_physics::units::{Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start};
@@ -38,7 +38,7 @@ impl ReadingError {
 pub(super) struct Reading<'d> {
     /// Changes of keys outside the parameter table: they replace values in the text.
     changes: BTreeMap<&'d str, Spanned<DeValue<'d>>>,
-    /// User-defined parameters.
+    /// User-defined parameters, by their full names: after the name of an included file that defines them.
     own: RefCell<BTreeMap<String, Quantity>>,
     numbers: RefCell<BTreeMap<String, FileNumber>>,
     /// SI sizes of [`all_units`].
@@ -60,7 +60,7 @@ impl<'d> Reading<'d> {
         self.changes.get(key)
     }
 
-    /// The SI value of a quantity or an expression; `copy` is the pattern copy it belongs to, if any.
+    /// The SI value of a quantity or an expression; `instance` is the group that it belongs to, if any.
     ///
     /// # Errors
     /// Invalid syntax, unit or dimension.
@@ -68,7 +68,7 @@ impl<'d> Reading<'d> {
         &self,
         text: &str,
         dimension: Dimension,
-        copy: Option<&PatternInstance>,
+        instance: Option<&Instance<'_>>,
     ) -> Result<f64, ReadingError> {
         let error = match parse_quantity(text, dimension) {
             Ok(value) => return Ok(value),
@@ -76,7 +76,7 @@ impl<'d> Reading<'d> {
         };
         let plain = plain(text);
         let own = self.own.borrow();
-        let (names, mut values) = named(&own, copy);
+        let (names, mut values) = named(&own, instance);
         let first_unit = values.len();
         values.extend(self.units());
         let program = Program::parse_with_units(
@@ -112,10 +112,10 @@ impl<'d> Reading<'d> {
         &self,
         text: &str,
         dimension: Dimension,
-        copy: Option<&PatternInstance>,
+        instance: Option<&Instance<'_>>,
     ) -> Result<(Program, bool), ReadingError> {
         let own = self.own.borrow();
-        let (mut names, mut values) = named(&own, copy);
+        let (mut names, mut values) = named(&own, instance);
         names.insert(0, "t");
         values.insert(0, Quantity::new(0.0, Dimension::Time));
         let first_unit = values.len();
@@ -168,15 +168,18 @@ impl<'d> Reading<'d> {
     }
 }
 
-/// Names and values for expressions: user-defined parameters, and the number `i` of a pattern copy.
-fn named<'a>(own: &'a BTreeMap<String, Quantity>, copy: Option<&PatternInstance>) -> (Vec<&'a str>, Vec<Quantity>) {
-    let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
-    let mut values: Vec<Quantity> = own.values().copied().collect();
-    if let Some(copy) = copy {
-        names.push("i");
-        values.push(Quantity::constant(f64::from(copy.number)));
-    }
-    (names, values)
+/// Names and values for expressions: the number `i` of a pattern copy, the parameters of the included file around `instance`, and
+/// those of the scene with other names.
+fn named<'a>(own: &'a BTreeMap<String, Quantity>, instance: Option<&Instance<'_>>) -> (Vec<&'a str>, Vec<Quantity>) {
+    let prefix = instance.map_or("", Instance::prefix);
+    let local = |name: &'a str| name.strip_prefix(prefix).filter(|name| !name.contains('.'));
+    let shadowed = |name: &str| !prefix.is_empty() && own.contains_key(&format!("{prefix}{name}"));
+    let seen = own.iter().filter_map(|(name, value)| {
+        let common = || Some(&**name).filter(|name| !name.contains('.') && !shadowed(name));
+        Some((local(name).or_else(common)?, *value))
+    });
+    let number = instance.and_then(Instance::number).map(|number| ("i", Quantity::constant(f64::from(number))));
+    seen.chain(number).unzip()
 }
 
 /// Whether a text has operators beyond those of a number with its unit.

@@ -170,8 +170,10 @@ pub struct Tyre {
     pub stiffness: f64,
     /// Damping, N s/m.
     pub damping: f64,
-    /// Height of the ground along `up`; `None` is ground at rest at the origin.
+    /// Height of the ground along `up` above `height`; `None` is ground at rest there.
     pub ground: Option<Drive>,
+    /// Coordinate along `up` at which `ground` is 0, m.
+    pub height: f64,
 }
 
 /// Axes in which a load is defined.

@@ -19,6 +19,8 @@ struct Tyre {
     stiffness: f64,
     damping: f64,
     ground: Option<Arc<dyn Law>>,
+    /// Coordinate along `up` at which `ground` is 0, m.
+    height: f64,
     /// Contact state frozen over a step, if any.
     held: Option<bool>,
 }
@@ -27,7 +29,7 @@ struct Tyre {
 struct State {
     centre: Vec3,
     arm: Vec3,
-    /// Ground height along `up`, m.
+    /// Coordinate of the ground along `up`, m.
     ground: Jet,
     /// Deflection d, m, negative above the ground, and its rate, m/s.
     depth: f64,
@@ -44,6 +46,7 @@ pub(super) fn make(tyre: &machine::Tyre, on: Anchor) -> Box<dyn SceneElement> {
         stiffness: tyre.stiffness,
         damping: tyre.damping,
         ground: law_of(tyre.ground.as_ref(), false),
+        height: tyre.height,
         held: None,
     })
 }
@@ -52,7 +55,7 @@ impl Tyre {
     fn at(&self, t: f64, motion: &[Kinematics]) -> State {
         let (centre, velocity, arm) = point_of(&self.on, motion);
         let height = |law: &Arc<dyn Law>| law.at(t);
-        let ground = self.ground.as_ref().map_or_else(Jet::default, height);
+        let ground = self.ground.as_ref().map_or_else(Jet::default, height) + Jet::constant(self.height);
         let depth = ground.value + self.radius - self.up.dot(&centre);
         let rate = ground.rate - self.up.dot(&velocity);
         // Once the spring has lost contact, the damper has, too.

@@ -1,0 +1,277 @@
+//! Files that a scene includes with names, values and places, several times.
+
+use crate::elements::at;
+use jointplay::machine::Vec3;
+use jointplay::scene::{Scene, SceneError, Texts};
+use jointplay::simulate::Simulation;
+
+/// A leg on the scene's chassis, with two toes, a spring, a stop and a foot on the world.
+const LEG: &str = r#"
+[[parameter]]
+name = "length"
+value = "200 mm"
+range = ["100 mm", "500 mm"]
+
+[[parameter]]
+name = "half"
+value = "length / 2"
+unit = "mm"
+
+[[body]]
+name = "thigh"
+mass = "weight * length / 200 mm"
+inertia = "1e-3 1e-3 1e-3 kg m^2"
+
+[[joint]]
+name = "hip"
+kind = "revolute"
+parent = "chassis"
+child = "thigh"
+axis = [0, 1, 0]
+parent_point = "50 0 0 mm"
+child_point = [0, 0, "half"]
+
+[[pattern]]
+name = "toes"
+count = 2
+along = "0 10 0 mm"
+
+[[pattern.body]]
+name = "toe"
+mass = "10 g * i"
+inertia = "1e-6 1e-6 1e-6 kg m^2"
+
+[[pattern.joint]]
+name = "toe"
+kind = "revolute"
+parent = "thigh"
+child = "toe"
+axis = [0, 1, 0]
+parent_point = [0, 0, "-half"]
+child_point = "0 0 10 mm"
+start = { position = "20 deg" }
+
+[[spring]]
+name = "muscle"
+from = { body = "chassis", at = "80 0 0 mm" }
+to = { body = "thigh" }
+length = "100 mm"
+stiffness = "500 N/m"
+damping = "1 N s/m"
+
+[[spring]]
+name = "tendon"
+from = { body = "toe1" }
+to = { body = "toe2" }
+length = "10 mm"
+stiffness = "50 N/m"
+
+[[spring]]
+name = "tether"
+from = { body = "world", at = "300 0 0 mm" }
+to = { body = "thigh" }
+length = "200 mm"
+stiffness = "20 N/m"
+
+[[motor]]
+name = "drive"
+joint = "hip"
+torque = "0.1 N m"
+"#;
+
+const CHASSIS: &str = r#"
+[gravity]
+z = "-9.81 m/s^2"
+
+[[parameter]]
+name = "weight"
+value = "1 kg"
+
+[[body]]
+name = "chassis"
+mass = "5 kg"
+inertia = "0.1 0.1 0.1 kg m^2"
+
+[[joint]]
+name = "chassis"
+kind = "revolute"
+child = "chassis"
+axis = [0, 0, 1]
+start = { velocity = "1 rad/s" }
+"#;
+
+fn read(top: &str, leg: &str, changes: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    let beside = Texts::from([("leg.toml".to_owned(), leg.into()), ("other.toml".to_owned(), leg.into())]);
+    let changes: Vec<(String, String)> = changes.iter().map(|(key, value)| ((*key).into(), (*value).into())).collect();
+    Scene::parse_with(&format!("name = \"top\"\n{top}{CHASSIS}"), Some("top.toml"), &beside, &changes)
+}
+
+const TWO: &str = "include = [\n\
+    { file = \"leg.toml\", name = \"left\" },\n\
+    { file = \"leg.toml\", name = \"right\", values = { length = \"2 * 150 mm\" }, position = \"0 -20 0 mm\", \
+      rotation = { axis = [0, 0, 1], angle = \"180 deg\" } },\n]\n";
+
+/// The leg as text of the scene itself: names after `prefix`, its own length, turned by half a turn and shifted if `turned`.
+fn written(prefix: &str, length: &str, turned: bool) -> String {
+    let mut text = LEG.to_owned();
+    for name in ["length", "half"] {
+        // Parameters have no dots and no hyphens in their names.
+        text = text.replace(&format!("name = \"{name}\""), &format!("name = \"{prefix}_{name}\""));
+    }
+    text = text
+        .replace("value = \"200 mm\"", &format!("value = \"{length}\""))
+        .replace("\"length / 2\"", &format!("\"{prefix}_length / 2\""));
+    text = text
+        .replace("weight * length", &format!("weight * {prefix}_length"))
+        .replace("\"half\"", &format!("\"{prefix}_half\""));
+    text = text.replace("\"-half\"", &format!("\"-{prefix}_half\""));
+    for name in ["thigh", "hip", "toe", "toe1", "toe2", "muscle", "tendon", "tether", "drive", "toes"] {
+        text = text.replace(&format!("\"{name}\""), &format!("\"{prefix}-{name}\""));
+    }
+    if turned {
+        // Half a turn about z: a point (x, y, z) comes to (-x, -y, z), and so do axes.
+        text = text.replace(
+            "axis = [0, 1, 0]\nparent_point = \"50 0 0 mm\"",
+            "axis = [0, -1, 0]\nparent_point = \"-50 -20 0 mm\"\nrotation = { axis = [0, 0, 1], angle = \"180 deg\" }",
+        );
+        text = text
+            .replace("at = \"80 0 0 mm\"", "at = \"-80 -20 0 mm\"")
+            .replace("at = \"300 0 0 mm\"", "at = \"-300 -20 0 mm\"");
+    }
+    text
+}
+
+#[test]
+fn a_file_that_is_included_twice_is_as_if_it_were_written_twice() {
+    let included = read(TWO, LEG, &[]).unwrap();
+    let text = CHASSIS.to_owned() + &written("left", "200 mm", false) + &written("right", "300 mm", true);
+    let whole = Scene::parse(&text, None, &[]).unwrap();
+    let names = |scene: &Scene| -> Vec<String> {
+        let machine = &scene.machine;
+        let bodies = machine.bodies.iter().map(|body| body.name.clone());
+        let joints = machine.joints.iter().map(|joint| joint.name.clone());
+        bodies.chain(joints).chain(machine.elements.iter().map(|element| element.name.clone())).collect()
+    };
+    let dots: Vec<String> = names(&included).iter().map(|name| name.replace('.', "-")).collect();
+    assert_eq!(dots, names(&whole).iter().map(|name| name.replace("toe-", "toe")).collect::<Vec<_>>());
+    assert!(names(&included).contains(&"left.toe2".to_owned()));
+    let mut both = [included, whole].map(|scene| {
+        let mut machine = scene.machine;
+        machine.solver.tolerance = 1e-10;
+        Simulation::new(&machine).unwrap()
+    });
+    let [a, b] = both.each_mut().map(|simulation| at(simulation, 0.3));
+    for (a, b) in a.bodies.iter().zip(&b.bodies) {
+        assert!((a.position - b.position).norm() < 1e-9 && (a.rotation - b.rotation).amax() < 1e-8);
+    }
+    assert!((a.bodies[1].position - a.bodies[2].position).norm() > 0.05);
+}
+
+#[test]
+fn parameters_of_an_included_file_are_its_own_and_the_scene_may_set_them() {
+    let scene = read(TWO, LEG, &[]).unwrap();
+    // To the gram: the mass of a thigh is a product.
+    let mass = |scene: &Scene, name: &str| {
+        let body = scene.machine.bodies.iter().find(|body| body.name == name).unwrap();
+        (body.mass * 1e3).round() / 1e3
+    };
+    assert_eq!((mass(&scene, "left.thigh"), mass(&scene, "right.thigh"), mass(&scene, "left.toe2")), (1.0, 1.5, 0.02));
+    let keys: Vec<&str> = scene.source.own.iter().map(|row| row.key).collect();
+    assert_eq!(keys, ["parameter.weight", "parameter.left.length", "parameter.right.length"]);
+    // A parameter of the scene is that of both, unless the file has one of this name.
+    let heavy = read(TWO, LEG, &[("parameter.weight", "2 kg"), ("parameter.left.length", "100 mm")]).unwrap();
+    assert_eq!((mass(&heavy, "left.thigh"), mass(&heavy, "right.thigh")), (1.0, 3.0));
+    let own = format!("[[parameter]]\nname = \"weight\"\nvalue = \"4 kg\"\n{LEG}");
+    let both = read(TWO, &own, &[("parameter.weight", "2 kg")]).unwrap();
+    assert_eq!(mass(&both, "left.thigh"), 4.0);
+    // What the scene gives can be saved in it; a number of the included file cannot.
+    let mut changed = scene.clone();
+    changed.set("parameter.right.length", "400 mm").unwrap();
+    assert_eq!(mass(&changed, "right.thigh"), 2.0);
+    assert!(changed.to_toml().unwrap().contains("values = { length = \"400 mm\" }"));
+    changed.set("include.right.position.y", "-30 mm").unwrap();
+    assert!(changed.to_toml().unwrap().contains("position = [\"0 mm\", \"-30 mm\", \"0 mm\"]"));
+    changed.set("joint.left.hip.parent_point.x", "60 mm").unwrap();
+    let joint = changed.machine.joints.iter().find(|joint| joint.name == "left.hip").unwrap();
+    assert_eq!(joint.parent_point, Vec3::new(0.06, 0.0, 0.0));
+    assert!(changed.to_toml().unwrap_err().to_string().contains("another file"));
+}
+
+#[test]
+fn parts_of_an_included_file_are_reached_by_their_full_names() {
+    let more = "[output]\nbody = \"right.toe1\"\n[[load]]\nname = \"pull\"\non = { body = \"left.thigh\" }\nforce = \"1 0 0 N\"\n\
+                [[stop]]\nname = \"stop\"\njoint = \"left.hip\"\nlower = \"-30 deg\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n";
+    let scene = read(&format!("{TWO}{more}"), LEG, &[]).unwrap();
+    let machine = &scene.machine;
+    assert_eq!(machine.bodies[machine.output.body].name, "right.toe1");
+    let error =
+        read(&format!("{TWO}{more}").as_str().replace("left.hip", "left.hop"), LEG, &[]).unwrap_err().to_string();
+    assert!(error.contains("did you mean `left.hip`"), "{error}");
+    // The short way to write a file without a name: names stay.
+    let scene = read("include = [{ file = \"leg.toml\" }]\n", LEG, &[]).unwrap();
+    assert!(scene.machine.bodies.iter().any(|body| body.name == "toe2"));
+    assert_eq!(scene.machine, read("include = [\"leg.toml\"]\n", LEG, &[]).unwrap().machine);
+}
+
+#[test]
+fn bad_includes_are_refused_where_they_stand() {
+    let one = |more: &str| format!("[[include]]\nfile = \"leg.toml\"\n{more}\n");
+    for (top, leg, said) in [
+        (
+            one("name = \"body\""),
+            LEG.to_owned(),
+            ["top.toml:4:8: include.body.name = \"body\"", "a word of scene files"],
+        ),
+        (one("name = \"a b\""), LEG.to_owned(), ["top.toml:4:8: include.a b.name", "is not a name"]),
+        (
+            one("name = \"left\"\nvalues = { lenght = \"1 m\" }"),
+            LEG.to_owned(),
+            ["top.toml:5:21: include.left.values.lenght", "is no parameter of leg.toml (did you mean `length`?)"],
+        ),
+        (
+            one("name = \"left\"\nvalues = { length = \"1 m\" }"),
+            LEG.to_owned(),
+            [
+                "top.toml:5:21: parameter.left.length = \"1 m\"",
+                "nm, km; the parameter is defined in line 2 of leg.toml",
+            ],
+        ),
+        (
+            one("name = \"left\"\nvalues = { length = \"1 kg\" }"),
+            LEG.to_owned(),
+            ["top.toml:5:21: parameter.left.length = \"1 kg\"", "mm"],
+        ),
+        (one("name = \"left\"\nvalues = 3"), LEG.to_owned(), ["top.toml:5:10: include.left.values", "must be a table"]),
+        (one("name = \"left\"\nscale = 3"), LEG.to_owned(), ["top.toml:5:1: include.left.scale", "unknown key"]),
+        (
+            one("name = \"left\"\nposition = \"1 0 0\""),
+            LEG.to_owned(),
+            ["top.toml:5:12: include.left.position", "unit"],
+        ),
+        (
+            one("name = \"left\""),
+            LEG.replace("mass = \"weight", "mass = \"wight"),
+            ["leg.toml:14:8: body.left.thigh.mass", "wight"],
+        ),
+        (
+            one("name = \"left\""),
+            LEG.replace("{ body = \"toe1\" }", "{ body = \"toe3\" }"),
+            ["leg.toml:56:17: spring.left.tendon.from.body", "no body `left.toe3`"],
+        ),
+        (
+            one("name = \"left\"") + &one("name = \"left\""),
+            LEG.to_owned(),
+            ["top.toml:7:8: include.left.name", "already a file of this name"],
+        ),
+        (
+            one("") + &one("name = \"left\""),
+            LEG.to_owned(),
+            ["top.toml:6:8: include.left.file", "needs a `name` each time"],
+        ),
+    ] {
+        let message = read(&top, &leg, &[]).unwrap_err().to_string();
+        for said in said {
+            assert!(message.contains(said), "{message}\nlacks {said}");
+        }
+    }
+}

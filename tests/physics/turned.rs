@@ -1,0 +1,130 @@
+//! A scene that is turned and shifted as a whole, together with its gravity, moves as before.
+
+use crate::common::parse;
+use crate::elements::at;
+use jointplay::machine::{Quat, Vec3};
+use jointplay::scene::{Scene, Texts, built_in_text};
+use jointplay::simulate::Simulation;
+
+const SHIFT: [f64; 3] = [0.3, -0.2, 0.1];
+const PLACE: &str = "position = \"0.3 -0.2 0.1 m\"\nrotation = { axis = [1, 2, -2], angle = \"50 deg\" }\n";
+const GRAVITY: &str = "[gravity]\nz = \"-9.81 m/s^2\"\n";
+
+fn turn() -> Quat {
+    Quat::from_axis_angle(&nalgebra::Unit::new_normalize(Vec3::new(1.0, 2.0, -2.0)), 50_f64.to_radians())
+}
+
+/// `text` turned by [`PLACE`], and its gravity with it.
+fn turned(text: &str) -> String {
+    assert!(text.contains(GRAVITY));
+    let gravity = turn() * Vec3::new(0.0, 0.0, -9.81);
+    let own = |(axis, value): (&str, &f64)| format!("{axis} = \"{value:e} m/s^2\"\n");
+    let own: String = ["x", "y", "z"].into_iter().zip(gravity.iter()).map(own).collect();
+    format!("{PLACE}{}", text.replace(GRAVITY, &format!("[gravity]\n{own}")))
+}
+
+/// Changes that leave of a step's error what rounding does.
+const FINE: [(&str, &str); 2] = [("solver.method", "dopri5"), ("solver.tolerance", "1e-12")];
+
+/// Checks that both scenes move alike until `time`, s: bodies within 1e-9 m, forces within 1e-9 of the largest.
+fn move_alike(name: &str, [plain, turned]: [Scene; 2], time: f64) {
+    let mut both = [plain, turned].map(|scene| {
+        let simulation = Simulation::new(&scene.machine);
+        simulation.unwrap_or_else(|error| panic!("{name}: {error}"))
+    });
+    let [a, b] = both.each_mut().map(|simulation| at(simulation, time));
+    let (turn, shift) = (turn(), Vec3::from(SHIFT));
+    let mut moved: f64 = 0.0;
+    for (a, b) in a.bodies.iter().zip(&b.bodies) {
+        let off = (turn * a.position + shift - b.position).norm();
+        assert!(off < 1e-9, "{name}: {off:e}");
+        let off = (turn.to_rotation_matrix().into_inner() * a.rotation - b.rotation).amax();
+        assert!(off < 1e-8, "{name}: {off:e}");
+        moved = moved.max(a.velocity.norm());
+    }
+    assert!(moved > 1e-3, "{name} stands still");
+    let largest = a.elements.iter().map(|element| element.force.norm()).fold(1.0, f64::max);
+    for (a, b) in a.elements.iter().zip(&b.elements) {
+        let off = (turn * a.force - b.force).norm();
+        assert!(off < 1e-8 * largest, "{name}: {off:e} of {largest}");
+    }
+    for j in 0..a.joints.len() {
+        let [a, b] = both.each_ref().map(|simulation| simulation.peak(j).0);
+        assert!((a / b - 1.0).abs() < 1e-9 || a == b, "{name}, joint {j}: {a} {b}");
+    }
+}
+
+#[test]
+fn a_built_in_scene_moves_alike_wherever_it_lies() {
+    for (name, time) in
+        [("pendulum", 0.01), ("slider-crank", 0.01), ("chain", 0.01), ("four-bar", 5e-3), ("suspension", 2e-3)]
+    {
+        let text = built_in_text(name).unwrap();
+        move_alike(name, [text.to_owned(), turned(text)].map(|text| parse(&text, &FINE)), time);
+    }
+}
+
+#[test]
+fn every_element_and_kind_of_joint_turns_with_the_scene() {
+    let body = "mass = \"1 kg\"\ninertia = \"0.01 0.02 0.025 kg m^2\"\n";
+    let text = format!(
+        "{GRAVITY}
+[[body]]\nname = \"a\"\n{body}
+[[body]]\nname = \"b\"\n{body}
+[[body]]\nname = \"c\"\n{body}
+[[body]]\nname = \"d\"\n{body}
+[[joint]]\nname = \"a\"\nkind = \"free\"\nchild = \"a\"\nchild_point = \"10 0 0 mm\"
+start = {{ position = \"0 0 290 mm\", rotation = {{ axis = [0, 1, 0], angle = \"10 deg\" }}, \
+velocity = \"0.1 0 0.2 m/s\", angular_velocity = \"1 2 3 rad/s\" }}
+[[joint]]\nname = \"b\"\nkind = \"universal\"\nchild = \"b\"\naxis = [0, 1, 0]\nchild_axis = [1, 0, 0]\nparent_point = \"500 0 0 mm\"
+child_point = \"0 0 50 mm\"\nstart = {{ angle = \"20 deg\", child_angular_velocity = \"1 rad/s\" }}
+[[joint]]\nname = \"c\"\nkind = \"cylindrical\"\nchild = \"c\"\naxis = [1, 0, 1]\nparent_point = \"0 500 0 mm\"
+rotation = {{ axis = [1, 0, 0], angle = \"30 deg\" }}
+[[joint]]\nname = \"d\"\nkind = \"prismatic\"\nchild = \"d\"\naxis = [0, 0, 1]\nparent_point = \"0 -500 290 mm\"
+[[tyre]]\nname = \"tyre\"\non = {{ body = \"a\" }}\nradius = \"300 mm\"\nstiffness = \"20 kN/m\"\ndamping = \"50 N s/m\"
+ground = {{ law = \"harmonic\", amplitude = \"5 mm\", frequency = \"4 Hz\" }}
+[[tyre]]\nname = \"tyre-up\"\non = {{ body = \"d\" }}\nradius = \"300 mm\"\nup = [0, 0, 1]\nstiffness = \"20 kN/m\"
+[[bushing]]\nname = \"from-world\"\nfrom = {{ body = \"world\", at = \"500 0 -40 mm\" }}\nto = {{ body = \"b\", at = \"0 0 10 mm\" }}
+stiffness = \"100 200 300 N/m\"\nturning_stiffness = \"1 2 3 N m/rad\"\nturning_damping = \"0.01 0.02 0.03 N m s/rad\"
+axes = {{ axis = [0, 1, 1], angle = \"20 deg\" }}\nrotation = {{ axis = [1, 1, 0], angle = \"5 deg\" }}
+[[bushing]]\nname = \"to-world\"\nfrom = {{ body = \"c\" }}\nto = {{ body = \"world\", at = \"0 500 10 mm\" }}
+stiffness = \"100 200 300 N/m\"\nturning_stiffness = \"1 2 3 N m/rad\"
+axes = {{ axis = [0, 1, 1], angle = \"20 deg\" }}\nrotation = {{ axis = [1, 1, 0], angle = \"5 deg\" }}
+[[spring]]\nname = \"spring\"\nfrom = {{ body = \"world\", at = \"0 -500 600 mm\" }}\nto = {{ body = \"a\" }}\nlength = \"500 mm\"\nstiffness = \"100 N/m\"
+[[load]]\nname = \"wind\"\non = {{ body = \"b\" }}\nforce = \"1 2 0 N\"\ntorque = \"0 0.1 0 N m\"\nfrequency = \"3 Hz\"\nphase = \"20 deg\"
+[[load]]\nname = \"thrust\"\non = {{ body = \"a\", at = \"0 0 10 mm\" }}\nforce = \"1 2 0 N\"\naxes = \"body\"
+[[joint_spring]]\nname = \"joint-spring\"\njoint = \"b\"\ncoordinate = \"angle\"\nstiffness = \"1 N m/rad\"
+[[motor]]\nname = \"motor\"\njoint = \"c\"\ncoordinate = \"position\"\nforce = \"5 N\"
+[[fixed_shape]]\nform = \"box\"\nrole = \"frame\"\ncentre = \"0 0 0 mm\"\nsize = \"10 20 30 mm\"
+"
+    );
+    move_alike("elements", [text.clone(), turned(&text)].map(|text| parse(&text, &FINE)), 0.2);
+}
+
+#[test]
+fn a_file_in_a_turned_scene_turns_with_it() {
+    // The file is turned and shifted in the scene, its pattern in the file.
+    let leg = "[[pattern]]\nname = \"rods\"\ncount = 3\nabout = { point = \"100 0 0 mm\", axis = [0, 0, 1] }\n\
+        [[pattern.body]]\nname = \"rod\"\nmass = \"0.2 kg * i\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+        [[pattern.joint]]\nname = \"rod\"\nkind = \"revolute\"\nparent = \"base\"\nchild = \"rod\"\naxis = [0, 1, 0]\n\
+        parent_point = \"200 0 0 mm\"\nchild_point = \"0 0 100 mm\"\nstart = { position = \"30 deg\" }\n\
+        [[pattern.spring]]\nname = \"s\"\nfrom = { body = \"world\", at = \"200 0 50 mm\" }\nto = { body = \"rod\" }\n\
+        length = \"100 mm\"\nstiffness = \"50 N/m\"\n";
+    let top = format!(
+        "include = [{{ file = \"leg.toml\", name = \"left\", position = \"0 100 0 mm\", rotation = {{ axis = [0, 1, 0], angle = \"40 deg\" }} }}]\n{GRAVITY}\
+         [[body]]\nname = \"base\"\nmass = \"1 kg\"\ninertia = \"0.1 0.1 0.1 kg m^2\"\n\
+         [[joint]]\nname = \"base\"\nkind = \"revolute\"\nchild = \"base\"\naxis = [1, 0, 0]\nstart = {{ velocity = \"1 rad/s\" }}\n"
+    );
+    let beside = Texts::from([("leg.toml".to_owned(), leg.into())]);
+    let changes = FINE.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let both = [top.clone(), turned(&top)].map(|text| Scene::parse_with(&text, None, &beside, &changes).unwrap());
+    assert_eq!(both[0].machine.bodies[3].name, "left.rod3");
+    move_alike("leg", both, 0.2);
+}
+
+#[test]
+fn a_machine_with_a_closed_form_stays_where_it_is() {
+    let text = format!("{PLACE}{}", built_in_text("spcmm").unwrap());
+    let error = Scene::parse(&text, None, &[]).unwrap_err().to_string();
+    assert!(error.contains("position = ") && error.contains("[spcmm] has its own place"), "{error}");
+}
