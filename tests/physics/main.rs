@@ -13,6 +13,7 @@ mod drives;
 mod elements;
 mod endurance;
 mod energy;
+mod equilibrium;
 mod extremes;
 mod flights;
 mod guard;

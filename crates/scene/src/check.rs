@@ -34,6 +34,11 @@ impl Scene {
                 let keys = ["solver.method", "formulation"].into_iter().chain(counts.map(|own| own.key));
                 (title.to_owned(), keys.map(str::to_owned).collect())
             }
+            MechanismError::NoRest { .. } => ("start".to_owned(), vec!["start".to_owned()]),
+            MechanismError::TooLargeForRest { .. } => {
+                let keys = std::iter::once("start").chain(counts.map(|own| own.key));
+                ("start".to_owned(), keys.map(str::to_owned).collect())
+            }
             // The reader builds only consistent machines.
             MechanismError::Machine(_) => ("body".to_owned(), Vec::new()),
             MechanismError::Branching { joints } => one(joints.first().map_or("", String::as_str), &["clearance"]),

@@ -311,8 +311,9 @@ static TABLE: [Parameter; 29] = [
         Scope::Every,
         "Where a run begins. as-given takes the start values of the joints. ideal takes them as guesses and closes every ball \
          joint, with the balls in the middle of their sockets: they drop first. settled lays each ball on the wall of its \
-         socket where the mechanism without play presses it, as deep as that force needs.",
-        "Constraints of paper eq. (45); (19) at rest for settled",
+         socket where the mechanism without play presses it, as deep as that force needs. equilibrium continues from there to where \
+         springs, bushings, tyres, stops, contacts and gravity are in balance.",
+        "Constraints of paper eq. (45); (19) at rest for settled; accelerations of 0 for equilibrium",
     )),
     row(
         "solver.method",

@@ -17,12 +17,16 @@ pub enum StartRule {
     /// As [`Self::Ideal`], with every ball then moved onto its socket wall, in the direction and to the penetration given by the
     /// joint force of the mechanism without play.
     Settled,
+    /// In static equilibrium near the settled start, with every drive, target, ground and load factor as it is at t = 0, and free
+    /// coordinates at rest.
+    Equilibrium,
 }
 
 words!(StartRule {
     AsGiven => "as-given",
     Ideal => "ideal",
     Settled => "settled",
+    Equilibrium => "equilibrium",
 });
 
 /// Formulation of the equations of motion.

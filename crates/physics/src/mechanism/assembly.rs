@@ -34,7 +34,7 @@ pub struct Placement {
     pub turned: f64,
 }
 
-/// A settled start.
+/// A start that is settled, or in equilibrium.
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     /// Positions and velocities in the coordinates of the tree.

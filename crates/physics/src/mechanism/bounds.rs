@@ -251,7 +251,7 @@ pub const LARGEST_COUPLED: usize = 96;
 /// As [`Cost::check`]; advises the other formulation if it is within the limits.
 pub fn check(machine: &Machine, model: &Model) -> Result<(), MechanismError> {
     let closed = match model.start {
-        StartRule::AsGiven | StartRule::Settled => model.ideal_joints.clone(),
+        StartRule::AsGiven | StartRule::Settled | StartRule::Equilibrium => model.ideal_joints.clone(),
         StartRule::Ideal => (0..model.joints.len()).collect(),
     };
     let cost = |form| Cost::of(form, machine, model, &closed);

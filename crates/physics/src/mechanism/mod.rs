@@ -16,6 +16,7 @@ mod discrete_gradient;
 mod drives;
 mod elements;
 mod equations;
+mod equilibrium;
 mod factor;
 mod flight;
 mod forest;
@@ -37,6 +38,7 @@ mod systems;
 mod tree;
 
 pub use crate::jet::Jet;
+use assembly::Settled;
 pub use assembly::{Assembly, Placement};
 pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
 pub use closed_form::ClosedMotion;
@@ -135,6 +137,31 @@ pub enum MechanismError {
         velocities: usize,
         /// Maximum accepted.
         most: usize,
+    },
+    /// Too many coordinates for the search of a position of rest.
+    #[error(
+        "this scene has {velocities} velocity coordinates; a position of rest is found for at most {most}: \
+         choose start = \"settled\""
+    )]
+    TooLargeForRest {
+        /// Number of velocity coordinates.
+        velocities: usize,
+        /// Maximum accepted.
+        most: usize,
+    },
+    /// A machine for which no position of rest was found.
+    #[error(
+        "found no position of rest: where the search ended, body {body} accelerates at {} and {}; \
+         hold it by a spring, a stop, a tyre or a joint, bring the start values closer to where it rests, or choose start = \"settled\"",
+        format_quantity_digits(*.acceleration, "m/s^2", 4), format_quantity_digits(*.angular_acceleration, "rad/s^2", 4)
+    )]
+    NoRest {
+        /// Name of the body that moves most.
+        body: String,
+        /// Acceleration of its centroid, m/s^2.
+        acceleration: f64,
+        /// Its angular acceleration, rad/s^2.
+        angular_acceleration: f64,
     },
     /// Equations that exceed the limits on memory or time.
     #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
@@ -297,18 +324,27 @@ impl Mechanism {
     /// Sets up the equations of `machine`.
     ///
     /// # Errors
-    /// The rods cannot reach the trajectory, the equations would be too costly, or, for a settled start, the machine does not
-    /// start without play.
+    /// The rods cannot reach the trajectory, the equations would be too costly, for a start that is settled or in equilibrium the
+    /// machine does not start without play, or it comes to rest nowhere.
     pub fn new(machine: &Machine) -> Result<Self, MechanismError> {
+        Self::near(machine, None)
+    }
+
+    /// The same, with the guess of an assembled start in tree coordinates and velocities, if not that of the machine.
+    fn near(machine: &Machine, guess: Option<&[f64]>) -> Result<Self, MechanismError> {
         machine.check()?;
         let mut model = Model::new(machine);
         if let Some(form) = &model.closed_form {
             form.check()?;
         }
         bounds::check(machine, &model)?;
-        if machine.start == StartRule::Settled {
-            model.settled = Some(settled::settle(machine)?);
-        }
+        model.settled = match machine.start {
+            StartRule::AsGiven | StartRule::Ideal => {
+                guess.map(|guess| Settled { state: guess.to_vec(), assembly: Assembly::default() })
+            }
+            StartRule::Settled => Some(settled::settle(machine, None)?),
+            StartRule::Equilibrium => Some(equilibrium::rest(machine)?),
+        };
         Ok(Self::with_model(machine, Arc::new(model)))
     }
 

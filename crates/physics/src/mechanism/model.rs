@@ -451,6 +451,11 @@ impl Model {
         self.scale = scale_q;
     }
 
+    /// Scale of speeds, m/s.
+    pub fn speed_scale(&self) -> f64 {
+        self.length_scale / SPEED_TIME
+    }
+
     /// Whether any joint closes a loop.
     pub fn closes_loops(&self) -> bool {
         !self.ideal_joints.is_empty() || !self.closures.is_empty()
@@ -511,7 +516,7 @@ fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) 
 }
 
 /// Closed form of `machine`, if any.
-fn closed_form_of(machine: &Machine) -> Option<Arc<dyn ClosedForm>> {
+pub(super) fn closed_form_of(machine: &Machine) -> Option<Arc<dyn ClosedForm>> {
     let spcmm = machine.spcmm.as_ref()?;
     Some(Arc::new(SliderTrajectory::new(spcmm)))
 }
@@ -527,6 +532,9 @@ fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
     }
 }
 
+/// Time in which a body moves by the length scale at that of speeds, s.
+const SPEED_TIME: f64 = 0.1;
+
 /// Scales multiplied by the relative tolerance; see `docs/numerics.md`.
 struct Scales {
     length: f64,
@@ -539,6 +547,6 @@ impl Scales {
     /// Length: [`Machine::length_scale`]. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
     fn of(machine: &Machine) -> Self {
         let length = machine.length_scale();
-        Self { length, speed: length / 0.1, angle: 0.1, angular_speed: 1.0 }
+        Self { length, speed: length / SPEED_TIME, angle: 0.1, angular_speed: 1.0 }
     }
 }

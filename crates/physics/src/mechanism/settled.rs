@@ -10,18 +10,19 @@ use crate::machine::{Formulation, Machine, StartRule, Vec3};
 /// clearance to machine size, typically a thousandth, and each iteration reduces the error by that factor.
 const ROUNDS: usize = 4;
 
-/// Settled start of `machine` at t = 0, with the velocities of the machine without play.
+/// Settled start of `machine` at t = 0, with the velocities of the machine without play; from the tree coordinates and velocities
+/// `near` it, if given, in place of the start values.
 ///
 /// # Errors
 /// That machine does not start.
-pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
+pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled, MechanismError> {
     let mut twin = machine.clone();
     for joint in &mut twin.ball_joints {
         joint.contact.clearance = 0.0;
     }
     twin.start = StartRule::Ideal;
     twin.formulation = Formulation::Tree;
-    let mut mechanism = Mechanism::new(&twin)?;
+    let mut mechanism = Mechanism::near(&twin, near)?;
     let mut state = mechanism.start()?;
     let assembly = mechanism.assembly().clone();
     for _ in 0..ROUNDS {
@@ -42,7 +43,7 @@ pub(super) fn settle(machine: &Machine) -> Result<Settled, MechanismError> {
             // Without play, this point of the ball's body coincides with the socket centre.
             twin.ball_joints[j].ball.point = joint.ball.point - turned_back;
         }
-        mechanism = Mechanism::new(&twin)?;
+        mechanism = Mechanism::near(&twin, near)?;
         state = mechanism.start()?;
     }
     Ok(Settled { state, assembly })

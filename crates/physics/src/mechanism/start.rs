@@ -290,7 +290,7 @@ fn rank_around(model: &Model, constraints: &mut Constraints, tree: &mut Tree, y:
 }
 
 /// Jacobians and J M^-1 J^T at (t, y).
-fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f64, y: &[f64]) {
+pub(super) fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f64, y: &[f64]) {
     tree.update_kinematics(model, t, y);
     constraints.prepare(model, tree, t, &y[..model.nq], &Vec3::zeros());
 }

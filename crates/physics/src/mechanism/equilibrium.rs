@@ -1,0 +1,314 @@
+//! Start in static equilibrium: every force of springs, bushings, tyres, stops, contacts and gravity in balance, at the values that
+//! drives, targets, grounds and load factors have at t = 0. Friction carries nothing there, because nothing slides.
+//!
+//! The rest position is a zero of the accelerations a(q) of the machine without velocities. It is found along the flow dq/ds = a(q),
+//! which leads downhill in the potential energy (dV/ds = -a' M a), by implicit Euler steps d / tau = a(q + d), solved by Newton's
+//! method. While the forces fall, tau grows, and the steps become those of Newton's method for a = 0: pseudo-transient
+//! continuation (Kelley & Keyes, SIAM J. Numer. Anal. 35, 1998, pp. 508-523).
+
+use std::sync::Arc;
+
+use super::assembly::Settled;
+use super::constraints::Constraints;
+use super::drives::trajectory_of;
+use super::lu::Lu;
+use super::model::Model;
+use super::settled::settle;
+use super::start::{CLOSED, factor_at};
+use super::tree::Tree;
+use super::{ActiveSet, Mechanism, MechanismError};
+use crate::contact::ContactState;
+use crate::integrate::System as _;
+use crate::machine::{BallJoint, Drive, ElementKind, Formulation, Machine, StartRule};
+
+/// Maximum number of velocity coordinates: the derivative of the accelerations is taken by differences and is dense.
+const MOST_COORDINATES: usize = 400;
+/// Maximum number of iterations of all steps, those that are repeated with a smaller tau included.
+const MOST_STEPS: usize = 1000;
+/// Maximum number of iterations of a step: bodies that move along a wall leave it by the curvature of their path, and each iteration
+/// takes two thirds of a penetration back. Steps with more than a few are not made longer.
+const MOST_CORRECTIONS: usize = 12;
+const FEW: usize = 6;
+/// Displacement for differences, as a time at the scales' speeds, s: 1e-9 m with balls of 10 mm, 1e-8 rad.
+const DIFFERENCE: f64 = 1e-8;
+/// Largest displacement in one iteration, as a time at the scales' speeds, s: 3 times the length scale, 0.3 rad.
+const LONGEST: f64 = 0.3;
+/// First tau, the bounds within which it changes, s^2, and the factors by which it does.
+const FIRST_TAU: f64 = 1e-4;
+const TAU: (f64, f64) = (1e-20, 1e3);
+const GROWTH: (f64, f64) = (2.0, 100.0);
+const CUT: f64 = 0.25;
+/// Least tau, s^2, at which the length of a step tells the distance from rest: parts that swing more slowly than 1 rad/s come
+/// closer with a larger one.
+const TELLING_TAU: f64 = 1.0;
+/// Factor by which the accelerations may grow in a step, and the fraction of those of gravity that may be rounding.
+const RISE: f64 = 2.0;
+const NOISE: f64 = 1e-5;
+/// Displacement of the last step, as a time at the scales' speeds, s: 1e-12 of the length scale; that below which steps that no
+/// longer become shorter are rounding; and the same with the largest tau, where parts without a place of their own drift.
+const AT_REST: f64 = 1e-13;
+const ROUNDING: f64 = 2e-9;
+const DRIFT: f64 = 1e-8;
+
+/// Start in equilibrium of `machine` at t = 0.
+///
+/// The machine without play rests first. Its balls are then laid on their walls where it presses them, and the search continues from
+/// there: on the long way, walls that a ball must follow would allow short steps only.
+///
+/// # Errors
+/// The machine does not start settled, has too many coordinates, or comes to rest nowhere.
+pub(super) fn rest(machine: &Machine) -> Result<Settled, MechanismError> {
+    let Settled { mut state, assembly } = settle(machine, None)?;
+    let mut still = at_start(machine);
+    still.formulation = Formulation::Tree;
+    let play = |joint: &BallJoint| joint.contact.clearance > 0.0;
+    if still.ball_joints.iter().any(play) {
+        let mut ideal = still.clone();
+        ideal.start = StartRule::Ideal;
+        for joint in &mut ideal.ball_joints {
+            joint.contact.clearance = 0.0;
+        }
+        // If it does not rest without play, the search with play says where it ended.
+        if let Ok(rests) = rest_near(&ideal, state.clone()) {
+            state = settle(&still, Some(&rests))?.state;
+        }
+    }
+    still.start = StartRule::AsGiven;
+    Ok(Settled { state: rest_near(&still, state)?, assembly })
+}
+
+/// State of rest of `machine`, whose laws are constant, near the tree coordinates `state`.
+fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f64>, MechanismError> {
+    let Model { nq, nv, .. } = Model::new(machine);
+    if nv > MOST_COORDINATES {
+        return Err(MechanismError::TooLargeForRest { velocities: nv, most: MOST_COORDINATES });
+    }
+    state[nq..].fill(0.0);
+    let mut mechanism = Mechanism::near(machine, Some(&state))?;
+    let state = mechanism.start()?;
+    let found = Search::new(&mut mechanism).find(state);
+    found.map_err(|moves| MechanismError::NoRest {
+        body: machine.bodies[moves.body].name.clone(),
+        acceleration: moves.acceleration,
+        angular_acceleration: moves.angular_acceleration,
+    })
+}
+
+/// `machine` with the values that every law has at t = 0.
+fn at_start(machine: &Machine) -> Machine {
+    let mut still = machine.clone();
+    let forms = super::model::closed_form_of(machine);
+    let forms = forms.map(|form| form.at(0.0).driven);
+    let hold = |drive: &mut Drive, turns: bool| {
+        let trajectory = trajectory_of(drive, turns);
+        let own = trajectory.law().map(|law| law.at(0.0).value);
+        let closed = || Some(forms?[drive.closed_form()?].value);
+        let position = own.or_else(closed).unwrap_or_default();
+        *drive = Drive::Constant { position, velocity: 0.0 };
+    };
+    still.spcmm = None;
+    for joint in &mut still.joints {
+        let freedoms = joint.kind.freedoms();
+        let drives = [&mut joint.drive, &mut joint.second_drive];
+        for (drive, freedom) in drives.into_iter().zip(freedoms) {
+            drive.iter_mut().for_each(|drive| hold(drive, freedom.turns()));
+        }
+    }
+    for element in &mut still.elements {
+        let turns = element.is_on_hinge();
+        let law = match &mut element.kind {
+            ElementKind::Load(load) => &mut load.factor,
+            ElementKind::Motor(motor) => &mut motor.target,
+            ElementKind::Tyre(tyre) => &mut tyre.ground,
+            ElementKind::Spring(_) | ElementKind::JointSpring(_) | ElementKind::Stop(_) | ElementKind::Bushing(_) => {
+                continue;
+            }
+        };
+        law.iter_mut().for_each(|law| hold(law, turns));
+    }
+    still
+}
+
+/// The body that moves most where no rest was found, with its accelerations, m/s^2 and rad/s^2.
+struct Moves {
+    body: usize,
+    acceleration: f64,
+    angular_acceleration: f64,
+}
+
+/// The search for the rest position.
+struct Search<'a> {
+    mechanism: &'a mut Mechanism,
+    model: Arc<Model>,
+    tree: Tree,
+    /// Of the joints without play that close loops.
+    constraints: Option<Constraints>,
+    contact_states: Vec<ContactState>,
+    derivative: Vec<f64>,
+    /// Columns of da/dq.
+    columns: Vec<Vec<f64>>,
+    lu: Lu<f64>,
+}
+
+impl<'a> Search<'a> {
+    fn new(mechanism: &'a mut Mechanism) -> Self {
+        let model = mechanism.model.clone();
+        let tree = Tree::new(&model);
+        let constraints = model.closes_loops().then(|| {
+            let mut constraints = Constraints::new(&model, &model.ideal_joints);
+            if let Some(rank) = model.assembled.get().and_then(|assembled| assembled.rank) {
+                constraints.treat_as_dependent(rank);
+            }
+            constraints
+        });
+        Self {
+            tree,
+            constraints,
+            contact_states: vec![ContactState::default(); model.joints.len()],
+            derivative: vec![0.0; model.nq + model.nv],
+            columns: Vec::new(),
+            lu: Lu::new(model.nv),
+            model,
+            mechanism,
+        }
+    }
+
+    /// The state of rest near `y`.
+    fn find(&mut self, mut y: Vec<f64>) -> Result<Vec<f64>, Moves> {
+        let nv = self.model.nv;
+        if nv == 0 {
+            return Ok(y);
+        }
+        let mut start = vec![0.0; nv];
+        self.accelerate(&y, &mut start);
+        let mut size = self.size(&start);
+        let fall = self.mechanism.gravity.norm() / self.model.speed_scale();
+        let noise = NOISE * size.max(fall);
+        let (mut tau, mut last) = (FIRST_TAU, f64::INFINITY);
+        // Within a step: where it has come to, by which displacement, and the accelerations there.
+        let (mut z, mut moved, mut here) = (y.clone(), vec![0.0; nv], start.clone());
+        let mut iterations = 0;
+        for _ in 0..MOST_STEPS {
+            self.linearise(&z, &here);
+            let mut step: Vec<f64> = here.iter().zip(&moved).map(|(a, moved)| a - moved / tau).collect();
+            self.solve(tau, &mut step);
+            self.project_step(&z, &mut step);
+            let length = self.size(&step);
+            let stirs = length <= if tau >= TAU.1 { DRIFT } else { ROUNDING } && length >= 0.5 * last;
+            if iterations == 0 && tau >= TELLING_TAU && (length <= AT_REST || stirs) {
+                return Ok(y);
+            }
+            let cut = (LONGEST / length).min(1.0);
+            step.iter_mut().for_each(|part| *part *= cut);
+            let closes = length.is_finite() && self.displace(&mut z, &step);
+            moved.iter_mut().zip(&step).for_each(|(moved, part)| *moved += part);
+            self.accelerate(&z, &mut here);
+            let now = self.size(&here);
+            iterations += 1;
+            // On the way, a ball may leave its wall, and then falls.
+            let slack = if tau >= TELLING_TAU { noise } else { fall };
+            let lost = iterations > 1 && length > self.size(&moved);
+            if closes && now <= RISE * size + slack {
+                // A step that needed corrections, or that the accelerations rose in, was long enough.
+                let growth = match size / now.max(f64::MIN_POSITIVE) {
+                    _ if iterations > FEW => 1.0,
+                    fall if fall > 0.8 => fall.clamp(GROWTH.0, GROWTH.1),
+                    fall if fall * RISE > 1.0 => 1.0,
+                    _ => CUT,
+                };
+                tau = (growth * tau).clamp(TAU.0, TAU.1);
+                (size, last) = (now, self.size(&moved));
+                y.clone_from(&z);
+                start.clone_from(&here);
+            } else if closes && now.is_finite() && !lost && iterations < MOST_CORRECTIONS {
+                continue;
+            } else {
+                tau = (CUT * tau).max(TAU.0);
+                z.clone_from(&y);
+                here.clone_from(&start);
+            }
+            moved.fill(0.0);
+            iterations = 0;
+        }
+        Err(self.moves(&y))
+    }
+
+    /// Solves (I / tau - da/dq) x = b in place.
+    fn solve(&mut self, tau: f64, b: &mut [f64]) {
+        let columns = self.columns.iter().enumerate();
+        let entries = columns.flat_map(|(j, column)| column.iter().enumerate().map(move |(i, x)| (i, j, -x)));
+        self.lu.factor(b.len(), entries, 1.0 / tau);
+        self.lu.solve(b);
+    }
+
+    /// Largest part of a displacement, velocity or acceleration, over the scales' speeds.
+    fn size(&self, parts: &[f64]) -> f64 {
+        let scales = &self.model.scale[self.model.nq..];
+        let sizes = parts.iter().zip(scales).map(|(part, scale)| (part / scale).abs());
+        // Unlike `max`, this keeps what is not a number.
+        sizes.fold(0.0, |most, size| if size <= most { most } else { size })
+    }
+
+    /// Accelerations at the positions in `y`, without velocities.
+    fn accelerate(&mut self, y: &[f64], out: &mut [f64]) {
+        let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.contact_states));
+        evaluator.derivative(0.0, y, &mut self.derivative);
+        out.copy_from_slice(&self.derivative[self.model.nq..]);
+    }
+
+    /// Derivatives of the accelerations along every coordinate, as far as the joints can move that way.
+    fn linearise(&mut self, y: &[f64], accelerations: &[f64]) {
+        let nv = self.model.nv;
+        self.columns.resize(nv, Vec::new());
+        for j in 0..nv {
+            let size = DIFFERENCE * self.model.scale[self.model.nq + j];
+            let mut step = vec![0.0; nv];
+            step[j] = size;
+            self.project_step(y, &mut step);
+            let mut beside = y.to_vec();
+            self.displace(&mut beside, &step);
+            let mut column = vec![0.0; nv];
+            self.accelerate(&beside, &mut column);
+            for (slope, at) in column.iter_mut().zip(accelerations) {
+                *slope = (*slope - at) / size;
+            }
+            self.columns[j] = column;
+        }
+    }
+
+    /// Removes the part of the displacement `step` from `y` that would open the joints.
+    fn project_step(&mut self, y: &[f64], step: &mut [f64]) {
+        if let Some(constraints) = &mut self.constraints {
+            factor_at(&self.model, constraints, &mut self.tree, 0.0, y);
+            constraints.project_accelerations(&self.model, step);
+        }
+    }
+
+    /// Moves the positions in `y` by `step`; returns whether the joints still close.
+    fn displace(&mut self, y: &mut [f64], step: &[f64]) -> bool {
+        Tree::displace(&self.model, y, step);
+        Tree::normalise(&self.model, y);
+        let Some(constraints) = &mut self.constraints else {
+            return true;
+        };
+        let error = constraints.project(&self.model, &mut self.tree, 0.0, y);
+        y[self.model.nq..].fill(0.0);
+        error <= CLOSED
+    }
+
+    /// The body that moves most at `y`.
+    fn moves(&mut self, y: &[f64]) -> Moves {
+        let mut evaluator = self.mechanism.evaluator(ActiveSet::Immediate(&self.contact_states));
+        evaluator.evaluate_fully(0.0, y, &mut self.derivative);
+        let scale = self.model.length_scale;
+        let motion = self.mechanism.motion()[..self.model.massive].iter().enumerate();
+        let moves = motion.map(|(body, motion)| Moves {
+            body,
+            acceleration: motion.acceleration.norm(),
+            angular_acceleration: motion.angular_acceleration.norm(),
+        });
+        let size = |moves: &Moves| moves.acceleration + scale * moves.angular_acceleration;
+        let none = Moves { body: 0, acceleration: 0.0, angular_acceleration: 0.0 };
+        moves.fold(none, |most, moves| if size(&moves) > size(&most) { moves } else { most })
+    }
+}
