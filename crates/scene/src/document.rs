@@ -3,7 +3,6 @@
 use super::assets::AssetResolver;
 use super::error::place_of;
 use super::given::{FileNumber, Place};
-use super::include::Include;
 use super::instance::Instance;
 use super::key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, MAX_SI, ValueType, Variants};
 use super::parameters::{Kind, ValueFault};
@@ -31,13 +30,19 @@ pub(super) struct Document<'d> {
     pub text: &'d str,
     pub reading: &'d Reading<'d>,
     /// How another file includes it, if one does.
-    pub include: Option<&'d Include<'d>>,
+    pub include: Option<&'d Inclusion<'d>>,
     /// Innermost group that the values belong to, if any.
     pub instance: Option<&'d Instance<'d>>,
     /// Whether the values belong to a hinge, which changes some dimensions.
     pub on_hinge: bool,
     /// Resolver of the files it names.
     pub beside: &'d AssetResolver<'d>,
+}
+
+/// How a scene includes a file: the values that it gives to the file's parameters, by their names in it.
+#[derive(Default)]
+pub(super) struct Inclusion<'d> {
+    pub values: BTreeMap<&'d str, Node<'d>>,
 }
 
 /// A table with the path of its keys.

@@ -1,11 +1,11 @@
 //! Files included by a scene file: `include = ["leg.toml"]`, or with a name, values and a place, as `[[include]]`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::document::{Document, Node, Section, lists};
+use super::document::{Document, Inclusion, Node, Section, lists};
 use super::format::{FILE, INCLUDED};
 use super::instance::{Group, Instance, Names, PREVIOUS, Placement};
 use super::placement::read_placement;
@@ -20,8 +20,7 @@ pub(super) struct Include<'d> {
     pub text: Arc<str>,
     /// Its entry, if that is a table.
     entry: Option<Section<'d>>,
-    /// Values of its parameters, by name.
-    pub values: BTreeMap<&'d str, Node<'d>>,
+    inclusion: Inclusion<'d>,
 }
 
 /// Reads the list of files that `top` includes.
@@ -55,8 +54,8 @@ pub(super) fn read_includes<'d>(top: &Section<'d>) -> Result<Vec<Include<'d>>, S
             return Err(file.error("this is the scene's own file, which cannot include itself; name another or none"));
         }
         let values = entry.as_ref().and_then(|entry| entry.get("values"));
-        let values = values.map_or(Ok(BTreeMap::new()), |node| node.named_values())?;
-        includes.push(Include { file: file.text()?, prefix, text, entry, values });
+        let values = values.map_or(Ok(Default::default()), |node| node.named_values())?;
+        includes.push(Include { file: file.text()?, prefix, text, entry, inclusion: Inclusion { values } });
     }
     Ok(includes)
 }
@@ -74,7 +73,7 @@ fn read_prefix(name: &Node<'_>) -> Result<String, SceneError> {
 impl<'d> Include<'d> {
     /// The document of the file.
     pub fn document(&'d self, of: Document<'d>) -> Document<'d> {
-        Document { file: Some(self.file), text: &self.text, include: Some(self), ..of }
+        Document { file: Some(self.file), text: &self.text, include: Some(&self.inclusion), ..of }
     }
 
     /// The group of its parts, not yet placed; `None` if the scene names the file and nothing more.
@@ -100,29 +99,30 @@ impl<'d> Include<'d> {
         let placement = read_placement(entry)?.unwrap_or(Placement::identity());
         Ok(Some(Instance { group: named.group.clone(), placement, outer }))
     }
+}
 
-    /// Checks that every value is one of the parameters in `file`, its section.
-    ///
-    /// # Errors
-    /// A value for no parameter.
-    pub fn check_values(&self, file: &Section<'d>) -> Result<(), SceneError> {
-        let nodes = lists(std::slice::from_ref(file), "parameter", Vec::new())?;
-        let named = |node: &Node<'d>| node.value.get_ref().get("name")?.get_ref().as_str();
-        let names: Vec<&str> = nodes.iter().filter_map(named).collect();
-        let unknown = self.values.iter().filter(|(name, _)| !names.contains(name));
-        match unknown.min_by_key(|(_, node)| node.place()) {
-            None => Ok(()),
-            Some((name, node)) => {
-                let near = nearest(name, names.iter().copied());
-                let file = visible_line(self.file);
-                let allowed = match names.is_empty() {
-                    true => "it has none".to_owned(),
-                    false => format!("allowed {}", names.join(", ")),
-                };
-                Err(node.error(format!("is no parameter of {file}{near}; {allowed}")))
-            }
-        }
-    }
+/// Checks that every value for `file`, the section of an included file, is that of one of its parameters.
+///
+/// # Errors
+/// A value for no parameter.
+pub(super) fn check_values(file: &Section<'_>) -> Result<(), SceneError> {
+    let Some(include) = file.document.include else {
+        return Ok(());
+    };
+    let nodes = lists(std::slice::from_ref(file), "parameter", Vec::new())?;
+    let names = nodes.iter().filter_map(|node| node.value.get_ref().get("name")?.get_ref().as_str());
+    let names: Vec<&str> = names.collect();
+    let unknown = include.values.iter().filter(|(name, _)| !names.contains(name));
+    let Some((name, node)) = unknown.min_by_key(|(_, node)| node.place()) else {
+        return Ok(());
+    };
+    let near = nearest(name, names.iter().copied());
+    let file = visible_line(file.document.file.unwrap_or_default());
+    let allowed = match names.is_empty() {
+        true => "it has none".to_owned(),
+        false => format!("allowed {}", names.join(", ")),
+    };
+    Err(node.error(format!("is no parameter of {file}{near}; {allowed}")))
 }
 
 /// Names of bodies and joints in a file.

@@ -2,6 +2,7 @@
 
 use super::document::{Node, Section, lists};
 use super::error::place_of;
+use super::include::check_values;
 use super::instance::Instance;
 use super::numbers::{LARGEST, row_of_file};
 use super::*;
@@ -13,9 +14,7 @@ use jointplay_physics::units::{all_units, same_unit, split_unit};
 /// An invalid or repeated parameter.
 pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>, SceneError> {
     let mut all: Vec<(&Parameter, bool)> = Vec::new();
-    for file in files {
-        file.document.include.map_or(Ok(()), |include| include.check_values(file))?;
-    }
+    files.iter().try_for_each(check_values)?;
     let nodes = lists(files, "parameter", Vec::new())?;
     for (i, node) in nodes.iter().enumerate() {
         let own = read_parameter(node, files[0].rows)
