@@ -5,7 +5,7 @@ use std::fmt::Display;
 use jointplay_physics::suggest::brief;
 
 use crate::normal::{cumulative, quantile};
-use crate::statistics::interpolated_quantile;
+use crate::yields::interpolated_quantile;
 
 /// Smallest probability between the limits of a truncated normal distribution.
 const LEAST_MASS: f64 = 1e-200;

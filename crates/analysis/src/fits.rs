@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::statistics::Estimate;
+use crate::yields::Estimate;
 
 /// Largest number of choices that a proof looks at; without an evaluation a choice costs nearly nothing.
 const MOST_CHOICES: usize = 1 << 20;
@@ -300,7 +300,7 @@ impl Eq for Node {}
 mod tests {
     use super::*;
     use crate::random::{Purpose, RandomStream};
-    use crate::statistics::yield_fraction;
+    use crate::yields::yield_fraction;
 
     const UNITS: usize = 400;
 

@@ -3,7 +3,7 @@
 
 use crate::random::{Purpose, RandomStream};
 use crate::sampling::{MOST_DIMENSIONS, MOST_POINTS, Sampler, Sampling, SamplingError};
-use crate::statistics::{Estimate, interpolated_quantile};
+use crate::yields::{Estimate, interpolated_quantile};
 
 /// Least number of complete rows from which indices are estimated.
 const LEAST_ROWS: usize = 8;

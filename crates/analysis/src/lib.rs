@@ -7,7 +7,7 @@
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
 //!   known answers ([`validation`]).
 //! - Uncertain parameters, without any scene: [`sampling`], [`distribution`] and ISO fits ([`iso286`]); which input matters
-//!   ([`morris`], [`indices`]); percentiles, yield and rejects ([`statistics`]); the cheapest fits that hold a yield ([`fits`]).
+//!   ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits that hold a yield ([`fits`]).
 //!
 //! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
 //!
@@ -40,9 +40,9 @@
 pub mod axis;
 pub mod beginning;
 mod cost;
-pub mod distribution;
 pub mod crossing;
 pub mod design;
+pub mod distribution;
 pub mod drive;
 pub mod exponent;
 pub mod fits;
@@ -71,7 +71,7 @@ pub mod sampling;
 pub mod section;
 mod setting;
 pub mod source;
-pub mod statistics;
+
 pub mod statistic;
 pub mod sweep;
 pub mod sweep_task;
@@ -79,6 +79,7 @@ pub mod task;
 mod timing;
 pub mod validation;
 mod work_precision;
+pub mod yields;
 
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use front::front;

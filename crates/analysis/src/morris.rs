@@ -3,7 +3,7 @@
 
 use crate::random::{Purpose, RandomStream};
 use crate::sampling::MOST_POINTS;
-use crate::statistics::mean_and_deviation;
+use crate::yields::mean_and_deviation;
 
 /// Largest number of levels of an input.
 const MOST_LEVELS: usize = 1000;

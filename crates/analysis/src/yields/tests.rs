@@ -129,7 +129,7 @@ fn p_values_are_those_of_kolmogorovs_distribution() {
 
 #[test]
 fn bad_input_is_refused() {
-    let text = |error: StatisticsError| error.to_string();
+    let text = |error: YieldsError| error.to_string();
     assert_eq!(text(percentile(&[], 0.5, 0.95).unwrap_err()), "too few values: 0 of at least 1");
     assert_eq!(
         text(percentile(&[1.0], 1.0, 0.95).unwrap_err()),
@@ -139,9 +139,9 @@ fn bad_input_is_refused() {
     assert_eq!(text(not_finite), "value 1 is NaN: only finite values can be evaluated");
     assert_eq!(text(yield_fraction(3, 2, 0.95).unwrap_err()), "3 of 2 accepted");
     assert!(yield_fraction(0, 0, 0.95).is_err() && yield_fraction(1, 2, f64::NAN).is_err());
-    assert_eq!(capability(&[2.0; 3], Some(0.0), None, 0.9).unwrap_err(), StatisticsError::NoSpread { value: 2.0 });
+    assert_eq!(capability(&[2.0; 3], Some(0.0), None, 0.9).unwrap_err(), YieldsError::NoSpread { value: 2.0 });
     for limits in [(None, None), (Some(2.0), Some(1.0)), (Some(f64::NAN), None)] {
-        assert_eq!(capability(&[1.0, 2.0], limits.0, limits.1, 0.9).unwrap_err(), StatisticsError::Limits);
+        assert_eq!(capability(&[1.0, 2.0], limits.0, limits.1, 0.9).unwrap_err(), YieldsError::Limits);
     }
     assert!(capability(&[1.0], Some(0.0), None, 0.9).is_err());
     assert!(reject_drivers(&[vec![1.0]], &[true, false]).is_err());

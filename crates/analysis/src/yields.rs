@@ -4,7 +4,7 @@ use crate::normal;
 
 /// Why there are no such statistics.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum StatisticsError {
+pub enum YieldsError {
     /// Too few values.
     #[error("too few values: {count} of at least {least}")]
     TooFew {
@@ -87,16 +87,16 @@ pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0)).sqrt())
 }
 
-fn probability(name: &'static str, value: f64) -> Result<(), StatisticsError> {
-    if value > 0.0 && value < 1.0 { Ok(()) } else { Err(StatisticsError::Probability { name, value }) }
+fn probability(name: &'static str, value: f64) -> Result<(), YieldsError> {
+    if value > 0.0 && value < 1.0 { Ok(()) } else { Err(YieldsError::Probability { name, value }) }
 }
 
-fn finite(values: &[f64], least: usize) -> Result<(), StatisticsError> {
+fn finite(values: &[f64], least: usize) -> Result<(), YieldsError> {
     if values.len() < least {
-        return Err(StatisticsError::TooFew { count: values.len(), least });
+        return Err(YieldsError::TooFew { count: values.len(), least });
     }
     match values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
-        Some((index, &value)) => Err(StatisticsError::NotFinite { index, value }),
+        Some((index, &value)) => Err(YieldsError::NotFinite { index, value }),
         None => Ok(()),
     }
 }
@@ -107,7 +107,7 @@ fn finite(values: &[f64], least: usize) -> Result<(), StatisticsError> {
 ///
 /// # Errors
 /// No values or one that is not finite; a probability that is not between 0 and 1.
-pub fn percentile(values: &[f64], p: f64, confidence: f64) -> Result<Estimate, StatisticsError> {
+pub fn percentile(values: &[f64], p: f64, confidence: f64) -> Result<Estimate, YieldsError> {
     probability("percentile", p)?;
     probability("confidence", confidence)?;
     finite(values, 1)?;
@@ -160,13 +160,13 @@ fn binomial(n: usize, p: f64) -> Vec<f64> {
 ///
 /// # Errors
 /// No units, more accepted than made, or a confidence that is not between 0 and 1.
-pub fn yield_fraction(accepted: usize, made: usize, confidence: f64) -> Result<Estimate, StatisticsError> {
+pub fn yield_fraction(accepted: usize, made: usize, confidence: f64) -> Result<Estimate, YieldsError> {
     probability("confidence", confidence)?;
     if made == 0 {
-        return Err(StatisticsError::TooFew { count: 0, least: 1 });
+        return Err(YieldsError::TooFew { count: 0, least: 1 });
     }
     if accepted > made {
-        return Err(StatisticsError::Counts { accepted, made });
+        return Err(YieldsError::Counts { accepted, made });
     }
     let z = normal::quantile(0.5 * (1.0 + confidence));
     let n = made as f64;
@@ -205,7 +205,7 @@ pub fn capability(
     lower: Option<f64>,
     upper: Option<f64>,
     confidence: f64,
-) -> Result<Capability, StatisticsError> {
+) -> Result<Capability, YieldsError> {
     probability("confidence", confidence)?;
     finite(values, 2)?;
     let ordered = lower.zip(upper).is_none_or(|(lower, upper)| lower < upper);
@@ -214,11 +214,11 @@ pub fn capability(
         || lower.is_some_and(f64::is_nan)
         || upper.is_some_and(f64::is_nan)
     {
-        return Err(StatisticsError::Limits);
+        return Err(YieldsError::Limits);
     }
     let (mean, deviation) = mean_and_deviation(values);
     if values.iter().all(|&value| value == values[0]) {
-        return Err(StatisticsError::NoSpread { value: values[0] });
+        return Err(YieldsError::NoSpread { value: values[0] });
     }
     let margins = [lower.map(|lower| mean - lower), upper.map(|upper| upper - mean)];
     let nearer = margins.into_iter().flatten().fold(f64::INFINITY, f64::min);
@@ -251,10 +251,10 @@ pub struct RejectDriver {
 ///
 /// # Errors
 /// An input without a value for each unit, or with one that is not finite.
-pub fn reject_drivers(inputs: &[Vec<f64>], accepted: &[bool]) -> Result<Option<Vec<RejectDriver>>, StatisticsError> {
+pub fn reject_drivers(inputs: &[Vec<f64>], accepted: &[bool]) -> Result<Option<Vec<RejectDriver>>, YieldsError> {
     for (input, values) in inputs.iter().enumerate() {
         if values.len() != accepted.len() {
-            return Err(StatisticsError::Lengths { input, values: values.len(), units: accepted.len() });
+            return Err(YieldsError::Lengths { input, values: values.len(), units: accepted.len() });
         }
         finite(values, 0)?;
     }
