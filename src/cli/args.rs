@@ -223,7 +223,7 @@ pub struct SweepArguments {
     /// Threads to use [default: one for each core]; the result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv).
+    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv, .parquet).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Format of the summary on standard output.
@@ -243,7 +243,7 @@ pub struct MergeArguments {
     /// Files that `sweep --shard` wrote, all from one sweep.
     #[arg(value_name = "SHARD", required = true)]
     pub shards: Vec<PathBuf>,
-    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv).
+    /// File to write: a NumPy archive (.npz), or a table with one row per point (.csv, .parquet).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Format of the summary on standard output.

@@ -12,6 +12,8 @@ use jointplay::analysis::sweep::Sweep;
 use jointplay::scene::Scene;
 use ndarray::{ArrayD, IxDyn, OwnedRepr};
 use ndarray_npy::NpzReader;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
 use serde_json::Value as Json;
 
 use crate::program::{command, folder, jointplay, names};
@@ -347,7 +349,7 @@ fn bad_input_is_refused_before_anything_runs() {
             2,
             "more than a result holds",
         ),
-        (format!("{SMALL} --out a.txt"), 2, ".npz or .csv"),
+        (format!("{SMALL} --out a.txt"), 2, ".npz, .csv or .parquet"),
         (format!("{SMALL} --shard 1/2 --out a.csv"), 2, "a shard is a NumPy archive"),
         (format!("{SMALL} --period 0 --out a.npz"), 2, "--period 0: the time must be above 0"),
         (format!("{SMALL} --keep S1.nromal:max --out a.npz"), 2, "did you mean `S1.normal`?"),
@@ -393,11 +395,14 @@ fn a_duration_needs_no_drive_and_threads_and_shards_change_no_bit_of_it() {
     assert!(said.contains("Points            6") && !said.contains("Regimes"), "{said}");
     run("--threads 2 --out two.npz");
     run("--threads 2 --out two.csv");
+    run("--threads 2 --out two.parquet");
     run("--shard 1/2 --out s1.npz");
     run("--shard 2/2 --out s2.npz");
     jointplay(folder.path(), "merge s2.npz s1.npz --out merged.npz").expect(0);
     jointplay(folder.path(), "merge s1.npz s2.npz --out merged.csv").expect(0);
+    jointplay(folder.path(), "merge s2.npz s1.npz --out merged.parquet").expect(0);
     assert!(read("one.npz") == read("two.npz") && read("one.npz") == read("merged.npz"));
+    assert!(read("two.parquet") == read("merged.parquet"));
     assert!(read("two.csv") == read("merged.csv") && read("two.csv.meta.json") == read("merged.csv.meta.json"));
 
     let (arrays, meta) = archive(&folder.path().join("one.npz"));
@@ -412,7 +417,32 @@ fn a_duration_needs_no_drive_and_threads_and_shards_change_no_bit_of_it() {
     let holds = |bytes: &[u8]| read("one.npz").windows(bytes.len()).any(|window| window == bytes);
     assert!(holds(b"<U32") && holds(&utf32("hertz")) && holds(&utf32("flores")) && !holds(&utf32("gonthier")));
 
-    // The table has the same numbers, point by point.
+    // The tables have the same numbers, point by point.
+    let table = SerializedFileReader::new(fs::File::open(folder.path().join("two.parquet")).unwrap()).unwrap();
+    let of_file = table.metadata().file_metadata();
+    let own = of_file.key_value_metadata().unwrap().iter().find(|own| own.key == "meta").unwrap();
+    let own: Json = serde_json::from_str(own.value.as_ref().unwrap()).unwrap();
+    assert_eq!(own, meta);
+    let mut points = 0;
+    for (i, row) in table.get_row_iter(None).unwrap().map(Result::unwrap).enumerate() {
+        let columns: Vec<(&String, &Field)> = row.get_column_iter().collect();
+        assert_eq!(
+            columns[0],
+            (&"contact.clearance_m".to_owned(), &Field::Double(arrays["contact.clearance"][[i / 2]]))
+        );
+        assert_eq!(columns[1].1, &Field::Str(["hertz", "flores"][i % 2].to_owned()));
+        for (name, field) in &columns[2..] {
+            let value = arrays[*name][[i / 2, i % 2]];
+            let same = match field {
+                Field::Double(own) => own.to_bits() == value.to_bits(),
+                Field::Long(own) => *own as f64 == value,
+                _ => false,
+            };
+            assert!(same, "{name}: {field} for {value}");
+        }
+        points += 1;
+    }
+    assert_eq!(points, 6);
     let text = String::from_utf8(read("two.csv")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let heads = lines.next().unwrap();

@@ -55,7 +55,7 @@ pub enum SweepError {
         most: usize,
     },
     /// No drive phase.
-    #[error("{0}; sections at a drive phase need a driven scene such as spcmm or slider-crank-driven")]
+    #[error("{0}; take a driven scene such as spcmm or slider-crank-driven")]
     NoPeriod(#[from] NoPeriod),
     /// A point that the scene does not accept, or that cannot start.
     #[error("the scene cannot start at {point}: {error}")]

@@ -4,6 +4,7 @@ mod archive;
 mod csv;
 mod merge;
 mod options;
+mod parquet;
 mod partial;
 mod request;
 mod target;

@@ -27,7 +27,7 @@ pub(super) fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
     let protocol = protocol(arguments, &scene)?;
     Sweep::new(scene, design, protocol).map_err(|error| match error {
         SweepError::NoPeriod(_) => usage(format!(
-            "{error}; or give the length of each point with --duration, or the time between two sections with --period"
+            "{error}, or give the length of each point with --duration, or the time between two sections with --period"
         )),
         other => usage(other),
     })
