@@ -242,6 +242,8 @@ impl Watch {
 pub struct PointRun {
     watch: Watch,
     interval: f64,
+    /// Whether the transient is over.
+    is_keeping: bool,
     resolution: Vec<f64>,
     started: f64,
     impacts_at_start: Vec<u64>,
@@ -292,6 +294,7 @@ impl PointRun {
             statistics: Accumulator::new(&protocol.keep, simulation, sample_interval),
             watch: protocol.watch(machine, interval, separation, follows),
             interval,
+            is_keeping: false,
             started,
             impacts_at_discard: impacts.clone(),
             impacts_at_start: impacts,
@@ -349,11 +352,10 @@ impl PointRun {
             Watch::Sections(run) => run.step()?,
             Watch::Crossings(run) => run.step()?,
         };
-        let discard = self.watch.discard();
-        if self.watch.taken() < discard {
+        if self.watch.taken() < self.watch.discard() {
             return Ok(());
         }
-        if at_section && self.watch.taken() == discard {
+        if !self.is_keeping {
             self.begin_keeping();
         } else {
             self.means.look(self.watch.orbit_mut(), at_section);
@@ -364,6 +366,7 @@ impl PointRun {
 
     /// Ends the transient and starts recording.
     fn begin_keeping(&mut self) {
+        self.is_keeping = true;
         let machine = self.watch.orbit_mut();
         let simulation = machine.simulation_mut();
         simulation.take_peaks(&mut self.peaks);
@@ -384,15 +387,17 @@ impl PointRun {
         let statistics = simulation.statistics();
         let span = self.means.span;
         let machine = simulation.machine();
-        let statistics_of_channels = self.statistics.values(machine, |j| self.peaks[j].normal);
+        // A point with fewer crossings than are discarded has no kept part.
+        let peak_kept = |j: usize| if self.is_keeping { self.peaks[j].normal } else { f64::NAN };
+        let statistics_of_channels = self.statistics.values(machine, peak_kept);
         let joints = (0..self.peaks.len())
             .map(|j| JointResult {
                 name: machine.ball_joints[j].name.clone(),
                 peak: self.peaks[j].normal.max(self.transient_peaks[j]),
-                peak_kept: self.peaks[j].normal,
+                peak_kept: peak_kept(j),
                 mean: self.means.normal[j] / span,
                 impacts: statistics.impacts[j] - self.impacts_at_start[j],
-                impacts_kept: statistics.impacts[j] - self.impacts_at_discard[j],
+                impacts_kept: if self.is_keeping { statistics.impacts[j] - self.impacts_at_discard[j] } else { 0 },
                 last_separation: statistics.last_separation[j]
                     .filter(|&time| time > self.started)
                     .map(|time| time - self.started),

@@ -240,6 +240,7 @@ impl BlockRun<'_> {
 mod tests {
     use super::*;
     use crate::axis::Axis;
+    use crate::crossing::Crossing;
     use crate::point::{Plan, Span};
     use crate::statistic::ChannelStatistic;
     use jointplay_physics::simulate::Frame;
@@ -309,6 +310,28 @@ mod tests {
             assert!(forces.iter().all(|force| *force <= peak * (1.0 + 1e-12)));
             let mean = value(&format!("{joint}_normal_mean_N"));
             assert!(mean > 0.0 && mean < peak, "{mean} {peak}");
+        }
+    }
+
+    #[test]
+    fn a_point_without_enough_crossings_has_no_kept_part() {
+        let scene = Scene::load("pendulum", &[]).expect("built in");
+        // It starts at 30 degrees and swings through the vertical at least once in a second.
+        let crossing = Crossing::parse(&scene, "rod.pose.gamma=0deg").expect("an angle");
+        for (discard, keeps) in [(1, true), (40, false)] {
+            let (count, crossing) = (50, crossing.clone());
+            let span = Span::Crossings { crossing, count, discard, duration: 1.0 };
+            let (sweep, results) = swept("pendulum", "gravity.z=-9.81m/s^2..-5m/s^2:2", span, "*.normal:max,time:end");
+            for result in results {
+                assert!(result.crossings >= 1 && result.crossings < 40, "{}", result.crossings);
+                let (peak, end) = (result.statistics[0], result.statistics[1]);
+                assert_eq!((peak.is_finite(), end == 1.0), (keeps, keeps));
+                assert!(keeps || result.joints[0].impacts_kept == 0);
+                assert_eq!(result.times.len(), result.crossings.saturating_sub(discard));
+                let mut record = Vec::new();
+                sweep.layout().append(Some(&result), &mut record);
+                assert_eq!(record.len(), sweep.layout().record_length());
+            }
         }
     }
 
