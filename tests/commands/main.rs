@@ -15,4 +15,5 @@ mod reproduce;
 mod states;
 mod survival;
 mod sweep;
+mod sweep_points;
 mod tradeoff;
