@@ -119,6 +119,19 @@ fn mechanisms_without_drives_start_at_rest_wherever_their_files_begin() {
 }
 
 #[test]
+fn a_row_of_links_too_long_for_the_search_is_refused() {
+    // Six velocity coordinates for each link.
+    let rests = |links: &str| {
+        let scene = scene("chain", &[("start", "equilibrium"), ("chain.links", links)]);
+        Simulation::new(&scene.machine).map(|_| ()).map_err(|error| scene.locate(&error).to_string())
+    };
+    assert_eq!(rests("40"), Ok(()));
+    let error = rests("67").unwrap_err();
+    assert!(error.contains("402 velocity coordinates") && error.contains("at most 400"), "{error}");
+    assert!(error.contains("chain.links = 67"), "{error}");
+}
+
+#[test]
 fn every_built_in_machine_starts_in_equilibrium_in_both_formulations() {
     for name in BUILT_IN {
         let [tree, lagrange] = ["tree", "lagrange"].map(|formulation| {

@@ -12,7 +12,7 @@ use super::assembly::Settled;
 use super::constraints::Constraints;
 use super::drives::trajectory_of;
 use super::lu::Lu;
-use super::model::Model;
+use super::model::{Body, Model, Motion};
 use super::settled::settle;
 use super::start::{CLOSED, factor_at};
 use super::tree::Tree;
@@ -23,16 +23,19 @@ use crate::machine::{BallJoint, Drive, ElementKind, Formulation, Machine, StartR
 
 /// Maximum number of velocity coordinates: the derivative of the accelerations is taken by differences and is dense.
 const MOST_COORDINATES: usize = 400;
-/// Maximum number of iterations of all steps, those that are repeated with a smaller tau included.
+/// Maximum number of iterations of all steps, those that are repeated with a smaller tau included, and of evaluations, one for each
+/// coordinate in an iteration: some seconds.
 const MOST_STEPS: usize = 1000;
+const MOST_EVALUATIONS: usize = 50_000;
 /// Maximum number of iterations of a step: bodies that move along a wall leave it by the curvature of their path, and each iteration
 /// takes two thirds of a penetration back. Steps with more than a few are not made longer.
 const MOST_CORRECTIONS: usize = 12;
 const FEW: usize = 6;
 /// Displacement for differences, as a time at the scales' speeds, s: 1e-9 m with balls of 10 mm, 1e-8 rad.
 const DIFFERENCE: f64 = 1e-8;
-/// Largest displacement in one iteration, as a time at the scales' speeds, s: 3 times the length scale, 0.3 rad.
-const LONGEST: f64 = 0.3;
+/// Largest turn in one iteration, rad, and largest shift over the length scale and over the size of the machine, whichever is more.
+const LARGEST_TURN: f64 = 0.3;
+const LARGEST_SHIFT: (f64, f64) = (3.0, 0.1);
 /// First tau, the bounds within which it changes, s^2, and the factors by which it does.
 const FIRST_TAU: f64 = 1e-4;
 const TAU: (f64, f64) = (1e-20, 1e3);
@@ -182,13 +185,14 @@ impl<'a> Search<'a> {
         let mut start = vec![0.0; nv];
         self.accelerate(&y, &mut start);
         let mut size = self.size(&start);
+        let largest_shift = (LARGEST_SHIFT.0 * self.model.length_scale).max(LARGEST_SHIFT.1 * self.extent());
         let fall = self.mechanism.gravity.norm() / self.model.speed_scale();
         let noise = NOISE * size.max(fall);
         let (mut tau, mut last) = (FIRST_TAU, f64::INFINITY);
         // Within a step: where it has come to, by which displacement, and the accelerations there.
         let (mut z, mut moved, mut here) = (y.clone(), vec![0.0; nv], start.clone());
         let mut iterations = 0;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MOST_STEPS.min(MOST_EVALUATIONS / nv) {
             self.linearise(&z, &here);
             let mut step: Vec<f64> = here.iter().zip(&moved).map(|(a, moved)| a - moved / tau).collect();
             self.solve(tau, &mut step);
@@ -198,7 +202,7 @@ impl<'a> Search<'a> {
             if iterations == 0 && tau >= TELLING_TAU && (length <= AT_REST || stirs) {
                 return Ok(y);
             }
-            let cut = (LONGEST / length).min(1.0);
+            let cut = (1.0 / self.excess(&step, largest_shift)).min(1.0);
             step.iter_mut().for_each(|part| *part *= cut);
             let closes = length.is_finite() && self.displace(&mut z, &step);
             moved.iter_mut().zip(&step).for_each(|(moved, part)| *moved += part);
@@ -241,6 +245,28 @@ impl<'a> Search<'a> {
         self.lu.solve(b);
     }
 
+    /// Diagonal of the box around the centroids at the latest evaluation, m.
+    fn extent(&self) -> f64 {
+        let places = || self.mechanism.motion()[..self.model.massive].iter().map(|body| body.position);
+        let most = places().reduce(|a, b| a.sup(&b)).unwrap_or_default();
+        let least = places().reduce(|a, b| a.inf(&b)).unwrap_or_default();
+        (most - least).norm()
+    }
+
+    /// Largest part of the displacement `step` over what one iteration may take, with shifts up to `largest_shift`, m.
+    fn excess(&self, step: &[f64], largest_shift: f64) -> f64 {
+        let shift = |part: &f64| part.abs() / largest_shift;
+        let turn = |part: &f64| part.abs() / LARGEST_TURN;
+        let most = |parts: &[f64], over: &dyn Fn(&f64) -> f64| parts.iter().map(over).fold(0.0, f64::max);
+        let of_body = |body: &Body| match body.motion {
+            Motion::Free { v, .. } => most(&step[v..v + 3], &shift).max(most(&step[v + 3..v + 6], &turn)),
+            Motion::Prismatic { v, .. } => shift(&step[v]),
+            Motion::Revolute { v, .. } => turn(&step[v]),
+            Motion::Fixed | Motion::Driven { .. } => 0.0,
+        };
+        self.model.bodies.iter().map(of_body).fold(0.0, f64::max)
+    }
+
     /// Largest part of a displacement, velocity or acceleration, over the scales' speeds.
     fn size(&self, parts: &[f64]) -> f64 {
         let scales = &self.model.scale[self.model.nq..];
@@ -265,8 +291,9 @@ impl<'a> Search<'a> {
             let mut step = vec![0.0; nv];
             step[j] = size;
             self.project_step(y, &mut step);
+            // So small a step along the joints opens them by less than rounding does.
             let mut beside = y.to_vec();
-            self.displace(&mut beside, &step);
+            Tree::displace(&self.model, &mut beside, &step);
             let mut column = vec![0.0; nv];
             self.accelerate(&beside, &mut column);
             for (slope, at) in column.iter_mut().zip(accelerations) {
