@@ -48,7 +48,8 @@ fn a_mass_starts_where_its_weight_and_its_springs_balance() {
     let spring = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\", at = \"0 0 1 m\" }\nto = { body = \"mass\" }\n\
                   length = \"1 m\"\nstiffness = \"500 N/m\"\ndamping = \"3 N s/m\"\n";
     let tyre = "[[tyre]]\nname = \"t\"\non = { body = \"mass\" }\nradius = \"0.3 m\"\nstiffness = \"20 kN/m\"\n\
-                ground = { law = \"harmonic\", mean = \"50 mm\", amplitude = \"10 mm\", frequency = \"2 Hz\", phase = \"90 deg\" }\n";
+                ground = { law = \"harmonic\", mean = \"50 mm\", amplitude = \"10 mm\", frequency = \"2 Hz\", \
+                phase = \"90 deg\" }\n";
     let bushing = "[[bushing]]\nname = \"b\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nstiffness = \"1 2 3 kN/m\"\n";
     let stop = "[[stop]]\nname = \"e\"\njoint = \"guide\"\nlower = \"-100 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n";
     let held = "[[joint_spring]]\nname = \"j\"\njoint = \"guide\"\nstiffness = \"1 kN/m\"\n\

@@ -76,7 +76,8 @@ fn every_element_and_kind_of_joint_turns_with_the_scene() {
 [[joint]]\nname = \"a\"\nkind = \"free\"\nchild = \"a\"\nchild_point = \"10 0 0 mm\"
 start = {{ position = \"0 0 290 mm\", rotation = {{ axis = [0, 1, 0], angle = \"10 deg\" }}, \
 velocity = \"0.1 0 0.2 m/s\", angular_velocity = \"1 2 3 rad/s\" }}
-[[joint]]\nname = \"b\"\nkind = \"universal\"\nchild = \"b\"\naxis = [0, 1, 0]\nchild_axis = [1, 0, 0]\nparent_point = \"500 0 0 mm\"
+[[joint]]\nname = \"b\"\nkind = \"universal\"\nchild = \"b\"\naxis = [0, 1, 0]\nchild_axis = [1, 0, 0]
+parent_point = \"500 0 0 mm\"
 child_point = \"0 0 50 mm\"\nstart = {{ angle = \"20 deg\", child_angular_velocity = \"1 rad/s\" }}
 [[joint]]\nname = \"c\"\nkind = \"cylindrical\"\nchild = \"c\"\naxis = [1, 0, 1]\nparent_point = \"0 500 0 mm\"
 rotation = {{ axis = [1, 0, 0], angle = \"30 deg\" }}
@@ -84,14 +85,17 @@ rotation = {{ axis = [1, 0, 0], angle = \"30 deg\" }}
 [[tyre]]\nname = \"tyre\"\non = {{ body = \"a\" }}\nradius = \"300 mm\"\nstiffness = \"20 kN/m\"\ndamping = \"50 N s/m\"
 ground = {{ law = \"harmonic\", amplitude = \"5 mm\", frequency = \"4 Hz\" }}
 [[tyre]]\nname = \"tyre-up\"\non = {{ body = \"d\" }}\nradius = \"300 mm\"\nup = [0, 0, 1]\nstiffness = \"20 kN/m\"
-[[bushing]]\nname = \"from-world\"\nfrom = {{ body = \"world\", at = \"500 0 -40 mm\" }}\nto = {{ body = \"b\", at = \"0 0 10 mm\" }}
+[[bushing]]\nname = \"from-world\"\nfrom = {{ body = \"world\", at = \"500 0 -40 mm\" }}
+to = {{ body = \"b\", at = \"0 0 10 mm\" }}
 stiffness = \"100 200 300 N/m\"\nturning_stiffness = \"1 2 3 N m/rad\"\nturning_damping = \"0.01 0.02 0.03 N m s/rad\"
 axes = {{ axis = [0, 1, 1], angle = \"20 deg\" }}\nrotation = {{ axis = [1, 1, 0], angle = \"5 deg\" }}
 [[bushing]]\nname = \"to-world\"\nfrom = {{ body = \"c\" }}\nto = {{ body = \"world\", at = \"0 500 10 mm\" }}
 stiffness = \"100 200 300 N/m\"\nturning_stiffness = \"1 2 3 N m/rad\"
 axes = {{ axis = [0, 1, 1], angle = \"20 deg\" }}\nrotation = {{ axis = [1, 1, 0], angle = \"5 deg\" }}
-[[spring]]\nname = \"spring\"\nfrom = {{ body = \"world\", at = \"0 -500 600 mm\" }}\nto = {{ body = \"a\" }}\nlength = \"500 mm\"\nstiffness = \"100 N/m\"
-[[load]]\nname = \"wind\"\non = {{ body = \"b\" }}\nforce = \"1 2 0 N\"\ntorque = \"0 0.1 0 N m\"\nfrequency = \"3 Hz\"\nphase = \"20 deg\"
+[[spring]]\nname = \"spring\"\nfrom = {{ body = \"world\", at = \"0 -500 600 mm\" }}\nto = {{ body = \"a\" }}
+length = \"500 mm\"\nstiffness = \"100 N/m\"
+[[load]]\nname = \"wind\"\non = {{ body = \"b\" }}\nforce = \"1 2 0 N\"\ntorque = \"0 0.1 0 N m\"
+frequency = \"3 Hz\"\nphase = \"20 deg\"
 [[load]]\nname = \"thrust\"\non = {{ body = \"a\", at = \"0 0 10 mm\" }}\nforce = \"1 2 0 N\"\naxes = \"body\"
 [[joint_spring]]\nname = \"joint-spring\"\njoint = \"b\"\ncoordinate = \"angle\"\nstiffness = \"1 N m/rad\"
 [[motor]]\nname = \"motor\"\njoint = \"c\"\ncoordinate = \"position\"\nforce = \"5 N\"
@@ -111,7 +115,8 @@ fn a_file_in_a_turned_scene_turns_with_it() {
         [[pattern.spring]]\nname = \"s\"\nfrom = { body = \"world\", at = \"200 0 50 mm\" }\nto = { body = \"rod\" }\n\
         length = \"100 mm\"\nstiffness = \"50 N/m\"\n";
     let top = format!(
-        "include = [{{ file = \"leg.toml\", name = \"left\", position = \"0 100 0 mm\", rotation = {{ axis = [0, 1, 0], angle = \"40 deg\" }} }}]\n{GRAVITY}\
+        "include = [{{ file = \"leg.toml\", name = \"left\", position = \"0 100 0 mm\", \
+         rotation = {{ axis = [0, 1, 0], angle = \"40 deg\" }} }}]\n{GRAVITY}\
          [[body]]\nname = \"base\"\nmass = \"1 kg\"\ninertia = \"0.1 0.1 0.1 kg m^2\"\n\
          [[joint]]\nname = \"base\"\nkind = \"revolute\"\nchild = \"base\"\naxis = [1, 0, 0]\nstart = {{ velocity = \"1 rad/s\" }}\n"
     );

@@ -1,9 +1,9 @@
 //! Start in static equilibrium: every force of springs, bushings, tyres, stops, contacts and gravity in balance, at the values that
 //! drives, targets, grounds and load factors have at t = 0. Friction carries nothing there, because nothing slides.
 //!
-//! The rest position is a zero of the accelerations a(q) of the machine without velocities. It is found along the flow dq/ds = a(q),
-//! which leads downhill in the potential energy (dV/ds = -a' M a), by implicit Euler steps d / tau = a(q + d), solved by Newton's
-//! method. While the forces fall, tau grows, and the steps become those of Newton's method for a = 0: pseudo-transient
+//! The rest position is a zero of the accelerations a(q) of the machine without velocities. It is found along the flow
+//! dq/ds = a(q), which leads downhill in the potential energy (dV/ds = -a' M a), by implicit Euler steps d / tau = a(q + d), solved
+//! by Newton's method. While the forces fall, tau grows, and the steps become those of Newton's method for a = 0: pseudo-transient
 //! continuation (Kelley & Keyes, SIAM J. Numer. Anal. 35, 1998, pp. 508-523).
 
 use std::sync::Arc;
@@ -27,8 +27,8 @@ const MOST_COORDINATES: usize = 400;
 /// coordinate in an iteration: some seconds.
 const MOST_STEPS: usize = 1000;
 const MOST_EVALUATIONS: usize = 50_000;
-/// Maximum number of iterations of a step: bodies that move along a wall leave it by the curvature of their path, and each iteration
-/// takes two thirds of a penetration back. Steps with more than a few are not made longer.
+/// Maximum number of iterations of a step: bodies that move along a wall leave it by the curvature of their path, and each
+/// iteration takes two thirds of a penetration back. Steps with more than a few are not made longer.
 const MOST_CORRECTIONS: usize = 12;
 const FEW: usize = 6;
 /// Displacement for differences, as a time at the scales' speeds, s: 1e-9 m with balls of 10 mm, 1e-8 rad.
@@ -55,8 +55,8 @@ const DRIFT: f64 = 1e-8;
 
 /// Start in equilibrium of `machine` at t = 0.
 ///
-/// The machine without play rests first. Its balls are then laid on their walls where it presses them, and the search continues from
-/// there: on the long way, walls that a ball must follow would allow short steps only.
+/// The machine without play rests first. Its balls are then laid on their walls where it presses them, and the search continues
+/// from there: on the long way, walls that a ball must follow would allow short steps only.
 ///
 /// # Errors
 /// The machine does not start settled, has too many coordinates, or comes to rest nowhere.
