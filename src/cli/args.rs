@@ -43,6 +43,8 @@ pub enum Command {
     Sweep(SweepArguments),
     /// Merge the shards of a sweep.
     Merge(MergeArguments),
+    /// Find which parameters move an output most, such as which joint's clearance the tip error: each alone, and all together.
+    Sensitivity(SensitivityArguments),
     /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
     /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
@@ -235,6 +237,65 @@ pub struct SweepArguments {
     /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// The runs of `sensitivity`.
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// Length of each run, e.g. `2s` [default: three periods of the drives, or 1 s without a drive].
+    #[arg(long, value_name = "TIME")]
+    pub duration: Option<String>,
+    /// End of the transient: outputs count from there [default: one period of the drives, or 0].
+    #[arg(long, value_name = "TIME", requires = "duration")]
+    pub from: Option<String>,
+    /// Seed of the samples: the same seed gives the same results.
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub seed: u64,
+    /// Threads to use [default: one for each core]; the result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// No progress and no warnings.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `sensitivity`.
+#[derive(Debug, Args)]
+pub struct SensitivityArguments {
+    /// Scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// What to explain: `tip-error` (largest), `tip-error-rms`, `peak-force`, `impacts`, `energy-lost` (since the start), or
+    /// CHANNEL:STATISTIC as in `sweep --keep`; several, separated by commas.
+    #[arg(long, value_name = "LIST", default_value = "tip-error")]
+    pub output: String,
+    /// Parameters that vary: a key, in which `*` stands for any characters, and a range or distribution, e.g.
+    /// `joint.*.clearance=0.05mm..0.2mm`, `contact.friction=normal(0.15, 0.02)`, `joint.S1.clearance=H7/g6`; may be repeated
+    /// [default range: half to one and a half of the value].
+    #[arg(long, value_name = "PATTERN[=RANGE]", required = true)]
+    pub over: Vec<String>,
+    /// Rows N of the design for the indices, N (k + 2) runs for k parameters; a power of two is best; 0 leaves them out.
+    #[arg(long, value_name = "N", default_value = "64", value_parser = clap::value_parser!(u32).range(0..=65536))]
+    pub rows: u32,
+    /// Trajectories of the screening by elementary effects, which leaves the parameters that matter most for the first output to the
+    /// indices [default: 10 if more than 8 parameters vary, else 0].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=10000))]
+    pub screen: Option<u32>,
+    /// Largest allowed value of the first output, e.g. `100um`: finds how far which parameters must be lowered or raised for it.
+    #[arg(long, value_name = "VALUE", allow_hyphen_values = true)]
+    pub target: Option<String>,
+    /// Runs.
+    #[command(flatten)]
+    pub study: StudyArguments,
+    /// Folder for the table (CSV), the results (JSON), all runs (CSV), and the charts (SVG, PNG).
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// Format of the result on standard output.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
+    pub summary: SummaryForm,
+    /// Replace existing results.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// `merge`.

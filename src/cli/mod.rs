@@ -26,7 +26,9 @@ mod render;
 pub mod reproduce;
 mod run;
 pub mod schema;
+mod sensitivity;
 mod state;
+mod study;
 mod summary;
 mod sweep;
 mod tables;
@@ -93,6 +95,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
+        Some(Command::Sensitivity(arguments)) => sensitivity::sensitivity(&arguments),
         Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
         Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),

@@ -111,7 +111,7 @@ impl Layout {
         for (name, whole, _) in of_point(has_sections) {
             add(name, *whole, false);
         }
-        let by_default = protocol.keep.is_empty();
+        let by_default = protocol.keep.is_empty() || protocol.joints;
         let joints = scene.machine.ball_joints.iter().filter(|_| by_default);
         let joints: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
         for joint in &joints {

@@ -77,6 +77,8 @@ pub struct Protocol {
     pub span: Span,
     /// Statistics of channels, in place of the quantities of the ball joints and the probe; if empty, those.
     pub keep: Vec<ChannelStatistic>,
+    /// Whether the quantities of the ball joints and the probe are recorded beside statistics of channels.
+    pub joints: bool,
 }
 
 impl Protocol {
@@ -143,7 +145,7 @@ impl Protocol {
 impl From<Plan> for Protocol {
     /// Sections in each period of the drives.
     fn from(plan: Plan) -> Self {
-        Self { span: Span::Sections { plan, interval: None }, keep: Vec::new() }
+        Self { span: Span::Sections { plan, interval: None }, keep: Vec::new(), joints: false }
     }
 }
 

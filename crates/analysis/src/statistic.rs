@@ -1,5 +1,7 @@
 //! Statistics of channels over the kept part of a run: `S1.normal:max`, `*.force:mean`.
 
+use std::fmt::{self, Display, Formatter};
+
 use jointplay_physics::machine::Machine;
 use jointplay_physics::simulate::{Frame, Listed, NoChannel, Reading, Simulation, StartError, channels_of, matching};
 use jointplay_physics::suggest::nearest;
@@ -73,6 +75,13 @@ pub struct ChannelStatistic {
     channel: String,
     statistic: Statistic,
     column: String,
+    unit: &'static str,
+}
+
+impl Display for ChannelStatistic {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.channel, self.statistic.word())
+    }
 }
 
 impl ChannelStatistic {
@@ -94,8 +103,12 @@ impl ChannelStatistic {
             })?;
             let chosen = matching(&list, pattern);
             for channel in chosen.map_err(|error| StatisticError::Channel { text: own(), error })? {
-                let next =
-                    Self { channel: channel.name.clone(), statistic, column: channel.column_of(statistic.word()) };
+                let next = Self {
+                    channel: channel.name.clone(),
+                    statistic,
+                    column: channel.column_of(statistic.word()),
+                    unit: channel.unit,
+                };
                 if !found.contains(&next) {
                     found.push(next);
                 }
@@ -107,6 +120,11 @@ impl ChannelStatistic {
     /// Name of its column in a file, with the SI unit: `S1_normal_max_N`.
     pub fn column(&self) -> &str {
         &self.column
+    }
+
+    /// SI unit; "" for a number.
+    pub fn unit(&self) -> &'static str {
+        self.unit
     }
 
     /// Index of the ball joint whose largest normal force in continuous time it is, if it is one.

@@ -249,7 +249,8 @@ mod tests {
         let scene = Scene::load(name, &[]).expect("built in");
         let keep = ChannelStatistic::parse_list(&scene, keep).expect("channels");
         let design = Design::crossed(&scene, vec![Axis::parse(&scene, vary).expect("a range")], &[Start::Cold]);
-        let sweep = Sweep::new(scene, design.expect("points"), Protocol { span, keep }).expect("a sweep");
+        let sweep =
+            Sweep::new(scene, design.expect("points"), Protocol { span, keep, joints: false }).expect("a sweep");
         let mut results = Vec::new();
         for b in 0..sweep.design().blocks() {
             let mut block = sweep.begin(b);

@@ -21,6 +21,11 @@ pub fn contact_value(joint: &BallJoint, part: &str) -> Option<Value> {
     Some((field.get)(&joint.contact))
 }
 
+/// Last parts of the keys of contact parameters, which every ball joint has: `clearance` of `joint.S1.clearance`.
+pub fn contact_parts() -> impl Iterator<Item = &'static str> {
+    contact_rows().map(|(part, _)| part)
+}
+
 impl Scene {
     /// Keys (without prefix) in which ball joint `joint` differs from the scene's `contact.*`.
     pub fn overrides(&self, joint: usize) -> &[&'static str] {

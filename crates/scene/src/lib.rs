@@ -64,7 +64,7 @@ mod value;
 mod visible;
 mod write;
 
-pub use access::contact_value;
+pub use access::{contact_parts, contact_value};
 pub use assets::{LARGEST_FILE, LARGEST_MESH, file_bytes, largest_file};
 pub use drives::{DRIVE_LAWS, DriveLaw};
 pub use elements::is_element;

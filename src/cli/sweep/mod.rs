@@ -234,7 +234,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
 }
 
 /// Computes the blocks `todo` and appends each to `partial` when it is done; stops early after Ctrl-C.
-fn compute(
+pub(super) fn compute(
     sweep: &Sweep,
     todo: &[usize],
     threads: usize,

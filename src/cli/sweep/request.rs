@@ -69,7 +69,7 @@ fn protocol(arguments: &SweepArguments, scene: &Scene) -> Result<Protocol, Failu
             ));
         }
         Some(text) => {
-            let (duration, from) = times(text, arguments.from.as_deref())?;
+            let (duration, from) = quantity::span(text, arguments.from.as_deref())?;
             Span::Duration { duration, from }
         }
         None if arguments.section != PHASE => {
@@ -92,7 +92,7 @@ fn protocol(arguments: &SweepArguments, scene: &Scene) -> Result<Protocol, Failu
             interval: arguments.period.as_deref().map(period).transpose()?,
         },
     };
-    Ok(Protocol { span, keep: keep.unwrap_or_default() })
+    Ok(Protocol { span, keep: keep.unwrap_or_default(), joints: false })
 }
 
 /// Reads `--section CHANNEL=VALUE`, `--crossings`, `--discard` and `--duration`.
@@ -107,21 +107,8 @@ fn crossings(arguments: &SweepArguments, scene: &Scene, text: &str) -> Result<Sp
     if let Some(from) = &arguments.from {
         return Err(usage(format!("--from {from}: with --section, --discard ends the transient")));
     }
-    let (duration, _) = times(text, None)?;
+    let (duration, _) = quantity::span(text, None)?;
     Ok(Span::Crossings { crossing, count, discard, duration })
-}
-
-/// Reads `--duration` and `--from`, s.
-fn times(text: &str, from: Option<&str>) -> Result<(f64, f64), Failure> {
-    let duration = quantity::duration("--duration", text)?;
-    let end = from.map_or(Ok(0.0), |from| quantity::duration("--from", from))?;
-    if duration <= end {
-        return Err(usage(match from {
-            Some(from) => format!("--duration {text} --from {from}: the statistics must begin before the end"),
-            None => format!("--duration {text}: the time must be above 0"),
-        }));
-    }
-    Ok((duration, end))
 }
 
 /// Reads `--period`.

@@ -3,7 +3,7 @@
 mod choice;
 mod table;
 
-pub use choice::{Listed, NoChannel, channels_of, chosen_columns, matching};
+pub use choice::{Listed, NoChannel, channels_of, chosen_columns, matches_pattern, matching};
 use table::TIME;
 pub use table::{PLOT_WORDS, PlotKind, Quantity};
 

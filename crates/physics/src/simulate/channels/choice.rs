@@ -49,7 +49,7 @@ impl Listed {
 
     /// Whether `pattern` matches its name, a prefix of the name that ends before a dot, or its column.
     pub fn is_chosen_by(&self, pattern: &str) -> bool {
-        self.names().any(|name| matches(pattern, name)) || matches(pattern, &self.column)
+        self.names().any(|name| matches_pattern(pattern, name)) || matches_pattern(pattern, &self.column)
     }
 
     /// Its name, then the name without its last part, and so on.
@@ -150,7 +150,7 @@ fn unit_of(column: &str) -> &'static str {
 }
 
 /// Whether `pattern`, in which `*` stands for any characters and `?` for one, matches all of `name`.
-fn matches(pattern: &str, name: &str) -> bool {
+pub fn matches_pattern(pattern: &str, name: &str) -> bool {
     let (pattern, name) = (pattern.as_bytes(), name.as_bytes());
     let (mut p, mut n) = (0, 0);
     // After the latest `*`: the next pattern position, and the end of the text that the `*` matches.
@@ -226,7 +226,7 @@ mod tests {
             ("*ab", "aab", true),
             ("*.?", "rod.pose.x", true),
         ] {
-            assert_eq!(matches(pattern, name), matching, "{pattern} {name}");
+            assert_eq!(matches_pattern(pattern, name), matching, "{pattern} {name}");
         }
     }
 

@@ -1,0 +1,300 @@
+//! The results as text, JSON, tables and charts.
+
+use std::path::Path;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::target::{Answer, Change};
+use super::{Found, picture};
+use crate::analysis::yields::Estimate;
+use crate::cli::args::SensitivityArguments;
+use crate::cli::output::significant;
+use crate::cli::study::{Input, Output, Study};
+use crate::cli::summary::count;
+use crate::cli::tables::{Table, quoted};
+use crate::cli::{Failure, provenance};
+use crate::files::Folder;
+use crate::units::format_quantity_digits;
+
+/// PNG pixels per pixel of a chart.
+const PNG_SCALE: f32 = 2.0;
+const DIGITS: usize = 4;
+
+/// Writes all files into `folder`; returns their provenance.
+pub fn fill(
+    folder: &Folder,
+    study: &Study,
+    found: &Found,
+    arguments: &SensitivityArguments,
+) -> Result<Map<String, Json>, Failure> {
+    let mut meta = provenance::meta(study.scene());
+    let (duration, from) = study.span();
+    meta.insert("duration_s".into(), json!(duration));
+    meta.insert("from_s".into(), json!(from));
+    meta.insert("over".into(), json!(arguments.over));
+    meta.insert("rows".into(), json!(arguments.rows));
+    meta.insert("seed".into(), json!(arguments.study.seed));
+    let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
+    let sheet = picture::sheet(study, found);
+    let mut whole = json(study, found);
+    if let Json::Object(whole) = &mut whole {
+        whole.insert("meta".into(), Json::Object(meta.clone()));
+    }
+    let files: [(&str, Vec<u8>); 5] = [
+        ("sensitivity.csv", table(study, found).into_bytes()),
+        ("sensitivity.json", format!("{whole:#}\n").into_bytes()),
+        ("runs.csv", runs(study, found).into_bytes()),
+        ("sensitivity.svg", sheet.svg().map_err(drawing)?.into_bytes()),
+        ("sensitivity.png", sheet.png(PNG_SCALE).map_err(drawing)?),
+    ];
+    for (name, content) in files {
+        folder.write(name, &content)?;
+    }
+    Ok(meta)
+}
+
+fn shown(value: f64, unit: &str) -> String {
+    let display = match unit {
+        "m" => "mm",
+        other => other,
+    };
+    if value.is_finite() { format_quantity_digits(value, display, DIGITS) } else { "-".to_owned() }
+}
+
+fn of_input(input: &Input, value: f64) -> String {
+    format_quantity_digits(value, input.unit, DIGITS)
+}
+
+fn interval(estimate: Option<&Estimate>) -> String {
+    estimate.map_or_else(|| "-".to_owned(), |e| format!("{:.2} ({:.2} to {:.2})", e.value, e.low, e.high))
+}
+
+/// For a terminal.
+pub fn text(study: &Study, found: &Found, out: &Path) -> String {
+    let mut text = format!(
+        "Scene             {}: runs of {}\nRuns              {}{}\n",
+        study.scene().name,
+        study.describe(),
+        found.runs.len(),
+        missing(found),
+    );
+    if let Some(screening) = &found.screening {
+        let first = &study.outputs()[0];
+        let rows = study.inputs().iter().zip(&screening.effects).enumerate().map(|(i, (input, effects))| {
+            let number = |of: fn(&crate::analysis::morris::ElementaryEffects) -> f64| {
+                effects.as_ref().map_or_else(|| "-".to_owned(), |effects| shown(of(effects), first.unit))
+            };
+            let kept = if screening.kept.contains(&i) { "kept" } else { "left out" };
+            vec![
+                input.key.clone(),
+                number(|e| e.mean_magnitude),
+                number(|e| e.mean),
+                number(|e| e.deviation),
+                kept.to_owned(),
+            ]
+        });
+        let heads = "parameter | mean size of effect | mean effect | deviation | for the indices";
+        text += &format!("\nScreening of {}, from end to end of each parameter\n", first.name);
+        text += &Table::new(heads, rows).text();
+    }
+    for (o, output) in study.outputs().iter().enumerate() {
+        text += &format!(
+            "\n{}: {} with the values of the scene\n",
+            output.name,
+            shown(found.alone.nominal[o], output.unit)
+        );
+        let mut rows: Vec<Vec<String>> = (0..study.inputs().len()).map(|i| line(study, found, o, i)).collect();
+        let [low, high] = &found.alone.together;
+        let together = [low, high].map(|outputs| shown(outputs[o], output.unit));
+        let [low, high] = together;
+        rows.push(vec![
+            "all together".into(),
+            "lower ends".into(),
+            low,
+            "upper ends".into(),
+            high,
+            "-".into(),
+            "-".into(),
+        ]);
+        let heads = "parameter | from | output alone | to | output alone | first-order | total";
+        text += &Table::new(heads, rows).text();
+        match &found.indices[o] {
+            Some(Err(error)) => text += &format!("No indices: {error}\n"),
+            Some(Ok(indices)) => {
+                text += &format!(
+                    "Indices from {}{}; mean {}, standard deviation {}; intervals of 95 %\n",
+                    count(indices.rows as u64, "row"),
+                    if indices.incomplete_rows > 0 {
+                        format!(", {} left out", indices.incomplete_rows)
+                    } else {
+                        String::new()
+                    },
+                    shown(indices.mean, output.unit),
+                    shown(indices.variance.sqrt(), output.unit),
+                );
+            }
+            None => {}
+        }
+    }
+    if let Some(answer) = &found.target {
+        text += &format!("\n{}\n", sentence(study, answer));
+    }
+    text + &format!("\nWritten           {}\nVersion           jointplay {}\n", out.display(), crate::VERSION)
+}
+
+/// Number of runs without a result.
+fn missing(found: &Found) -> String {
+    let missing = found.runs.iter().filter(|(.., outputs)| outputs.iter().any(|value| !value.is_finite())).count();
+    if missing > 0 { format!(", {missing} without a result: they did not start, or diverged") } else { String::new() }
+}
+
+/// Row of parameter `i` in the table of output `o`.
+fn line(study: &Study, found: &Found, o: usize, i: usize) -> Vec<String> {
+    let (input, output) = (&study.inputs()[i], &study.outputs()[o]);
+    let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
+    let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
+    let at = found.kept.iter().position(|&kept| kept == i);
+    let [first, total] = match (indices, at) {
+        (Some(indices), Some(at)) => [Some(&indices.first[at]), Some(&indices.total[at])],
+        _ => [None, None],
+    };
+    vec![
+        input.key.clone(),
+        of_input(input, *low),
+        shown(at_low[o], output.unit),
+        of_input(input, *high),
+        shown(at_high[o], output.unit),
+        interval(first),
+        interval(total),
+    ]
+}
+
+/// The answer to `--target` in words.
+fn sentence(study: &Study, answer: &Answer) -> String {
+    let output = &study.outputs()[0];
+    let goal = format!("{} of at most {}", output.name, shown(answer.target, output.unit));
+    let change = |change: &Change| {
+        let input = &study.inputs()[change.input];
+        format!("{} = {}", input.key, of_input(input, change.value))
+    };
+    if !answer.single.is_empty() {
+        let ways = answer
+            .single
+            .iter()
+            .map(|(one, value)| format!("  {} alone gives {}\n", change(one), shown(*value, output.unit)));
+        return format!("{goal} is reached by one of\n{}", ways.collect::<String>().trim_end());
+    }
+    match &answer.together {
+        Some((changes, value)) if changes.is_empty() => {
+            format!("{goal} is held by the values of the scene: {}", shown(*value, output.unit))
+        }
+        Some((changes, value)) => {
+            let changes: Vec<String> = changes.iter().map(change).collect();
+            format!(
+                "{goal} takes several changes together: {}, which give {}",
+                changes.join(", "),
+                shown(*value, output.unit)
+            )
+        }
+        None => format!("{goal} is not reached within the ranges"),
+    }
+}
+
+fn number(value: f64) -> Json {
+    if value.is_finite() { json!(value) } else { Json::Null }
+}
+
+/// Everything but the runs, SI.
+pub fn json(study: &Study, found: &Found) -> Json {
+    let estimate = |e: &Estimate| json!({"value": number(e.value), "low": number(e.low), "high": number(e.high)});
+    let of_output = |(o, output): (usize, &Output)| {
+        let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
+        let of_input = |(i, input): (usize, &Input)| {
+            let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
+            let at = found.kept.iter().position(|&kept| kept == i);
+            let own = indices.zip(at);
+            json!({
+                "key": input.key,
+                "value": input.nominal,
+                "low": low, "high": high,
+                "alone_low": number(at_low[o]), "alone_high": number(at_high[o]),
+                "first_order": own.map(|(indices, at)| estimate(&indices.first[at])),
+                "total": own.map(|(indices, at)| estimate(&indices.total[at])),
+            })
+        };
+        json!({
+            "name": output.name,
+            "unit": output.unit,
+            "value": number(found.alone.nominal[o]),
+            "all_low": number(found.alone.together[0][o]),
+            "all_high": number(found.alone.together[1][o]),
+            "parameters": study.inputs().iter().enumerate().map(of_input).collect::<Vec<_>>(),
+            "rows": indices.map(|indices| indices.rows),
+            "incomplete_rows": indices.map(|indices| indices.incomplete_rows),
+            "mean": indices.map(|indices| indices.mean),
+            "variance": indices.map(|indices| indices.variance),
+        })
+    };
+    let change = |one: &Change| json!({"key": study.inputs()[one.input].key, "value": one.value});
+    let target = found.target.as_ref().map(|answer| {
+        json!({
+            "target": answer.target,
+            "single": answer.single.iter().map(|(one, value)| json!({"change": change(one), "output": value})).collect::<Vec<_>>(),
+            "together": answer.together.as_ref().map(|(changes, value)| {
+                json!({"changes": changes.iter().map(change).collect::<Vec<_>>(), "output": value})
+            }),
+        })
+    });
+    let screening = found.screening.as_ref().map(|screening| {
+        let effects = study.inputs().iter().zip(&screening.effects).map(|(input, effects)| {
+            json!({
+                "key": input.key,
+                "mean": effects.map(|e| e.mean), "mean_magnitude": effects.map(|e| e.mean_magnitude),
+                "deviation": effects.map(|e| e.deviation),
+            })
+        });
+        effects.collect::<Vec<_>>()
+    });
+    json!({
+        "outputs": study.outputs().iter().enumerate().map(of_output).collect::<Vec<_>>(),
+        "screening": screening,
+        "target": target,
+        "runs": found.runs.len(),
+    })
+}
+
+/// One row per output and parameter, SI.
+fn table(study: &Study, found: &Found) -> String {
+    let mut out = String::from(
+        "output,unit,parameter,low,high,alone_low,alone_high,first_order,first_order_low,first_order_high,total,total_low,total_high\n",
+    );
+    for (o, output) in study.outputs().iter().enumerate() {
+        let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
+        for (i, input) in study.inputs().iter().enumerate() {
+            let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
+            let own = indices.zip(found.kept.iter().position(|&kept| kept == i));
+            let both = own.map_or([None, None], |(indices, at)| [Some(indices.first[at]), Some(indices.total[at])]);
+            let estimates = both.into_iter().flat_map(|e| e.map_or([f64::NAN; 3], |e| [e.value, e.low, e.high]));
+            let numbers = [*low, *high, at_low[o], at_high[o]].into_iter().chain(estimates);
+            let cells: Vec<String> = numbers.map(|value| significant(value, 12)).collect();
+            out += &format!("{},{},{},{}\n", quoted(&output.name), output.unit, quoted(&input.key), cells.join(","));
+        }
+    }
+    out
+}
+
+/// All runs, SI.
+fn runs(study: &Study, found: &Found) -> String {
+    let keys = study.inputs().iter().map(|input| quoted(&input.key));
+    let outputs = study.outputs().iter().map(|output| {
+        let unit = if output.unit.is_empty() { String::new() } else { format!(" ({})", output.unit) };
+        quoted(&format!("{}{unit}", output.name))
+    });
+    let heads: Vec<String> = ["stage".to_owned()].into_iter().chain(keys).chain(outputs).collect();
+    let mut out = heads.join(",") + "\n";
+    for (stage, row, values) in &found.runs {
+        let cells: Vec<String> = row.iter().chain(values).map(|value| significant(*value, 12)).collect();
+        out += &format!("{stage},{}\n", cells.join(","));
+    }
+    out
+}
