@@ -12,6 +12,7 @@ mod links;
 mod peaks;
 mod program;
 mod reproduce;
+mod sensitivity;
 mod states;
 mod survival;
 mod sweep;

@@ -11,6 +11,9 @@ const ROW: u32 = 34;
 /// Largest number of parameters drawn: those with the largest effects.
 const MOST: usize = 20;
 
+/// Space above and below the parameters, in rows.
+const MARGIN: f64 = 0.5;
+
 /// Two charts side by side for each output.
 pub fn sheet(study: &Study, found: &Found) -> Sheet {
     let outputs = study.outputs().len();
@@ -72,11 +75,10 @@ fn tornado(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
     series.push(Series::dots("lower end of the range", low_ends, PALETTE[0], Marker::Disc));
     series.push(Series::dots("upper end", high_ends, PALETTE[1], Marker::Square));
     let nominal = scaled(found.alone.nominal[o]);
-    let top = order.len() as f64 + 0.5;
-    series.push(Series::line("values of the scene", vec![(nominal, 0.5), (nominal, top)], PALETTE[2]));
+    let top = order.len() as f64 + MARGIN;
+    series.push(Series::line("values of the scene", vec![(nominal, 1.0 - MARGIN), (nominal, top)], PALETTE[2]));
     let x = Axis::new(&output.name, drawn(0.0, output.unit).1);
-    let y = Axis::new("Rank from below", "");
-    Chart { labels, ..Chart::new("Each parameter alone", x, y, series) }
+    Chart { labels, ..Chart::new("Each parameter alone", x, ranks(order), series) }
 }
 
 fn indices(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
@@ -104,6 +106,12 @@ fn indices(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
     series.push(Series::dots("first-order", first, PALETTE[0], Marker::Disc));
     series.push(Series::dots("total", total, PALETTE[1], Marker::Square));
     let x = Axis::new("Share of the variance, with intervals of 95 %", "");
-    let title = "All parameters together";
-    Chart { labels, ..Chart::new(title, x, Axis::new("Rank from below", ""), series) }
+    let varies = matches!(found.indices[o], Some(Ok(_)));
+    let title = if varies { "All parameters together" } else { "All parameters together: no variance to share" };
+    Chart { labels, ..Chart::new(title, x, ranks(order), series) }
+}
+
+/// The axis of the parameters, the one with the largest effect on top.
+fn ranks(order: &[usize]) -> Axis {
+    Axis { range: Some((1.0 - MARGIN, order.len() as f64 + MARGIN)), ..Axis::new("Rank from below", "") }
 }

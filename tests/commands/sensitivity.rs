@@ -1,0 +1,166 @@
+//! `sensitivity`: known answers, and what a user may get wrong.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value as Json;
+
+use crate::program::{folder, jointplay};
+
+const LINKS: usize = 3;
+/// The scene of [`hung`], and runs in which nothing moves.
+const HUNG: &str = "sensitivity ./hung.toml --duration 1ms --quiet --over joint.*.clearance=0.05mm..0.15mm";
+/// Height of the middle of the last link without play, m.
+const LENGTH: f64 = 0.1 * LINKS as f64 - 0.05;
+
+/// Links of 100 mm, pulled straight upwards from a fixed socket by their weight in reversed gravity: the height of the last follows from that
+/// of the links and all clearances.
+fn hung(folder: &Path) {
+    let mut text = String::from(
+        "start = \"equilibrium\"\n[gravity]\nz = \"9.81 m/s^2\"\n[contact]\nclearance = \"0.1 mm\"\n\
+         [output]\nbody = \"link3\"\n",
+    );
+    for n in 1..=LINKS {
+        let below = if n == 1 { "world".to_owned() } else { format!("link{}", n - 1) };
+        let socket = if n == 1 { "0 0 0 mm" } else { "0 0 50 mm" };
+        text += &format!(
+            "[[body]]\nname = \"link{n}\"\nmass = \"0.2 kg\"\ninertia = \"2e-4 2e-4 1e-5 kg m^2\"\n\
+             [[joint]]\nname = \"free{n}\"\nkind = \"free\"\nchild = \"link{n}\"\nstart = {{ position = \"0 0 {} mm\" }}\n\
+             [[ball_joint]]\nname = \"J{n}\"\nsocket = {{ body = \"{below}\", at = \"{socket}\" }}\n\
+             ball = {{ body = \"link{n}\", at = \"0 0 -50 mm\" }}\nopening = [0, 1, 0]\n",
+            100 * n - 50
+        );
+    }
+    fs::write(folder.join("hung.toml"), text).unwrap();
+}
+
+fn results(path: &Path) -> Json {
+    serde_json::from_str(&fs::read_to_string(path.join("sensitivity.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn joints_pulled_straight_share_the_variance_equally() {
+    let folder = folder();
+    hung(folder.path());
+    let said = jointplay(folder.path(), &format!("{HUNG} --output link3.pose.z:end --rows 128 --out out")).expect(0);
+    assert!(said.stdout.contains("joint.J2.clearance"), "{}", said.stdout);
+    let found = results(&folder.path().join("out"));
+    let output = &found["outputs"][0];
+    let nominal = output["value"].as_f64().unwrap();
+    // The balls press into their walls by less than a micrometre.
+    assert!((nominal - LENGTH - 0.3e-3).abs() < 1e-6, "{nominal}");
+    let parameters = output["parameters"].as_array().unwrap();
+    assert_eq!(parameters.len(), LINKS);
+    for own in parameters {
+        let end = |key: &str| own[key].as_f64().unwrap() - nominal;
+        assert!((end("alone_low") + 0.05e-3).abs() < 1e-7 && (end("alone_high") - 0.05e-3).abs() < 1e-7, "{own}");
+        for key in ["first_order", "total"] {
+            let value = own[key]["value"].as_f64().unwrap();
+            assert!((value - 1.0 / LINKS as f64).abs() < 0.02, "{key} {value}");
+            assert!(own[key]["low"].as_f64().unwrap() < value && value < own[key]["high"].as_f64().unwrap());
+        }
+    }
+    // Three uniform clearances, each of variance (0.1 mm)^2 / 12.
+    let variance = output["variance"].as_f64().unwrap();
+    assert!((variance / (3.0 * 1e-8 / 12.0) - 1.0).abs() < 0.03, "{variance}");
+    let runs = fs::read_to_string(folder.path().join("out/runs.csv")).unwrap();
+    assert_eq!(runs.lines().count(), 1 + (1 + 2 * LINKS + 2) + 128 * (LINKS + 2));
+    for name in ["sensitivity.csv", "sensitivity.svg", "sensitivity.png", "manifest.json"] {
+        assert!(folder.path().join("out").join(name).exists(), "{name}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "no partial file is left");
+}
+
+#[test]
+fn a_target_is_answered_by_runs_that_reach_it() {
+    let folder = folder();
+    hung(folder.path());
+    let ask = |excess: &str, out: &str| {
+        let target = LENGTH + excess.parse::<f64>().unwrap();
+        let line = format!("{HUNG} --output link3.pose.z:end --rows 0 --target {target:.6}m --out {out}");
+        jointplay(folder.path(), &line).expect(0);
+        results(&folder.path().join(out))["target"].clone()
+    };
+    // 0.3 mm less 23 um: any joint alone, by four of the eight steps of 6.25 um.
+    let single = ask("277e-6", "one");
+    let ways = single["single"].as_array().unwrap();
+    assert_eq!(ways.len(), LINKS, "{single}");
+    for way in ways {
+        assert!((way["change"]["value"].as_f64().unwrap() - 0.075e-3).abs() < 1e-12, "{way}");
+        assert!(way["output"].as_f64().unwrap() <= LENGTH + 277e-6);
+    }
+    // Less 70 um: one joint to its end, another by 25 um at the most.
+    let together = ask("230e-6", "two");
+    assert!(together["single"].as_array().unwrap().is_empty());
+    let changes = together["together"]["changes"].as_array().unwrap();
+    let mut values: Vec<f64> = changes.iter().map(|change| change["value"].as_f64().unwrap()).collect();
+    values.sort_by(f64::total_cmp);
+    assert!(
+        (values[0] - 0.05e-3).abs() < 1e-12 && (values[1] - 0.075e-3).abs() < 1e-12 && values.len() == 2,
+        "{values:?}"
+    );
+    assert!(ask("100e-6", "three")["together"].is_null());
+}
+
+#[test]
+fn threads_change_no_byte() {
+    let folder = folder();
+    hung(folder.path());
+    for (threads, out) in [(1, "a"), (2, "b")] {
+        let line = format!("{HUNG} --output link3.pose.z:end,peak-force --rows 8 --threads {threads} --out {out}");
+        jointplay(folder.path(), &line).expect(0);
+    }
+    for name in ["sensitivity.csv", "sensitivity.json", "runs.csv", "sensitivity.svg", "sensitivity.png"] {
+        let read = |out: &str| fs::read(folder.path().join(out).join(name)).unwrap();
+        assert!(read("a") == read("b"), "{name}");
+    }
+}
+
+#[test]
+fn a_screening_leaves_out_what_does_not_matter() {
+    let folder = folder();
+    hung(folder.path());
+    let line = format!(
+        "{HUNG} --over contact.restitution=0.5..0.9 --over gravity.x=0m/s^2..0.001m/s^2 --output link3.pose.z:end --rows 8 --screen 4 --out out"
+    );
+    let said = jointplay(folder.path(), &line).expect(0);
+    let found = results(&folder.path().join("out"));
+    let parameters = found["outputs"][0]["parameters"].as_array().unwrap();
+    let kept = |key: &str| {
+        let own = parameters.iter().find(|own| own["key"] == key).unwrap();
+        !own["total"].is_null()
+    };
+    assert!(kept("joint.J1.clearance") && kept("joint.J3.clearance"), "{}", said.stdout);
+    assert!(!kept("contact.restitution") && !kept("gravity.x"), "{}", said.stdout);
+}
+
+#[test]
+fn what_cannot_be_computed_is_refused_before_it_runs() {
+    let folder = folder();
+    hung(folder.path());
+    let bad = [
+        ("--over joint.*.clearence=1um..2um", "clearence"),
+        ("--over contact.friction=0.1..-2", "--over contact.friction=0.1..-2"),
+        ("--over contact.friction=-1..2", "out of range"),
+        ("--over contact.friction_law=coulomb", "contact.friction_law"),
+        ("--over contact.friction=normal(0.1)", "normal"),
+        ("--over contact.friction=H7/g6", "a fit gives a clearance"),
+        ("--over joint.J1.clearance=H7/q6", "H7/q6"),
+        ("--over joint.J1.clearance --output nothing", "outputs by name: tip-error"),
+        ("--over joint.J1.clearance --output peak-force --target 1mm", "--target 1mm"),
+        ("--over joint.J1.clearance --output peak-force --from 1ms", "--duration"),
+        ("--over joint.J1.clearance --output peak-force --duration 1ms --from 2ms", "before the end"),
+    ];
+    for (rest, message) in bad {
+        let said = jointplay(folder.path(), &format!("sensitivity ./hung.toml --out out {rest}")).expect(2);
+        assert!(said.stderr.contains(message), "{rest}: {}", said.stderr);
+        assert!(!folder.path().join("out").exists(), "{rest}");
+    }
+    // A fit at the diameter of the ball: half the clearance between hole and shaft.
+    let line = "sensitivity ./hung.toml --quiet --over joint.J1.clearance=H7/g6 --duration 1ms --rows 0 --output peak-force --out fit";
+    jointplay(folder.path(), line).expect(0);
+    let own = &results(&folder.path().join("fit"))["outputs"][0]["parameters"][0];
+    let [low, high] = ["low", "high"].map(|key| own[key].as_f64().unwrap());
+    // Of 20 mm: H7 0 to 21 um, g6 -20 to -7 um (ISO 286-2, tables 2 and 4).
+    assert!((low - 3.5e-6).abs() < 1e-9 && (high - 20.5e-6).abs() < 1e-9, "{low} {high}");
+}
