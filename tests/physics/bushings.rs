@@ -209,22 +209,22 @@ const RING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
 
 #[test]
 fn bushings_of_a_pattern_turn_with_its_copies() {
-    let mut simulation = started(RING, &[("solver.tolerance", "1e-10")]);
-    let frame = at(&mut simulation, 0.1);
-    let out = 0.1 + 0.02 * ((500.0_f64 / 0.5).sqrt() * 0.1).cos();
-    for (copy, body) in frame.bodies.iter().enumerate() {
-        let angle = std::f64::consts::TAU / 3.0 * copy as f64;
-        let expected = Vec3::new(angle.cos(), angle.sin(), 0.0) * out;
-        assert!((body.position - expected).norm() < 1e-9, "{copy}: {}", body.position);
-        let torque = frame.elements[copy].torque.expect("a torque").norm();
-        assert!(torque < 1e-12, "{copy}: {torque:e}");
-    }
+    // The axes turn with the copies whichever end the world is.
     let backwards = RING.replace(
         "from = { body = \"world\", at = \"100 0 0 mm\" }\nto = { body = \"mass\" }",
         "from = { body = \"mass\" }\nto = { body = \"world\", at = \"100 0 0 mm\" }",
     );
-    let error = Scene::parse(&backwards, None, &[]).expect_err("refused");
-    let message = error.to_string();
-    assert!(message.contains("bushing.b1.to") || message.contains("bushing.b2.to"), "{message}");
-    assert!(message.contains("make it that of `from`"), "{message}");
+    assert_ne!(backwards, RING);
+    let out = 0.1 + 0.02 * ((500.0_f64 / 0.5).sqrt() * 0.1).cos();
+    for text in [RING, &backwards] {
+        let mut simulation = started(text, &[("solver.tolerance", "1e-10")]);
+        let frame = at(&mut simulation, 0.1);
+        for (copy, body) in frame.bodies.iter().enumerate() {
+            let angle = std::f64::consts::TAU / 3.0 * copy as f64;
+            let expected = Vec3::new(angle.cos(), angle.sin(), 0.0) * out;
+            assert!((body.position - expected).norm() < 1e-9, "{copy}: {}", body.position);
+            let torque = frame.elements[copy].torque.expect("a torque").norm();
+            assert!(torque < 1e-12, "{copy}: {torque:e}");
+        }
+    }
 }
