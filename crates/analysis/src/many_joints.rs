@@ -8,7 +8,7 @@ use jointplay_scene::Scene;
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-9;
 /// Steps per impact and tolerances tried, from the fastest.
-const STEPS_PER_IMPACT: [f64; 9] = [3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0];
+const STEPS_PER_IMPACT: [f64; 12] = [3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
 const TOLERANCES: [f64; 8] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7];
 const BUDGET: WorkBudget = WorkBudget { measured: 0.3, ..WorkBudget::REFERENCE };
 /// Errors of the first peaks allowed.
