@@ -1,5 +1,7 @@
 //! Command-line arguments.
 
+mod tolerance;
+
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -7,6 +9,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::analysis::design::Start;
+
+pub use self::tolerance::ToleranceArguments;
 
 /// A 3D laboratory that shows what play in a ball joint does to a machine.
 ///
@@ -45,6 +49,9 @@ pub enum Command {
     Merge(MergeArguments),
     /// Find which parameters move an output most, such as which joint's clearance the tip error: each alone, and all together.
     Sensitivity(SensitivityArguments),
+    /// Find what part of a manufactured lot holds its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what
+    /// drives the rejects, and the cheapest fits that hold a yield.
+    Tolerance(ToleranceArguments),
     /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
     /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
@@ -239,7 +246,7 @@ pub struct SweepArguments {
     pub quiet: bool,
 }
 
-/// The runs of `sensitivity`.
+/// The runs of `sensitivity` and `tolerance`.
 #[derive(Debug, Args)]
 pub struct StudyArguments {
     /// Length of each run, e.g. `2s` [default: three periods of the drives, or 1 s without a drive].

@@ -32,6 +32,7 @@ mod study;
 mod summary;
 mod sweep;
 mod tables;
+mod tolerance;
 pub mod tradeoff;
 pub mod validate;
 mod wear;
@@ -40,6 +41,7 @@ mod workers;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::num::NonZero;
+use std::path::Path;
 
 use clap::Parser;
 
@@ -48,6 +50,9 @@ pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::LiveScene;
 use crate::scene::{BENCHMARKS, BUILT_IN, Scene, reference_page, visible};
+
+/// Size limit of a table that is read, in bytes.
+const LARGEST_TABLE: u64 = 64 << 20;
 
 /// Runs the command line; returns the exit code.
 pub fn main() -> u8 {
@@ -96,6 +101,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Sensitivity(arguments)) => sensitivity::sensitivity(&arguments),
+        Some(Command::Tolerance(arguments)) => tolerance::tolerance(&arguments),
         Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
         Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
@@ -196,6 +202,19 @@ fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
 /// Starts a scene; an error names the line of its file and the change concerned.
 fn start(scene: &Scene) -> Result<LiveScene, Failure> {
     LiveScene::new(scene).map_err(|error| scene.locate(&error).into())
+}
+
+/// The text of a table.
+///
+/// # Errors
+/// Input/output: unreadable, or too large.
+fn read_text(path: &Path) -> Result<String, Failure> {
+    let unreadable = |why: String| Failure::io(format!("cannot read {}: {why}", path.display()));
+    let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
+    if size > LARGEST_TABLE {
+        return Err(unreadable(format!("it has {size} bytes, more than the limit of {LARGEST_TABLE}")));
+    }
+    std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))
 }
 
 /// Writes results to standard output, with control characters in foreign text made visible; a reader that stops early (`|

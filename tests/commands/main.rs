@@ -17,4 +17,5 @@ mod states;
 mod survival;
 mod sweep;
 mod sweep_points;
+mod tolerance;
 mod tradeoff;

@@ -84,7 +84,7 @@ pub mod yields;
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use front::front;
 pub use many_joints::{GROWTH, LIMITS, LOOSE_MACHINES, LooseMachine, LooseSpeed, Timed, growth, loose_speed};
-pub use points::{PointsError, read_points};
+pub use points::{PointsError, cells, read_points};
 pub use reach::{Goal, GoalResult, reach};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};

@@ -99,8 +99,8 @@ pub fn read_points(scene: &Scene, file: &str, text: &str, starts: &[Start]) -> R
     design.map_err(|error| PointsError::Together { file: own(), error: Box::new(error) })
 }
 
-/// The cells of a line, without quotes and surrounding blanks.
-fn cells(line: &str) -> Vec<String> {
+/// The cells of a line of CSV, without quotes and surrounding blanks.
+pub fn cells(line: &str) -> Vec<String> {
     let (mut all, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     let mut letters = line.chars().peekable();
     while let Some(letter) = letters.next() {

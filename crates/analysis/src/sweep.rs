@@ -83,6 +83,16 @@ impl Sweep {
     /// # Errors
     /// No kept periods, no drive phase where sections need one, or a value at which the scene cannot start.
     pub fn new(scene: Scene, design: Design, protocol: impl Into<Protocol>) -> Result<Self, SweepError> {
+        let sweep = Self::untried(scene, design, protocol)?;
+        sweep.design.tried().into_iter().try_for_each(|point| sweep.check(point))?;
+        Ok(sweep)
+    }
+
+    /// The same without a trial: a point that cannot start is recorded as such.
+    ///
+    /// # Errors
+    /// No kept periods, or too many sections.
+    pub fn untried(scene: Scene, design: Design, protocol: impl Into<Protocol>) -> Result<Self, SweepError> {
         let protocol = protocol.into();
         if let Some((all, discard)) = protocol.sections() {
             if discard >= all {
@@ -95,9 +105,7 @@ impl Sweep {
             }
         }
         let layout = Layout::new(&scene, &protocol);
-        let sweep = Self { scene, design, protocol, layout };
-        sweep.design.tried().into_iter().try_for_each(|point| sweep.check(point))?;
-        Ok(sweep)
+        Ok(Self { scene, design, protocol, layout })
     }
 
     /// Requires that a point can start, and that its run is no longer than the longest.

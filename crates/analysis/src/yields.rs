@@ -79,8 +79,8 @@ pub(crate) fn interpolated_quantile(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
-/// Mean and sample standard deviation of at least two values.
-pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+/// Mean and sample standard deviation of at least two values; the deviation of a single one is NaN.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();

@@ -5,7 +5,7 @@ mod report;
 mod target;
 
 use super::args::{SensitivityArguments, SummaryForm};
-use super::study::{Study, outputs, over};
+use super::study::{Study, inputs, outputs};
 use super::{Failure, load, print, warn};
 use crate::analysis::indices::{Bootstrap, IndicesError, SaltelliDesign, SensitivityIndices};
 use crate::analysis::morris::{ElementaryEffects, MorrisPlan};
@@ -48,8 +48,6 @@ struct Found {
     /// For each output; `None` if none were asked for.
     indices: Vec<Option<Result<SensitivityIndices, IndicesError>>>,
     target: Option<Answer>,
-    /// Values and outputs of all runs, with the stage that made them.
-    runs: Vec<(&'static str, Vec<f64>, Vec<f64>)>,
 }
 
 /// Runs `sensitivity`.
@@ -58,8 +56,8 @@ struct Found {
 /// Bad input, before anything runs; later Ctrl-C or the file system.
 pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
     let scene = load(&arguments.scene)?;
-    let inputs = over(&scene, &arguments.over)?;
-    let outputs = outputs(&scene, &arguments.output)?;
+    let inputs = inputs(&scene, None, &arguments.over)?;
+    let outputs = outputs(&scene, "--output", &arguments.output)?;
     let target = arguments.target.as_deref().map(|text| target::read(&outputs[0], text)).transpose()?;
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study, &arguments.out)?;
@@ -75,31 +73,18 @@ pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
 }
 
 fn find(study: &mut Study, arguments: &SensitivityArguments, target: Option<f64>) -> Result<Found, Failure> {
-    let mut runs = Vec::new();
-    let alone = alone(study, &mut runs)?;
-    let screening = screening(study, arguments, &mut runs)?;
+    let alone = alone(study)?;
+    let screening = screening(study, arguments)?;
     let kept = screening.as_ref().map_or_else(|| (0..study.inputs().len()).collect(), |s| s.kept.clone());
-    let indices = indices(study, &kept, arguments, &mut runs)?;
+    let indices = indices(study, &kept, arguments)?;
     let target = match target {
-        Some(target) => Some(target::answer(study, &alone, &indices, &kept, target, &mut runs)?),
+        Some(target) => Some(target::answer(study, &alone, &indices, &kept, target)?),
         None => None,
     };
-    Ok(Found { alone, screening, kept, indices, target, runs })
+    Ok(Found { alone, screening, kept, indices, target })
 }
 
-/// Runs a stage and keeps its runs.
-fn stage(
-    study: &mut Study,
-    name: &'static str,
-    rows: Vec<Vec<f64>>,
-    runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>,
-) -> Result<Vec<Vec<f64>>, Failure> {
-    let results = study.run(name, &rows)?;
-    runs.extend(rows.into_iter().zip(&results).map(|(row, result)| (name, row, result.clone())));
-    Ok(results)
-}
-
-fn alone(study: &mut Study, runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>) -> Result<Alone, Failure> {
+fn alone(study: &mut Study) -> Result<Alone, Failure> {
     let nominal: Vec<f64> = study.inputs().iter().map(|input| input.nominal).collect();
     let ends = study.inputs().iter().map(|input| {
         let (low, high) = input.distribution.support();
@@ -116,7 +101,7 @@ fn alone(study: &mut Study, runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>) 
         }
     }
     rows.extend([0, 1].map(|end| ends.iter().map(|own| own[end]).collect()));
-    let mut results = stage(study, "alone", rows, runs)?.into_iter();
+    let mut results = study.run("alone", rows)?.into_iter();
     let mut next = || results.next().unwrap_or_default();
     let nominal = next();
     let ends = ends.iter().map(|own| own.map(|end| (end, next()))).collect();
@@ -124,11 +109,7 @@ fn alone(study: &mut Study, runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>) 
 }
 
 /// Elementary effects, if asked for or if there are many parameters.
-fn screening(
-    study: &mut Study,
-    arguments: &SensitivityArguments,
-    runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>,
-) -> Result<Option<Screening>, Failure> {
+fn screening(study: &mut Study, arguments: &SensitivityArguments) -> Result<Option<Screening>, Failure> {
     let inputs = study.inputs().len();
     let default = if inputs > UNSCREENED { TRAJECTORIES } else { 0 };
     let trajectories = arguments.screen.map_or(default, |asked| asked as usize);
@@ -140,7 +121,7 @@ fn screening(
     let plan = MorrisPlan::new(inputs, trajectories, LEVELS, margin, arguments.study.seed)
         .map_err(|error| Failure::usage(format!("--screen: {error}")))?;
     let rows = (0..plan.points()).map(|index| row(study, plan.point(index), &[]));
-    let results = stage(study, "screening", rows.collect(), runs)?;
+    let results = study.run("screening", rows.collect())?;
     let first: Vec<f64> = results.iter().map(|outputs| outputs[0]).collect();
     let effects = plan.effects(&first).map_err(|error| Failure::usage(error.to_string()))?;
     let size = |i: usize| effects[i].map_or(0.0, |effects| effects.mean_magnitude);
@@ -158,7 +139,6 @@ fn indices(
     study: &mut Study,
     kept: &[usize],
     arguments: &SensitivityArguments,
-    runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>,
 ) -> Result<Vec<Option<Result<SensitivityIndices, IndicesError>>>, Failure> {
     if arguments.rows == 0 {
         return Ok(study.outputs().iter().map(|_| None).collect());
@@ -170,7 +150,7 @@ fn indices(
         warn(&format!("--rows {}: a Sobol sequence is even only at a power of two", arguments.rows));
     }
     let rows = (0..design.points()).map(|index| row(study, design.point(index), kept));
-    let results = stage(study, "indices", rows.collect(), runs)?;
+    let results = study.run("indices", rows.collect())?;
     let bootstrap = Bootstrap { seed, ..Bootstrap::default() };
     let of_output = |o: usize| {
         let values: Vec<f64> = results.iter().map(|outputs| outputs[o]).collect();

@@ -2,7 +2,7 @@
 
 use super::Found;
 use crate::chart::{Axis, Chart, Label, Marker, PALETTE, Series, Sheet};
-use crate::cli::study::Study;
+use crate::cli::study::{Study, drawn};
 
 /// Width of one chart, height of its frame and of each parameter, pixels.
 const WIDTH: u32 = 560;
@@ -50,11 +50,6 @@ fn order(found: &Found, o: usize) -> Vec<usize> {
     order.sort_by(|&a, &b| spread(b).total_cmp(&spread(a)));
     order.truncate(MOST);
     order
-}
-
-/// Value on the axis, in mm for lengths.
-fn drawn(value: f64, unit: &str) -> (f64, &str) {
-    if unit == "m" { (1e3 * value, "mm") } else { (value, unit) }
 }
 
 fn tornado(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {

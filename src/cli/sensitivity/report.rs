@@ -7,18 +7,13 @@ use serde_json::{Map, Value as Json, json};
 use super::target::{Answer, Change};
 use super::{Found, picture};
 use crate::analysis::yields::Estimate;
+use crate::cli::Failure;
 use crate::cli::args::SensitivityArguments;
 use crate::cli::output::significant;
-use crate::cli::study::{Input, Output, Study};
+use crate::cli::study::{Input, Output, Study, estimate, number, shown};
 use crate::cli::summary::count;
 use crate::cli::tables::{Table, quoted};
-use crate::cli::{Failure, provenance};
 use crate::files::Folder;
-use crate::units::format_quantity_digits;
-
-/// PNG pixels per pixel of a chart.
-const PNG_SCALE: f32 = 2.0;
-const DIGITS: usize = 4;
 
 /// Writes all files into `folder`; returns their provenance.
 pub fn fill(
@@ -27,42 +22,18 @@ pub fn fill(
     found: &Found,
     arguments: &SensitivityArguments,
 ) -> Result<Map<String, Json>, Failure> {
-    let mut meta = provenance::meta(study.scene());
-    let (duration, from) = study.span();
-    meta.insert("duration_s".into(), json!(duration));
-    meta.insert("from_s".into(), json!(from));
+    let mut meta = study.meta();
     meta.insert("over".into(), json!(arguments.over));
     meta.insert("rows".into(), json!(arguments.rows));
-    meta.insert("seed".into(), json!(arguments.study.seed));
-    let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
-    let sheet = picture::sheet(study, found);
-    let mut whole = json(study, found);
-    if let Json::Object(whole) = &mut whole {
-        whole.insert("meta".into(), Json::Object(meta.clone()));
-    }
-    let files: [(&str, Vec<u8>); 5] = [
-        ("sensitivity.csv", table(study, found).into_bytes()),
-        ("sensitivity.json", format!("{whole:#}\n").into_bytes()),
-        ("runs.csv", runs(study, found).into_bytes()),
-        ("sensitivity.svg", sheet.svg().map_err(drawing)?.into_bytes()),
-        ("sensitivity.png", sheet.png(PNG_SCALE).map_err(drawing)?),
-    ];
-    for (name, content) in files {
-        folder.write(name, &content)?;
-    }
+    study.write(
+        folder,
+        "sensitivity",
+        &meta,
+        json(study, found),
+        &table(study, found),
+        &picture::sheet(study, found),
+    )?;
     Ok(meta)
-}
-
-fn shown(value: f64, unit: &str) -> String {
-    let display = match unit {
-        "m" => "mm",
-        other => other,
-    };
-    if value.is_finite() { format_quantity_digits(value, display, DIGITS) } else { "-".to_owned() }
-}
-
-fn of_input(input: &Input, value: f64) -> String {
-    format_quantity_digits(value, input.unit, DIGITS)
 }
 
 fn interval(estimate: Option<&Estimate>) -> String {
@@ -72,11 +43,10 @@ fn interval(estimate: Option<&Estimate>) -> String {
 /// For a terminal.
 pub fn text(study: &Study, found: &Found, out: &Path) -> String {
     let mut text = format!(
-        "Scene             {}: runs of {}\nRuns              {}{}\n",
+        "Scene             {}: runs of {}\nRuns              {}\n",
         study.scene().name,
         study.describe(),
-        found.runs.len(),
-        missing(found),
+        study.counted(),
     );
     if let Some(screening) = &found.screening {
         let first = &study.outputs()[0];
@@ -142,12 +112,6 @@ pub fn text(study: &Study, found: &Found, out: &Path) -> String {
     text + &format!("\nWritten           {}\nVersion           jointplay {}\n", out.display(), crate::VERSION)
 }
 
-/// Number of runs without a result.
-fn missing(found: &Found) -> String {
-    let missing = found.runs.iter().filter(|(.., outputs)| outputs.iter().any(|value| !value.is_finite())).count();
-    if missing > 0 { format!(", {missing} without a result: they did not start, or diverged") } else { String::new() }
-}
-
 /// Row of parameter `i` in the table of output `o`.
 fn line(study: &Study, found: &Found, o: usize, i: usize) -> Vec<String> {
     let (input, output) = (&study.inputs()[i], &study.outputs()[o]);
@@ -160,9 +124,9 @@ fn line(study: &Study, found: &Found, o: usize, i: usize) -> Vec<String> {
     };
     vec![
         input.key.clone(),
-        of_input(input, *low),
+        input.shown(*low),
         shown(at_low[o], output.unit),
-        of_input(input, *high),
+        input.shown(*high),
         shown(at_high[o], output.unit),
         interval(first),
         interval(total),
@@ -175,7 +139,7 @@ fn sentence(study: &Study, answer: &Answer) -> String {
     let goal = format!("{} of at most {}", output.name, shown(answer.target, output.unit));
     let change = |change: &Change| {
         let input = &study.inputs()[change.input];
-        format!("{} = {}", input.key, of_input(input, change.value))
+        format!("{} = {}", input.key, input.shown(change.value))
     };
     if !answer.single.is_empty() {
         let ways = answer
@@ -200,13 +164,8 @@ fn sentence(study: &Study, answer: &Answer) -> String {
     }
 }
 
-fn number(value: f64) -> Json {
-    if value.is_finite() { json!(value) } else { Json::Null }
-}
-
 /// Everything but the runs, SI.
 pub fn json(study: &Study, found: &Found) -> Json {
-    let estimate = |e: &Estimate| json!({"value": number(e.value), "low": number(e.low), "high": number(e.high)});
     let of_output = |(o, output): (usize, &Output)| {
         let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
         let of_input = |(i, input): (usize, &Input)| {
@@ -259,7 +218,7 @@ pub fn json(study: &Study, found: &Found) -> Json {
         "outputs": study.outputs().iter().enumerate().map(of_output).collect::<Vec<_>>(),
         "screening": screening,
         "target": target,
-        "runs": found.runs.len(),
+        "runs": study.runs().len(),
     })
 }
 
@@ -279,22 +238,6 @@ fn table(study: &Study, found: &Found) -> String {
             let cells: Vec<String> = numbers.map(|value| significant(value, 12)).collect();
             out += &format!("{},{},{},{}\n", quoted(&output.name), output.unit, quoted(&input.key), cells.join(","));
         }
-    }
-    out
-}
-
-/// All runs, SI.
-fn runs(study: &Study, found: &Found) -> String {
-    let keys = study.inputs().iter().map(|input| quoted(&input.key));
-    let outputs = study.outputs().iter().map(|output| {
-        let unit = if output.unit.is_empty() { String::new() } else { format!(" ({})", output.unit) };
-        quoted(&format!("{}{unit}", output.name))
-    });
-    let heads: Vec<String> = ["stage".to_owned()].into_iter().chain(keys).chain(outputs).collect();
-    let mut out = heads.join(",") + "\n";
-    for (stage, row, values) in &found.runs {
-        let cells: Vec<String> = row.iter().chain(values).map(|value| significant(*value, 12)).collect();
-        out += &format!("{stage},{}\n", cells.join(","));
     }
     out
 }

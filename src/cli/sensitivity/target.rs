@@ -3,9 +3,8 @@
 use crate::analysis::indices::{IndicesError, SensitivityIndices};
 use crate::cli::Failure;
 use crate::cli::study::{Output, Study};
-use crate::units::{Dimension, parse_quantity};
 
-use super::{Alone, stage};
+use super::Alone;
 
 /// Values tried between that of the scene and the better end.
 const STEPS: usize = 8;
@@ -31,27 +30,7 @@ pub struct Answer {
 /// # Errors
 /// Usage: no such quantity.
 pub fn read(output: &Output, text: &str) -> Result<f64, Failure> {
-    let dimension = match output.unit {
-        "m" => Some(Dimension::Length),
-        "rad" => Some(Dimension::Angle),
-        "s" => Some(Dimension::Time),
-        _ => None,
-    };
-    let wrong = |error: &dyn std::fmt::Display| Failure::usage(format!("--target {text}: {error}"));
-    match dimension {
-        Some(dimension) => parse_quantity(text, dimension).map_err(|error| wrong(&error)),
-        None => {
-            let number = text.trim().strip_suffix(output.unit).unwrap_or(text).trim();
-            let value = number.parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| {
-                wrong(&format!(
-                    "expected a number for {}{}",
-                    output.name,
-                    if output.unit.is_empty() { String::new() } else { format!(" in {}", output.unit) }
-                ))
-            })
-        }
-    }
+    output.read(text).map_err(|error| Failure::usage(format!("--target {text}: {error}")))
 }
 
 /// Tries each parameter alone in equal steps towards its better end; if none suffices, all of them, one after the other to its
@@ -65,7 +44,6 @@ pub fn answer(
     indices: &[Option<Result<SensitivityIndices, IndicesError>>],
     kept: &[usize],
     target: f64,
-    runs: &mut Vec<(&'static str, Vec<f64>, Vec<f64>)>,
 ) -> Result<Answer, Failure> {
     let nominal: Vec<f64> = study.inputs().iter().map(|input| input.nominal).collect();
     let inputs = nominal.len();
@@ -85,7 +63,7 @@ pub fn answer(
             rows.push(row);
         }
     }
-    let results = stage(study, "target", rows.clone(), runs)?;
+    let results = study.run("target", rows.clone())?;
     let mut single = Vec::new();
     for i in 0..inputs {
         let first = (0..STEPS).map(|step| i * STEPS + step).find(|&run| results[run][0] <= target);
@@ -113,7 +91,7 @@ pub fn answer(
         }
         moved[i] = towards(i, STEPS);
     }
-    let results = if rows.is_empty() { Vec::new() } else { stage(study, "target-together", rows.clone(), runs)? };
+    let results = if rows.is_empty() { Vec::new() } else { study.run("target-together", rows.clone())? };
     let together = results.iter().position(|outputs| outputs[0] <= target).map(|run| {
         let changed = order.iter().filter(|&&i| rows[run][i] != nominal[i]);
         let changes = changed.map(|&input| Change { input, value: rows[run][input] }).collect();

@@ -1,12 +1,15 @@
 //! The uncertain parameters of a study.
 
-use std::fmt::Display;
+use std::path::Path;
 
+use super::report::DIGITS;
+use super::rows::{Row, rows};
 use crate::analysis::distribution::Distribution;
 use crate::analysis::iso286::{Fit, FitError};
 use crate::cli::Failure;
 use crate::scene::{Kind, Scene, Value, contact_parts};
 use crate::simulate::matches_pattern;
+use crate::units::format_quantity_digits;
 
 /// Range of an input without one of its own, over its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
@@ -28,37 +31,59 @@ pub struct Input {
     pub distribution: Distribution,
 }
 
-/// Parses `--over PATTERN[=DISTRIBUTION]`: every numeric parameter of `scene` whose key matches, `*` for any characters, with a range
-/// `A..B`, a distribution or a fit; without one, from half to one and a half of its value.
+/// The parameters of the file `--tolerances`, then those of the options `--over KEY[=DISTRIBUTION]`. A key may be a pattern,
+/// which stands for all numeric parameters that it matches; of a parameter given twice, the later distribution counts. An
+/// option without a distribution stands for a uniform one, from half to one and a half of the value.
 ///
 /// # Errors
-/// Usage: no such parameter, or a distribution that one does not accept.
-pub fn over(scene: &Scene, options: &[String]) -> Result<Vec<Input>, Failure> {
+/// Usage: no such parameter, a distribution that one does not accept, or another form of the file, with its line. Input/output:
+/// an unreadable file.
+pub fn inputs(scene: &Scene, tolerances: Option<&Path>, over: &[String]) -> Result<Vec<Input>, Failure> {
     let mut inputs: Vec<Input> = Vec::new();
-    for option in options {
-        let (pattern, text) = match option.split_once('=') {
-            Some((pattern, text)) => (pattern.trim(), Some(text.trim())),
-            None => (option.trim(), None),
-        };
-        let wrong = |error: &dyn Display| Failure::usage(format!("--over {option}: {error}"));
-        let keys: Vec<String> = keys(scene).into_iter().filter(|key| matches_pattern(pattern, key)).collect();
-        if keys.is_empty() {
-            let near = scene.parameter(pattern).err().map(|error| error.to_string());
-            return Err(wrong(&near.unwrap_or_else(|| format!("no numeric parameter of the scene matches {pattern}"))));
-        }
-        for key in keys {
-            let input = Input::new(scene, &key, text).map_err(|error| wrong(&format!("{key}: {error}")))?;
+    let mut add = |place: &str, pattern: &str, text: Option<&str>| -> Result<(), Failure> {
+        for key in matching(scene, pattern).map_err(|error| Failure::usage(format!("{place}: {error}")))? {
+            let input =
+                Input::new(scene, &key, text).map_err(|error| Failure::usage(format!("{place}: {key}: {error}")))?;
             match inputs.iter_mut().find(|known| known.key == key) {
-                // A later option refines an earlier pattern.
+                // A later one refines an earlier pattern.
                 Some(known) => *known = input,
                 None => inputs.push(input),
             }
         }
+        Ok(())
+    };
+    if let Some(path) = tolerances {
+        for Row { place, cells: [pattern, text] } in rows("--tolerances", path, ["parameter", "distribution"])? {
+            add(&place, &pattern, Some(&text))?;
+        }
+    }
+    for option in over {
+        let (pattern, text) = match option.split_once('=') {
+            Some((pattern, text)) => (pattern.trim(), Some(text.trim())),
+            None => (option.trim(), None),
+        };
+        add(&format!("--over {option}"), pattern, text)?;
     }
     if inputs.len() > MOST_INPUTS {
-        return Err(Failure::usage(format!("--over: {} parameters; at most {MOST_INPUTS} are possible", inputs.len())));
+        return Err(Failure::usage(format!(
+            "{} uncertain parameters; at most {MOST_INPUTS} are possible",
+            inputs.len()
+        )));
     }
     Ok(inputs)
+}
+
+/// Keys of the numeric parameters that match `pattern`; at least one.
+///
+/// # Errors
+/// A sentence: there are none.
+pub fn matching(scene: &Scene, pattern: &str) -> Result<Vec<String>, String> {
+    let keys: Vec<String> = keys(scene).into_iter().filter(|key| matches_pattern(pattern, key)).collect();
+    if keys.is_empty() {
+        let near = scene.parameter(pattern).err().map(|error| error.to_string());
+        return Err(near.unwrap_or_else(|| format!("no numeric parameter of the scene matches {pattern}")));
+    }
+    Ok(keys)
 }
 
 impl Input {
@@ -94,6 +119,11 @@ impl Input {
                 .map_err(|error| format!("{}: {error}", parameter.show(&Value::Number(end))))?;
         }
         Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), nominal, distribution })
+    }
+
+    /// One of its values, with unit.
+    pub fn shown(&self, value: f64) -> String {
+        format_quantity_digits(value, self.unit, DIGITS)
     }
 
     /// Its value at the fraction `u` of all values, 0 < u < 1.

@@ -2,15 +2,19 @@
 
 mod inputs;
 mod outputs;
+mod report;
+mod rows;
 
-pub use inputs::{Input, over};
+pub use inputs::{Input, inputs, matching};
 pub use outputs::{Output, outputs};
+pub use report::{drawn, estimate, number, shown};
+pub use rows::{Row, rows};
 
 use std::path::{Path, PathBuf};
 
 use super::args::StudyArguments;
 use super::sweep::{Partial, Source as _, compute, meta};
-use super::{Failure, interrupt, progress, quantity, threads, warn};
+use super::{Failure, interrupt, progress, quantity, start, threads, warn};
 use crate::analysis::design::{Design, Start};
 use crate::analysis::drive::common_period;
 use crate::analysis::point::{Protocol, Span};
@@ -22,6 +26,16 @@ use crate::units::format_quantity;
 const PERIODS: f64 = 2.0;
 const UNDRIVEN: f64 = 1.0;
 
+/// A run.
+pub struct Run {
+    /// Stage that made it.
+    pub stage: String,
+    /// Values of the inputs, SI.
+    pub values: Vec<f64>,
+    /// Outputs, SI; NaN if it did not start or diverged.
+    pub outputs: Vec<f64>,
+}
+
 /// The runs of one command.
 pub struct Study {
     scene: Scene,
@@ -29,8 +43,10 @@ pub struct Study {
     outputs: Vec<Output>,
     protocol: Protocol,
     out: PathBuf,
+    seed: u64,
     threads: usize,
     quiet: bool,
+    runs: Vec<Run>,
     /// Finished stages, kept until the results are written.
     partials: Vec<Partial>,
 }
@@ -39,7 +55,7 @@ impl Study {
     /// The runs of `inputs` of `scene`, of which `outputs` are kept. Files of an interrupted command lie beside `out`.
     ///
     /// # Errors
-    /// Usage: an invalid duration.
+    /// Usage: an invalid duration, or a scene that cannot start.
     pub fn new(
         scene: Scene,
         inputs: Vec<Input>,
@@ -51,6 +67,7 @@ impl Study {
             Some(text) => quantity::span(text, arguments.from.as_deref())?,
             None => default_span(&scene),
         };
+        start(&scene)?;
         let protocol = outputs::protocol(&outputs, Span::Duration { duration, from });
         interrupt::listen();
         Ok(Self {
@@ -59,8 +76,10 @@ impl Study {
             outputs,
             protocol,
             out: out.to_owned(),
+            seed: arguments.seed,
             threads: threads(arguments.threads),
             quiet: arguments.quiet,
+            runs: Vec::new(),
             partials: Vec::new(),
         })
     }
@@ -80,6 +99,11 @@ impl Study {
         &self.outputs
     }
 
+    /// All runs so far, in order.
+    pub fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
     /// Length of each run and end of its transient, s.
     pub fn span(&self) -> (f64, f64) {
         match self.protocol.span {
@@ -88,17 +112,18 @@ impl Study {
         }
     }
 
-    /// The outputs at each of `rows`, which give every input a value, SI. NaN where a run does not start or diverges. `stage` names
-    /// the runs for the user, and the file from which an interrupted command resumes.
+    /// The outputs at each of `rows`, which give every input a value, SI. NaN where a run does not start or diverges. `stage`
+    /// names the runs for the user, and the file from which an interrupted command resumes.
     ///
     /// # Errors
     /// A row that the scene does not accept; Ctrl-C; the file system.
-    pub fn run(&mut self, stage: &str, rows: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Failure> {
+    pub fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Failure> {
         let usage = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
+        self.check(&rows)?;
         let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
         let values: Vec<Vec<Value>> = rows.iter().map(|row| row.iter().copied().map(Value::Number).collect()).collect();
         let design = Design::table(&self.scene, &keys, &values, &[Start::Cold]).map_err(|error| usage(&error))?;
-        let sweep = Sweep::new(self.scene.clone(), design, self.protocol.clone()).map_err(|error| usage(&error))?;
+        let sweep = Sweep::untried(self.scene.clone(), design, self.protocol.clone()).map_err(|error| usage(&error))?;
         let blocks: Vec<usize> = (0..sweep.design().blocks()).collect();
         let beside = self.out.with_added_extension(stage);
         let mut partial = Partial::open(&beside, &meta(&sweep), &sweep, &blocks)?;
@@ -129,13 +154,34 @@ impl Study {
         self.partials.push(partial);
         let names: Vec<&str> = sweep.layout().columns().iter().map(|column| &column.name[..]).collect();
         let columns: Vec<Vec<usize>> = self.outputs.iter().map(|output| output.columns(&names)).collect();
-        Ok(records
-            .chunks_exact(length)
-            .map(|record| {
-                let outputs = self.outputs.iter().zip(&columns);
-                outputs.map(|(output, columns)| output.value(columns.iter().map(|&at| record[at]))).collect()
-            })
-            .collect())
+        let results = records.chunks_exact(length).map(|record| {
+            let outputs = self.outputs.iter().zip(&columns);
+            outputs.map(|(output, columns)| output.value(columns.iter().map(|&at| record[at]))).collect()
+        });
+        let results: Vec<Vec<f64>> = results.collect();
+        let runs = rows.into_iter().zip(&results);
+        self.runs.extend(runs.map(|(values, outputs)| Run {
+            stage: stage.to_owned(),
+            values,
+            outputs: outputs.clone(),
+        }));
+        Ok(results)
+    }
+
+    /// Requires values that the parameters accept, which a distribution without limits does not grant.
+    fn check(&self, rows: &[Vec<f64>]) -> Result<(), Failure> {
+        for (i, input) in self.inputs.iter().enumerate() {
+            let parameter = self.scene.parameter(&input.key)?;
+            let refused = rows.iter().find_map(|row| {
+                let value = Value::Number(row[i]);
+                parameter.check(&value).err().map(|error| format!("{}: {error}", parameter.show(&value)))
+            });
+            if let Some(error) = refused {
+                let advice = "a distribution with limits, such as normal(MEAN, SD, LOW..HIGH), draws no such value";
+                return Err(Failure::usage(format!("{}: {error}; {advice}", input.key)));
+            }
+        }
+        Ok(())
     }
 
     /// Removes the files of the finished stages, once the results are written.

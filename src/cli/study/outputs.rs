@@ -4,6 +4,7 @@ use crate::analysis::point::{Protocol, Span};
 use crate::analysis::statistic::ChannelStatistic;
 use crate::cli::Failure;
 use crate::scene::Scene;
+use crate::units::{Dimension, parse_quantity};
 
 /// How an output follows from several columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +25,8 @@ pub struct Output {
     keep: Vec<ChannelStatistic>,
 }
 
-/// Outputs with a name of their own: name, what it stands for, and how several columns combine. Impacts are columns of the joints.
+/// Outputs with a name of their own: name, what it stands for, and how several columns combine. Impacts are columns of the
+/// joints.
 const NAMED: [(&str, &str, Of, &str); 5] = [
     ("tip-error", "tip_error:max", Of::Largest, "m"),
     ("tip-error-rms", "tip_error:rms", Of::Largest, "m"),
@@ -36,18 +38,18 @@ const IMPACTS: &str = "impacts";
 /// End of the names of the columns that are impacts of the kept time.
 const IMPACTS_COLUMN: &str = "_impacts_kept";
 
-/// Parses `--output`: names of [`NAMED`] and CHANNEL:STATISTIC, separated by commas.
+/// Parses the value of `option`: names of [`NAMED`] and CHANNEL:STATISTIC, separated by commas.
 ///
 /// # Errors
 /// Usage: an unknown output, channel or statistic.
-pub fn outputs(scene: &Scene, text: &str) -> Result<Vec<Output>, Failure> {
+pub fn outputs(scene: &Scene, option: &str, text: &str) -> Result<Vec<Output>, Failure> {
     let mut found: Vec<Output> = Vec::new();
     for entry in text.split(',').map(str::trim) {
         let named = NAMED.iter().find(|(name, ..)| *name == entry);
         let keep = |list: &str| {
             ChannelStatistic::parse_list(scene, list).map_err(|error| {
                 let names: Vec<&str> = NAMED.iter().map(|(name, ..)| *name).collect();
-                Failure::usage(format!("--output {entry}: {error}; outputs by name: {}", names.join(", ")))
+                Failure::usage(format!("{option} {entry}: {error}; outputs by name: {}", names.join(", ")))
             })
         };
         match named {
@@ -64,7 +66,7 @@ pub fn outputs(scene: &Scene, text: &str) -> Result<Vec<Output>, Failure> {
         }
     }
     if let Some((i, twice)) = found.iter().enumerate().find(|(i, one)| found[..*i].iter().any(|o| o.name == one.name)) {
-        return Err(Failure::usage(format!("--output {}: given twice ({} and before)", twice.name, i + 1)));
+        return Err(Failure::usage(format!("{option} {}: given twice ({} and before)", twice.name, i + 1)));
     }
     Ok(found)
 }
@@ -82,6 +84,28 @@ pub(super) fn protocol(outputs: &[Output], span: Span) -> Protocol {
 }
 
 impl Output {
+    /// Reads a value of this output, SI.
+    ///
+    /// # Errors
+    /// A sentence: no finite number, or not in a unit of the output.
+    pub fn read(&self, text: &str) -> Result<f64, String> {
+        let dimension = match self.unit {
+            "m" => Some(Dimension::Length),
+            "rad" => Some(Dimension::Angle),
+            "s" => Some(Dimension::Time),
+            _ => None,
+        };
+        if let Some(dimension) = dimension {
+            return parse_quantity(text, dimension).map_err(|error| error.to_string());
+        }
+        let number = text.trim().strip_suffix(self.unit).unwrap_or(text).trim();
+        let value = number.parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| {
+            let unit = if self.unit.is_empty() { String::new() } else { format!(" in {}", self.unit) };
+            format!("expected a number for {}{unit}", self.name)
+        })
+    }
+
     /// Which of the columns `names` of a record it follows from.
     pub(super) fn columns(&self, names: &[&str]) -> Vec<usize> {
         let is_own = |name: &str| {

@@ -9,13 +9,11 @@ use crate::analysis::read_points;
 use crate::analysis::statistic::ChannelStatistic;
 use crate::analysis::sweep::{Sweep, SweepError};
 use crate::cli::args::SweepArguments;
-use crate::cli::{Failure, load, quantity};
+use crate::cli::{Failure, load, quantity, read_text};
 use crate::scene::Scene;
 
 /// Word for sections at a phase of the drive.
 const PHASE: &str = "phase";
-/// Size limit of the file of points, in bytes.
-const LARGEST_POINTS: u64 = 64 << 20;
 
 /// Reads and checks the sweep.
 ///
@@ -40,14 +38,8 @@ fn usage(error: impl std::fmt::Display) -> Failure {
 fn design(arguments: &SweepArguments, scene: &Scene) -> Result<Design, Failure> {
     let starts = &arguments.start;
     if let Some(path) = &arguments.points {
-        let file = path.display().to_string();
-        let unreadable = |why: String| Failure::io(format!("cannot read {file}: {why}"));
-        let size = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?.len();
-        if size > LARGEST_POINTS {
-            return Err(unreadable(format!("it has {size} bytes, more than the limit of {LARGEST_POINTS}")));
-        }
-        let text = std::fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))?;
-        return read_points(scene, &format!("--points {file}"), &text, starts).map_err(usage);
+        let file = format!("--points {}", path.display());
+        return read_points(scene, &file, &read_text(path)?, starts).map_err(usage);
     }
     let axes = arguments.vary.iter().map(|text| Axis::parse(scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>().map_err(usage)?;

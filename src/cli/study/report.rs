@@ -1,0 +1,107 @@
+//! What the results of all studies share: numbers for people and programs, the table of runs, and the files of a folder.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::Study;
+use crate::analysis::yields::Estimate;
+use crate::chart::{Sheet, SheetError};
+use crate::cli::output::significant;
+use crate::cli::tables::quoted;
+use crate::cli::{Failure, provenance};
+use crate::files::Folder;
+use crate::units::format_quantity_digits;
+
+/// Significant digits for people.
+pub const DIGITS: usize = 4;
+/// PNG pixels per pixel of a chart.
+const PNG_SCALE: f32 = 2.0;
+
+/// A value with its unit, lengths in mm; `-` if unknown or unlimited.
+pub fn shown(value: f64, unit: &str) -> String {
+    let display = if unit == "m" { "mm" } else { unit };
+    if value.is_finite() { format_quantity_digits(value, display, DIGITS) } else { "-".to_owned() }
+}
+
+/// A value on an axis, in mm for lengths, and its unit.
+pub fn drawn(value: f64, unit: &str) -> (f64, &str) {
+    if unit == "m" { (1e3 * value, "mm") } else { (value, unit) }
+}
+
+/// In JSON; null if unknown or unlimited.
+pub fn number(value: f64) -> Json {
+    if value.is_finite() { json!(value) } else { Json::Null }
+}
+
+/// An estimate with its interval in JSON.
+pub fn estimate(estimate: &Estimate) -> Json {
+    json!({"value": number(estimate.value), "low": number(estimate.low), "high": number(estimate.high)})
+}
+
+impl Study {
+    /// Number of runs, and of those without a result, for people.
+    pub fn counted(&self) -> String {
+        let missing = self.runs().iter().filter(|run| run.outputs.iter().any(|value| !value.is_finite())).count();
+        let missing = match missing {
+            0 => String::new(),
+            _ => format!(", {missing} without a result: they did not start, or diverged"),
+        };
+        format!("{}{missing}", self.runs().len())
+    }
+
+    /// Provenance of the results.
+    pub fn meta(&self) -> Map<String, Json> {
+        let mut meta = provenance::meta(self.scene());
+        let (duration, from) = self.span();
+        meta.insert("duration_s".into(), json!(duration));
+        meta.insert("from_s".into(), json!(from));
+        meta.insert("seed".into(), json!(self.seed));
+        meta
+    }
+
+    /// Writes results, table, charts and runs into `folder`, all but the runs under the name `name`.
+    ///
+    /// # Errors
+    /// A chart that cannot be drawn; the file system.
+    pub fn write(
+        &self,
+        folder: &Folder,
+        name: &str,
+        meta: &Map<String, Json>,
+        mut results: Json,
+        table: &str,
+        sheet: &Sheet,
+    ) -> Result<(), Failure> {
+        if let Json::Object(results) = &mut results {
+            results.insert("meta".into(), Json::Object(meta.clone()));
+        }
+        let drawing = |error: SheetError| Failure::io(error.to_string());
+        let files = [
+            (format!("{name}.csv"), table.as_bytes().to_vec()),
+            (format!("{name}.json"), format!("{results:#}\n").into_bytes()),
+            ("runs.csv".to_owned(), self.table().into_bytes()),
+            (format!("{name}.svg"), sheet.svg().map_err(drawing)?.into_bytes()),
+            (format!("{name}.png"), sheet.png(PNG_SCALE).map_err(drawing)?),
+        ];
+        for (name, content) in files {
+            folder.write(&name, &content)?;
+        }
+        Ok(())
+    }
+
+    /// All runs as CSV, SI.
+    fn table(&self) -> String {
+        let keys = self.inputs().iter().map(|input| quoted(&input.key));
+        let outputs = self.outputs().iter().map(|output| {
+            let unit = if output.unit.is_empty() { String::new() } else { format!(" ({})", output.unit) };
+            quoted(&format!("{}{unit}", output.name))
+        });
+        let heads: Vec<String> = ["stage".to_owned()].into_iter().chain(keys).chain(outputs).collect();
+        let mut out = heads.join(",") + "\n";
+        for run in self.runs() {
+            let cells: Vec<String> =
+                run.values.iter().chain(&run.outputs).map(|value| significant(*value, 12)).collect();
+            out += &format!("{},{}\n", run.stage, cells.join(","));
+        }
+        out
+    }
+}

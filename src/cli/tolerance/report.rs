@@ -1,0 +1,256 @@
+//! The results as text, JSON and a table.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::limit::Limit;
+use super::{Cheapest, Found, PERCENTILES, Quality};
+use crate::analysis::yields::{Estimate, RejectDriver};
+use crate::cli::args::ToleranceArguments;
+use crate::cli::output::significant;
+use crate::cli::study::{Output, Study, estimate, number, shown};
+use crate::cli::summary::count;
+use crate::cli::tables::{Table, quoted};
+
+/// Provenance of the files.
+pub fn meta(study: &Study, arguments: &ToleranceArguments) -> Map<String, Json> {
+    let mut meta = study.meta();
+    let file = |path: &Option<std::path::PathBuf>| path.as_ref().map(|path| path.display().to_string());
+    meta.insert("limit".into(), json!(arguments.limit));
+    meta.insert("tolerances".into(), json!(file(&arguments.tolerances)));
+    meta.insert("over".into(), json!(arguments.over));
+    meta.insert("cost".into(), json!(file(&arguments.cost)));
+    meta.insert("sampling".into(), json!(arguments.sampling));
+    meta.insert("lot".into(), json!(arguments.runs));
+    meta
+}
+
+fn percent(part: f64) -> String {
+    shown(100.0 * part, "%")
+}
+
+fn with_interval(part: &Estimate) -> String {
+    format!("{} ({} to {})", percent(part.value), percent(part.low), percent(part.high))
+}
+
+/// Name of a statistic for people and for programs, its unit, and its value, with an interval where one is known.
+type Statistic = (String, String, &'static str, Option<Estimate>);
+
+fn statistics(output: &Output, quality: &Quality) -> Vec<Statistic> {
+    let bare = |value: f64| Some(Estimate { value, low: f64::NAN, high: f64::NAN });
+    let mut all = vec![
+        ("mean".to_owned(), "mean".to_owned(), output.unit, bare(quality.mean)),
+        ("standard deviation".to_owned(), "deviation".to_owned(), output.unit, bare(quality.deviation)),
+    ];
+    for (p, value) in PERCENTILES.iter().zip(&quality.percentiles) {
+        let p = 100.0 * p;
+        all.push((format!("{p:.0}th percentile"), format!("percentile_{p:.0}"), output.unit, *value));
+    }
+    let capability = quality.capability.as_ref();
+    if let Some(cp) = capability.and_then(|capability| capability.cp) {
+        all.push(("Cp".to_owned(), "cp".to_owned(), "", bare(cp)));
+    }
+    all.push(("Cpk".to_owned(), "cpk".to_owned(), "", capability.map(|capability| capability.cpk)));
+    all
+}
+
+/// Number of units of the lot that did not start, or diverged.
+fn without_result(found: &Found) -> usize {
+    found.lot.outputs.iter().filter(|outputs| outputs.iter().any(|value| !value.is_finite())).count()
+}
+
+/// Indices of the parameters, the one that differs most between rejects and accepted units first.
+fn order(drivers: &[RejectDriver]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..drivers.len()).collect();
+    order.sort_by(|&a, &b| drivers[b].distance.total_cmp(&drivers[a].distance));
+    order
+}
+
+/// For a terminal.
+pub fn text(study: &Study, limits: &[Limit], found: &Found, arguments: &ToleranceArguments) -> String {
+    let units = found.lot.accepted.len();
+    let rejects = found.lot.accepted.iter().filter(|accepted| !**accepted).count();
+    let mut text = format!(
+        "Scene             {}: runs of {}\nRuns              {}\nLot               {}, {} rejected\n\
+         Yield             {}, interval of 95 %\n",
+        study.scene().name,
+        study.describe(),
+        study.counted(),
+        count(units as u64, "unit"),
+        rejects,
+        with_interval(&found.lot.yielded),
+    );
+    let lost = without_result(found);
+    if lost > 0 {
+        text += &format!("Statistics        of the {} with a result\n", count((units - lost) as u64, "unit"));
+    }
+    for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&found.qualities) {
+        text += &format!(
+            "\n{} {}: {} of the lot\n",
+            output.name,
+            limit.describe(output.unit),
+            with_interval(&quality.yielded)
+        );
+        let rows = statistics(output, quality).into_iter().map(|(name, _, unit, value)| {
+            let number =
+                |of: fn(&Estimate) -> f64| value.as_ref().map_or("-".to_owned(), |value| shown(of(value), unit));
+            vec![name, number(|e| e.value), number(|e| e.low), number(|e| e.high)]
+        });
+        text += &Table::new("statistic | value | 95 % from | to", rows).text();
+    }
+    text += &match &found.drivers {
+        Some(drivers) => {
+            let rows = order(drivers).into_iter().map(|i| {
+                let driver = &drivers[i];
+                vec![
+                    study.inputs()[i].key.clone(),
+                    shown(driver.mean_shift, ""),
+                    format!("{:.2}", driver.distance),
+                    p_value(driver.p_value),
+                ]
+            });
+            let heads = "parameter | mean of the rejects off by (deviations) | Kolmogorov-Smirnov distance | p-value";
+            format!("\nWhat drives the rejects\n{}", Table::new(heads, rows).text())
+        }
+        None if rejects == 0 => "\nNo rejects\n".to_owned(),
+        None => "\nNothing but rejects: what drives them cannot be told\n".to_owned(),
+    };
+    if let Some(cheapest) = &found.cheapest {
+        text += &fits(study, cheapest, arguments);
+    }
+    text + &format!("\nWritten           {}\nVersion           jointplay {}\n", arguments.out.display(), crate::VERSION)
+}
+
+fn p_value(p: f64) -> String {
+    if p < 1e-4 { "<0.0001".to_owned() } else { format!("{p:.4}") }
+}
+
+/// The cheapest fits in words.
+fn fits(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> String {
+    let required = percent(arguments.required_yield);
+    let search = &cheapest.search;
+    let effort = count(search.evaluations as u64, "choice");
+    let mut text = String::new();
+    match &search.best {
+        None => {
+            text += &format!("\nNo choice of fits holds a yield of {required}: the tightest do not ({effort} tried)\n");
+        }
+        Some(best) => {
+            let proof = if search.is_proven {
+                "proven the cheapest if a tighter fit never lowers the yield".to_owned()
+            } else {
+                format!("not proven the cheapest: --evaluations {} ended the search", arguments.evaluations)
+            };
+            text += &format!("\nFits for a yield of {required}: cost {}, {proof}; {effort} tried\n", best.cost);
+            let rows = cheapest.candidates.iter().zip(&best.candidates).map(|(of, &chosen)| {
+                let one = &of.list[chosen];
+                vec![study.inputs()[of.input].key.clone(), one.text.clone(), one.cost.to_string()]
+            });
+            text += &Table::new("parameter | fit | cost", rows).text();
+            text += &format!("Yield {} in the lot of the search\n", with_interval(&best.estimate));
+        }
+    }
+    if let Some(check) = &cheapest.check {
+        text +=
+            &format!("Yield {} in another lot: {}\n", with_interval(check), verdict(check, arguments.required_yield).1);
+    }
+    for of in cheapest.candidates.iter().filter(|of| !of.is_ordered()) {
+        text += &format!(
+            "The order of the candidates of {} is not checked: a distribution without limits has no width\n",
+            study.inputs()[of.input].key
+        );
+    }
+    text
+}
+
+/// What another lot says about a required yield: a word and a sentence.
+fn verdict(check: &Estimate, required: f64) -> (&'static str, &'static str) {
+    if check.low >= required {
+        ("held", "it holds")
+    } else if check.high < required {
+        ("missed", "it does not hold")
+    } else {
+        ("open", "too few runs to tell whether it holds")
+    }
+}
+
+/// Everything but the runs, SI.
+pub fn json(study: &Study, limits: &[Limit], found: &Found, arguments: &ToleranceArguments) -> Json {
+    let of_output = |((output, limit), quality): ((&Output, &Limit), &Quality)| {
+        let mut all = Map::new();
+        all.insert("name".into(), json!(output.name));
+        all.insert("unit".into(), json!(output.unit));
+        all.insert("lower".into(), json!(limit.lower));
+        all.insert("upper".into(), json!(limit.upper));
+        all.insert("yield".into(), estimate(&quality.yielded));
+        for (_, name, _, value) in statistics(output, quality) {
+            let plain = value.is_some_and(|value| value.low.is_nan());
+            let value = value.map(|value| if plain { number(value.value) } else { estimate(&value) });
+            all.insert(name, json!(value));
+        }
+        all
+    };
+    let outputs = study.outputs().iter().zip(limits).zip(&found.qualities).map(of_output);
+    let drivers = found.drivers.as_ref().map(|drivers| {
+        let of_input = |i: usize| {
+            let driver = &drivers[i];
+            json!({
+                "key": study.inputs()[i].key,
+                "mean_shift": number(driver.mean_shift),
+                "distance": number(driver.distance),
+                "p_value": number(driver.p_value),
+            })
+        };
+        order(drivers).into_iter().map(of_input).collect::<Vec<_>>()
+    });
+    json!({
+        "units": found.lot.accepted.len(),
+        "accepted": found.lot.accepted.iter().filter(|accepted| **accepted).count(),
+        "without_result": without_result(found),
+        "yield": estimate(&found.lot.yielded),
+        "outputs": outputs.collect::<Vec<_>>(),
+        "reject_drivers": drivers,
+        "fits": found.cheapest.as_ref().map(|cheapest| fits_json(study, cheapest, arguments)),
+        "runs": study.runs().len(),
+    })
+}
+
+fn fits_json(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> Json {
+    let best = cheapest.search.best.as_ref().map(|best| {
+        let fits = cheapest.candidates.iter().zip(&best.candidates).map(|(of, &chosen)| {
+            let one = &of.list[chosen];
+            json!({"key": study.inputs()[of.input].key, "fit": one.text, "cost": one.cost})
+        });
+        json!({"cost": best.cost, "fits": fits.collect::<Vec<_>>(), "yield": estimate(&best.estimate)})
+    });
+    let unchecked = cheapest.candidates.iter().filter(|of| !of.is_ordered()).map(|of| &study.inputs()[of.input].key);
+    json!({
+        "required_yield": arguments.required_yield,
+        "best": best,
+        "is_proven": cheapest.search.is_proven,
+        "evaluations": cheapest.search.evaluations,
+        "check": cheapest.check.as_ref().map(|check| {
+            json!({"yield": estimate(check), "verdict": verdict(check, arguments.required_yield).0})
+        }),
+        "order_not_checked": unchecked.collect::<Vec<_>>(),
+    })
+}
+
+/// One row per output and statistic, SI.
+pub fn table(study: &Study, limits: &[Limit], found: &Found) -> String {
+    let mut out = String::from("output,unit,lower,upper,statistic,value,low,high\n");
+    let cell = |value: f64| significant(value, 12);
+    let mut line = |heads: &str, name: &str, value: &Estimate| {
+        out += &format!("{heads},{name},{},{},{}\n", cell(value.value), cell(value.low), cell(value.high));
+    };
+    line("all,,NaN,NaN", "yield", &found.lot.yielded);
+    for ((output, limit), quality) in study.outputs().iter().zip(limits).zip(&found.qualities) {
+        let [lower, upper] = [limit.lower, limit.upper].map(|end| cell(end.unwrap_or(f64::NAN)));
+        let heads = format!("{},{},{lower},{upper}", quoted(&output.name), output.unit);
+        line(&heads, "yield", &quality.yielded);
+        let unknown = Estimate { value: f64::NAN, low: f64::NAN, high: f64::NAN };
+        for (_, name, _, value) in statistics(output, quality) {
+            line(&heads, &name, &value.unwrap_or(unknown));
+        }
+    }
+    out
+}
