@@ -168,6 +168,22 @@ fn the_cheapest_fits_are_those_of_trying_all() {
     }
     let none = jointplay(folder.path(), &format!("{line} --cost costs.csv --limit impacts=1000.. --yield 100%"));
     assert_eq!(none.expect(0).json()["fits"]["best"], Json::Null);
+
+    // One evaluation, of the tightest fits, proves nothing.
+    let cut = format!(
+        "{FOUR_BAR} --limit peak-force=125 --runs 8 --force --tolerances tolerances.csv --cost costs.csv --yield 1%"
+    );
+    let said = jointplay(folder.path(), &format!("{cut} --evaluations 1")).expect(0).stdout;
+    assert!(
+        said.contains("cost 10, not proven the cheapest: --evaluations 1 ended the search; 1 choice tried"),
+        "{said}"
+    );
+    let normal =
+        "parameter,fit,cost\njoint.A.clearance,\"normal(0.1mm, 5um)\",1\njoint.A.clearance,\"normal(0.1mm, 2um)\",2\n";
+    fs::write(folder.path().join("costs.csv"), normal).unwrap();
+    let said = jointplay(folder.path(), &cut).expect(0).stdout;
+    assert!(said.contains("The order of the candidates of joint.A.clearance is not checked"), "{said}");
+    assert!(said.contains("cost 1, proven the cheapest") && said.contains("in another lot: "), "{said}");
 }
 
 #[test]
