@@ -221,7 +221,7 @@ fn long_list() -> Vec<Long> {
     list.push(long("slider-crank-driven", "default", &[], CRANK_PERIOD, [None; 2]));
     list.push(long("pendulum", "default", &[], 1.0, [None; 2]));
     list.push(long("slider-crank", "free, ideal", &[IDEAL], 1.0, [None; 2]));
-    let many = |scene, what, changes| Long { residual: [2e-3, 1e-3], ..long(scene, what, changes, 1.0, [None; 2]) };
+    let many = |scene, what, changes| Long { residual: [1e-4; 2], ..long(scene, what, changes, 1.0, [None; 2]) };
     list.push(many("hexapod", "default", &[]));
     list.push(many("delta", "default", &[]));
     list.push(many("chain", "16 links", &[("chain.links", "16")]));
