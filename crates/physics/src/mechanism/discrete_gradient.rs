@@ -29,8 +29,6 @@ const CUTS: u32 = 4;
 const CUT: f64 = 0.4;
 /// Change of a velocity at which the iteration ends where no friction asks for less, m/s or rad/s.
 const STILL: f64 = 1e-4;
-/// Part of that which may remain, by the rate at which the changes shrink.
-const REMAINDER: f64 = 0.1;
 /// An element whose force changes by less than this fraction of what moves it, over half a step, is as good as constant.
 const SOFT: f64 = 0.05;
 /// Distance of the end from the guessed one, over the scales, beyond which the step is repeated from there.
@@ -371,7 +369,7 @@ impl DiscreteGradient {
         let laws = self.touches.iter().filter_map(Touch::contact);
         let still = laws.map(|(_, law)| law.slip_high).fold(STILL, f64::min);
         let (mut merit, mut cuts, mut part) = (f64::INFINITY, 0, 1.0);
-        let (mut through_centres, mut latest) = (false, f64::NAN);
+        let mut through_centres = false;
         for iteration in 0..ITERATIONS {
             counts.contacts += 1;
             for touch in &mut self.touches {
@@ -410,9 +408,7 @@ impl DiscreteGradient {
             if !change.is_finite() {
                 return false;
             }
-            let rate = change / latest;
-            latest = change;
-            if change < still || rate * change < REMAINDER * (1.0 - rate) * still {
+            if change < still {
                 if through_centres || self.move_normal_forces(half, model, equations) < still {
                     return true;
                 }
