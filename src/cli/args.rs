@@ -261,6 +261,15 @@ pub struct StudyArguments {
     /// Threads to use [default: one for each core]; the result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
+    /// Folder for the table (CSV), the results (JSON), all runs (CSV), and the charts (SVG, PNG).
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// Format of the result on standard output.
+    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
+    pub summary: SummaryForm,
+    /// Replace existing results.
+    #[arg(long)]
+    pub force: bool,
     /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
@@ -294,15 +303,6 @@ pub struct SensitivityArguments {
     /// Runs.
     #[command(flatten)]
     pub study: StudyArguments,
-    /// Folder for the table (CSV), the results (JSON), all runs (CSV), and the charts (SVG, PNG).
-    #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
-    /// Format of the result on standard output.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
-    pub summary: SummaryForm,
-    /// Replace existing results.
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// `merge`.

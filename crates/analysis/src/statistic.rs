@@ -156,6 +156,20 @@ struct Tally {
 }
 
 impl Tally {
+    /// Nothing seen.
+    fn new(reading: Option<Reading>) -> Self {
+        let unknown = f64::NAN;
+        Self {
+            reading,
+            first: unknown,
+            latest: unknown,
+            least: unknown,
+            largest: unknown,
+            deviation: unknown,
+            square: unknown,
+        }
+    }
+
     fn begin(&mut self, value: f64) {
         let reading = self.reading;
         *self =
@@ -207,15 +221,8 @@ impl Accumulator {
     pub(super) fn new(wanted: &[ChannelStatistic], simulation: &mut Simulation, interval: f64) -> Self {
         let machine = simulation.machine().clone();
         let list = if wanted.is_empty() { Vec::new() } else { channels(&machine, simulation) };
-        let unknown = f64::NAN;
-        let tally = |of: &ChannelStatistic| Tally {
-            reading: list.iter().find(|channel| channel.name == of.channel).map(Listed::reading),
-            first: unknown,
-            latest: unknown,
-            least: unknown,
-            largest: unknown,
-            deviation: unknown,
-            square: unknown,
+        let tally = |of: &ChannelStatistic| {
+            Tally::new(list.iter().find(|channel| channel.name == of.channel).map(Listed::reading))
         };
         let tallies: Vec<Tally> = wanted.iter().map(tally).collect();
         let mut frame = Frame::default();
@@ -308,16 +315,7 @@ mod tests {
     /// A sine about a large mean, sampled at unequal intervals.
     #[test]
     fn statistics_of_a_sine_are_the_known_ones() {
-        let unknown = f64::NAN;
-        let mut tally = Tally {
-            reading: None,
-            first: unknown,
-            latest: unknown,
-            least: unknown,
-            largest: unknown,
-            deviation: unknown,
-            square: unknown,
-        };
+        let mut tally = Tally::new(None);
         let (mean, amplitude, samples) = (1e6, 2.0, 4000);
         // Two periods; the intervals alternate between one and three parts of four.
         let time = |k: usize| (k as f64 + if k % 2 == 1 { 0.5 } else { 0.0 }) / samples as f64;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::{SceneArguments, StudyArguments, SummaryForm};
+use super::{SceneArguments, StudyArguments};
 use crate::analysis::sampling::Sampling;
 
 /// `tolerance`.
@@ -49,15 +49,6 @@ pub struct ToleranceArguments {
     /// Runs.
     #[command(flatten)]
     pub study: StudyArguments,
-    /// Folder for the table (CSV), the results (JSON), all runs (CSV), and the charts (SVG, PNG).
-    #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
-    /// Format of the result on standard output.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value = "text")]
-    pub summary: SummaryForm,
-    /// Replace existing results.
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Parser for `--sampling`.

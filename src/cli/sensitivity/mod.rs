@@ -59,13 +59,13 @@ pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
     let inputs = inputs(&scene, None, &arguments.over)?;
     let outputs = outputs(&scene, "--output", &arguments.output)?;
     let target = arguments.target.as_deref().map(|text| target::read(&outputs[0], text)).transpose()?;
-    let folder = Folder::claim(&arguments.out, arguments.force)?;
-    let mut study = Study::new(scene, inputs, outputs, &arguments.study, &arguments.out)?;
+    let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
+    let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
     let found = find(&mut study, arguments, target)?;
     let manifest = report::fill(&folder, &study, &found, arguments)?;
     folder.finish(manifest)?;
-    print(&match arguments.summary {
-        SummaryForm::Text => report::text(&study, &found, &arguments.out),
+    print(&match arguments.study.summary {
+        SummaryForm::Text => report::text(&study, &found, &arguments.study.out),
         SummaryForm::Json => format!("{:#}\n", report::json(&study, &found)),
     })?;
     study.finish();

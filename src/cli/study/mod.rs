@@ -10,7 +10,7 @@ pub use outputs::{Output, outputs};
 pub use report::{drawn, estimate, number, shown};
 pub use rows::{Row, rows};
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::args::StudyArguments;
 use super::sweep::{Partial, Source as _, compute, meta};
@@ -52,7 +52,7 @@ pub struct Study {
 }
 
 impl Study {
-    /// The runs of `inputs` of `scene`, of which `outputs` are kept. Files of an interrupted command lie beside `out`.
+    /// The runs of `inputs` of `scene`, of which `outputs` are kept. Files of an interrupted command lie beside its folder.
     ///
     /// # Errors
     /// Usage: an invalid duration, or a scene that cannot start.
@@ -61,7 +61,6 @@ impl Study {
         inputs: Vec<Input>,
         outputs: Vec<Output>,
         arguments: &StudyArguments,
-        out: &Path,
     ) -> Result<Self, Failure> {
         let (duration, from) = match &arguments.duration {
             Some(text) => quantity::span(text, arguments.from.as_deref())?,
@@ -75,7 +74,7 @@ impl Study {
             inputs,
             outputs,
             protocol,
-            out: out.to_owned(),
+            out: arguments.out.clone(),
             seed: arguments.seed,
             threads: threads(arguments.threads),
             quiet: arguments.quiet,

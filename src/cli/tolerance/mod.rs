@@ -75,15 +75,15 @@ pub fn tolerance(arguments: &ToleranceArguments) -> Result<(), Failure> {
     let inputs = inputs(&scene, arguments.tolerances.as_deref(), &arguments.over)?;
     let (outputs, limits) = limit::read(&scene, &arguments.limit)?;
     let candidates = arguments.cost.as_deref().map(|path| candidates::read(&scene, &inputs, path)).transpose()?;
-    let folder = Folder::claim(&arguments.out, arguments.force)?;
-    let mut study = Study::new(scene, inputs, outputs, &arguments.study, &arguments.out)?;
+    let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
+    let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
     let found = find(&mut study, &limits, candidates, arguments)?;
     let results = report::json(&study, &limits, &found, arguments);
     let meta = report::meta(&study, arguments);
     let sheet = picture::sheet(&study, &limits, &found.lot);
     study.write(&folder, "tolerance", &meta, results.clone(), &report::table(&study, &limits, &found), &sheet)?;
     folder.finish(meta)?;
-    print(&match arguments.summary {
+    print(&match arguments.study.summary {
         SummaryForm::Text => report::text(&study, &limits, &found, arguments),
         SummaryForm::Json => format!("{results:#}\n"),
     })?;

@@ -117,7 +117,11 @@ pub fn text(study: &Study, limits: &[Limit], found: &Found, arguments: &Toleranc
     if let Some(cheapest) = &found.cheapest {
         text += &fits(study, cheapest, arguments);
     }
-    text + &format!("\nWritten           {}\nVersion           jointplay {}\n", arguments.out.display(), crate::VERSION)
+    text + &format!(
+        "\nWritten           {}\nVersion           jointplay {}\n",
+        arguments.study.out.display(),
+        crate::VERSION
+    )
 }
 
 fn p_value(p: f64) -> String {
