@@ -191,7 +191,7 @@ fn gzip(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
 fn brotli(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
     const BUFFER: usize = 1 << 16;
     const QUALITY: u32 = 11;
-    const WINDOW: u32 = 22;
+    const WINDOW: u32 = 24;
     let mut writer = brotli::CompressorWriter::new(Vec::new(), BUFFER, QUALITY, WINDOW);
     writer.write_all(bytes)?;
     Ok(writer.into_inner())
