@@ -216,3 +216,77 @@ fn a_live_change_keeps_the_balance() {
     simulation.advance_to(0.5).unwrap();
     assert_eq!(hashes, [simulation.state_hash(); 2]);
 }
+
+/// A ball of 0.1 kg and of 10 mm, which turns about y, under a torque about y, N m, if any. It touches its socket where friction that
+/// carries `ratio` of the normal force holds it: a ball that slides oscillates about that place for ever.
+fn rotor(spin: f64, torque: Option<f64>, ratio: f64) -> String {
+    let (x, z) = (0.1 * ratio.atan().sin(), -0.1 * ratio.atan().cos());
+    let load = torque.map_or_else(String::new, |torque| {
+        format!("[[load]]\nname = \"torque\"\non = {{ body = \"ball\" }}\ntorque = \"0 {torque} 0 N m\"")
+    });
+    format!(
+        r#"
+        [gravity]
+        z = "-10 m/s^2"
+        [contact]
+        ball_radius = "10 mm"
+        clearance = "0.1 mm"
+        friction = 0.3
+        slip_speed_low = "0.01 mm/s"
+        slip_speed_high = "0.2 mm/s"
+        [[body]]
+        name = "ball"
+        mass = "0.1 kg"
+        inertia = "1e-4 1e-4 1e-4 kg m^2"
+        [[joint]]
+        name = "ball"
+        kind = "free"
+        child = "ball"
+        start = {{ position = "{x} 0 {z} mm", angular_velocity = "0 {spin} 0 rad/s" }}
+        [[ball_joint]]
+        name = "S"
+        socket = {{ body = "world" }}
+        ball = {{ body = "ball" }}
+        {load}
+        "#
+    )
+}
+
+/// Its rates about y at `times`, s, by `parts` steps per impact.
+fn rates<const N: usize>(text: &str, parts: &str, times: [f64; N]) -> [f64; N] {
+    let mut simulation = Simulation::new(&parse(text, &with(parts, &[])).machine).unwrap();
+    times.map(|time| {
+        run_until(&mut simulation, time);
+        frame_now(&mut simulation).bodies[0].angular_velocity.y
+    })
+}
+
+/// Load, N, and ball radius, m, of [`rotor`].
+const LOAD: f64 = 1.0;
+const RADIUS: f64 = 0.01;
+
+/// The contact climbs until it stands at the friction angle: the torque is W r mu / sqrt(1 + mu^2), for any step.
+#[test]
+fn sliding_friction_brakes_a_turning_ball_by_its_closed_form() {
+    let expected = -LOAD * RADIUS * 0.3 / 1.09_f64.sqrt() / 1e-4;
+    for parts in ["2", "8", "64"] {
+        let [start, end] = rates(&rotor(40.0, None, 0.3), parts, [0.5, 1.0]);
+        let found = (end - start) / 0.5;
+        assert!((found / expected - 1.0).abs() < 1e-3, "{parts}: {found} rad/s^2, not {expected}");
+    }
+}
+
+/// Under half of that torque the ball creeps at the speed at which the law gives the friction that carries it.
+#[test]
+fn a_torque_below_the_friction_turns_a_ball_at_the_speed_of_the_law() {
+    let torque = 0.5 * LOAD * RADIUS * 0.3 / 1.09_f64.sqrt();
+    let carried = (torque / (LOAD * RADIUS)).asin().tan();
+    let speed = 0.01e-3 + carried / 0.3 * 0.19e-3;
+    for parts in ["2", "8", "64"] {
+        let found = rates(&rotor(speed / RADIUS, Some(torque), carried), parts, [4.0, 4.5]);
+        for rate in found {
+            let expected = speed / RADIUS;
+            assert!((rate / expected - 1.0).abs() < 1e-3, "{parts}: {rate} rad/s, not {expected}");
+        }
+    }
+}
