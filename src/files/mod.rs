@@ -4,13 +4,14 @@
 mod folder;
 mod names;
 mod output;
+mod same;
 mod temporary;
 #[cfg(test)]
 mod tests;
 
 pub use folder::{Folder, MANIFEST};
-pub use names::same_file;
 pub use output::{Content, OutputFile, PendingFile, open_or_create, publish};
+pub use same::same_file;
 // The rest of the program changes nothing on the disk except through this module.
 pub use std::fs::{create_dir_all, remove_dir, remove_file};
 

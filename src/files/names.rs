@@ -1,6 +1,6 @@
-//! Path resolution: links, and different names for one file.
+//! Path resolution.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -28,24 +28,4 @@ pub(super) fn parent(path: &Path) -> &Path {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     }
-}
-
-/// The first of `others` that would be the same file as `path`: by a link, by another route, or by a spelling that its
-/// file system treats as equal.
-pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
-    let own = place(path).ok()?;
-    let others: Vec<_> = others.iter().map(|other| place(other).ok()).collect();
-    if let Some(same) = others.iter().position(|other| other.as_ref() == Some(&own)) {
-        return Some(same);
-    }
-    let beside = |other: &Option<PathBuf>| other.clone().filter(|other| parent(other) == parent(&own));
-    let beside: Vec<_> = others.iter().map(beside).collect();
-    if beside.iter().all(Option::is_none) {
-        return None;
-    }
-    // Only the file system knows how it compares names: ask it. A failure to write here is reported elsewhere.
-    let trial = tempfile::Builder::new().prefix(".jointplay-").tempdir_in(parent(&own)).ok()?;
-    let at = |place: &Path| place.file_name().map(|name| trial.path().join(name));
-    File::create_new(at(&own)?).ok()?;
-    beside.iter().position(|other| other.as_deref().and_then(at).is_some_and(|trial| trial.exists()))
 }

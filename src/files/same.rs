@@ -1,0 +1,30 @@
+//! Different names for one file.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use super::names::{parent, place};
+use super::temporary;
+
+/// The first of `others` that would be the same file as `path`: by a link, by another route, or by a spelling that its
+/// file system treats as equal.
+pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
+    let own = place(path).ok()?;
+    let others: Vec<_> = others.iter().map(|other| place(other).ok()).collect();
+    if let Some(same) = others.iter().position(|other| other.as_ref() == Some(&own)) {
+        return Some(same);
+    }
+    let beside = |other: &Option<PathBuf>| other.clone().filter(|other| parent(other) == parent(&own));
+    let beside: Vec<_> = others.iter().map(beside).collect();
+    if beside.iter().all(Option::is_none) {
+        return None;
+    }
+    // Only the file system knows how it compares names: ask it. A failure to write here is reported elsewhere.
+    let (trial, _lock) = temporary::folder(&own).ok()?;
+    // One level down, where no name means anything to the run that removes what a killed one left.
+    let names = trial.path().join("names");
+    fs::create_dir(&names).ok()?;
+    let at = |place: &Path| place.file_name().map(|name| names.join(name));
+    File::create_new(at(&own)?).ok()?;
+    beside.iter().position(|other| other.as_deref().and_then(at).is_some_and(|trial| trial.exists()))
+}
