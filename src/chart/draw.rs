@@ -6,7 +6,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 use super::ink::{Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write};
 use super::labels::{Area, arrange};
 use super::ticks::Ruler;
-use super::{Chart, Colour, Marker, Series};
+use super::{Chart, Colour, LINE, Marker, Series};
 use super::{heat, thin};
 use crate::scene::visible;
 
@@ -31,13 +31,13 @@ pub struct Sheet {
 const TITLE: f64 = 16.0;
 const HEADING: f64 = 14.0;
 
-/// Height of a row of the legend, length of its sample, gap between entries, pixels.
+/// Height of a row of the legend, length of its sample and its largest width, gap between entries, pixels.
 const ROW: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
+const THICKEST: f64 = 10.0;
 const GAP: f64 = 18.0;
-/// Half the size of a marker, line width, pixels.
+/// Half the size of a marker, pixels.
 const MARKER: f64 = 4.0;
-const LINE: f64 = 1.6;
 /// Average letter width as a fraction of text size, a generous estimate.
 const LETTER: f64 = 0.51;
 
@@ -148,9 +148,9 @@ fn draw_legend(root: &Canvas, row: &[&Series], left: f64, width: f64, y: f64) ->
     let mut x = left + 0.5 * (width - total + GAP);
     let style = style(TEXT, INK, HPos::Left, VPos::Center);
     for series in row {
-        if series.line {
+        if let Some(width) = series.line {
             let ends = vec![(fine(x), fine(y)), (fine(x + SAMPLE), fine(y))];
-            root.draw(&PathElement::new(ends, stroke(series.colour))).map_err(failed)?;
+            root.draw(&PathElement::new(ends, stroke(series.colour, width.min(THICKEST)))).map_err(failed)?;
         }
         if let Some(marker) = series.marker {
             draw_marker(root, (fine(x + 0.5 * SAMPLE), fine(y)), marker, series.colour)?;
@@ -161,8 +161,8 @@ fn draw_legend(root: &Canvas, row: &[&Series], left: f64, width: f64, y: f64) ->
     Ok(())
 }
 
-fn stroke(colour: Colour) -> ShapeStyle {
-    rgb(colour).stroke_width(fine(LINE).unsigned_abs())
+fn stroke(colour: Colour, width: f64) -> ShapeStyle {
+    rgb(colour).stroke_width(fine(width).unsigned_abs())
 }
 
 fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetError> {
@@ -220,7 +220,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     }
     draw_levels(root, &plot, chart, &x, &y, &mut taken)?;
     for series in &chart.series {
-        if series.line {
+        if let Some(width) = series.line {
             for part in series.points.split(|point| inside(point).is_none()) {
                 let path: Vec<(i32, i32)> =
                     part.iter().filter_map(|point| inside(point).map(|place| plot.backend_coord(&place))).collect();
@@ -229,14 +229,14 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
                 if !chart.labels.is_empty() {
                     along(&path, &mut taken);
                 }
-                root.draw(&PathElement::new(path, stroke(series.colour))).map_err(failed)?;
+                root.draw(&PathElement::new(path, stroke(series.colour, width))).map_err(failed)?;
             }
         }
     }
     for series in &chart.series {
         let all = series.points.iter().filter_map(inside);
         let mut all: Vec<_> = all.map(|place| plot.backend_coord(&place)).collect();
-        if !series.line {
+        if series.line.is_none() {
             all = thin::cloud(all.into_iter(), fine(1.0));
         }
         for at in all {
@@ -373,14 +373,14 @@ fn draw_marker(root: &Canvas, (x, y): (i32, i32), marker: Marker, colour: Colour
     let strokes = |lines: [[(i32, i32); 2]; 2]| {
         lines.into_iter().try_for_each(|[a, b]| {
             let ends = vec![(x + a.0, y + a.1), (x + b.0, y + b.1)];
-            root.draw(&PathElement::new(ends, stroke(colour)))
+            root.draw(&PathElement::new(ends, stroke(colour, LINE)))
         })
     };
     match marker {
         Marker::Disc => root.draw(&Circle::new((x, y), r, filled)),
         Marker::Dot => root.draw(&Circle::new((x, y), fine(1.25), filled)),
         Marker::Point => root.draw(&Circle::new((x, y), fine(2.5), filled)),
-        Marker::Ring => root.draw(&Circle::new((x, y), fine(MARKER + 3.0), stroke(colour))),
+        Marker::Ring => root.draw(&Circle::new((x, y), fine(MARKER + 3.0), stroke(colour, LINE))),
         Marker::Square => {
             let s = fine(0.88 * MARKER);
             root.draw(&Rectangle::new([(x - s, y - s), (x + s, y + s)], filled))

@@ -51,6 +51,8 @@ pub struct Axis {
     pub scale: Scale,
     /// Range; `None` follows the data.
     pub range: Option<(f64, f64)>,
+    /// For categories: the value and name of each, in place of numbers. Empty for quantities.
+    pub names: Vec<(f64, String)>,
 }
 
 impl Axis {
@@ -90,6 +92,9 @@ pub enum Marker {
     Dot,
 }
 
+/// Width of a line, pixels.
+const LINE: f64 = 1.6;
+
 /// Points drawn in one style.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
@@ -99,8 +104,8 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Colour of line and markers.
     pub colour: Colour,
-    /// Whether a line joins the points.
-    pub line: bool,
+    /// Width of the line that joins the points, pixels.
+    pub line: Option<f64>,
     /// Marker at each point.
     pub marker: Option<Marker>,
 }
@@ -108,12 +113,17 @@ pub struct Series {
 impl Series {
     /// A line without markers.
     pub fn line(label: &str, points: Vec<(f64, f64)>, colour: Colour) -> Self {
-        Self { label: label.to_owned(), points, colour, line: true, marker: None }
+        Self { label: label.to_owned(), points, colour, line: Some(LINE), marker: None }
+    }
+
+    /// A horizontal bar at height `y`, `width` pixels wide, from `ends.0` to `ends.1` on the x axis.
+    pub fn bar(label: &str, ends: (f64, f64), y: f64, width: f64, colour: Colour) -> Self {
+        Self { line: Some(width), ..Self::line(label, vec![(ends.0, y), (ends.1, y)], colour) }
     }
 
     /// Markers without a line.
     pub fn dots(label: &str, points: Vec<(f64, f64)>, colour: Colour, marker: Marker) -> Self {
-        Self { line: false, ..Self::line(label, points, colour).marked(marker) }
+        Self { line: None, ..Self::line(label, points, colour).marked(marker) }
     }
 
     /// The same with a marker at each point.

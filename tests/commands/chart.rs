@@ -3,7 +3,7 @@
 use jointplay::chart::{Axis, Chart, Label, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
 
 fn axis(label: &str, unit: &str, scale: Scale) -> Axis {
-    Axis { label: label.to_owned(), unit: unit.to_owned(), scale, range: None }
+    Axis { scale, ..Axis::new(label, unit) }
 }
 
 fn series(label: &str, points: Vec<(f64, f64)>, n: usize) -> Series {
@@ -19,13 +19,8 @@ fn series(label: &str, points: Vec<(f64, f64)>, n: usize) -> Series {
         Marker::Point,
         Marker::Dot,
     ];
-    Series {
-        label: label.to_owned(),
-        points,
-        colour: PALETTE[n % PALETTE.len()],
-        line: n < 8,
-        marker: Some(markers[n]),
-    }
+    let line = Series::line(label, points, PALETTE[n % PALETTE.len()]).marked(markers[n]);
+    Series { line: line.line.filter(|_| n < 8), ..line }
 }
 
 fn sheet(size: (u32, u32)) -> Sheet {
@@ -206,13 +201,9 @@ fn a_hundred_thousand_points_make_no_large_file() {
             let a = f64::from(k) * 1e-3;
             (a.sin(), (1.7 * a).cos())
         };
-        let series = Series {
-            label: String::new(),
-            points: (0..100_000).map(place).collect(),
-            colour: PALETTE[1],
-            line,
-            marker: (!line).then_some(Marker::Dot),
-        };
+        let points = (0..100_000).map(place).collect();
+        let series =
+            if line { Series::line("", points, PALETTE[1]) } else { Series::dots("", points, PALETTE[1], Marker::Dot) };
         Sheet {
             title: String::new(),
             charts: vec![Chart { series: vec![series], ..Chart::default() }],
@@ -230,26 +221,44 @@ fn a_hundred_thousand_points_make_no_large_file() {
     assert!((1000..20_000).contains(&dots), "{dots}");
 }
 
+/// Pixels of `series` , columns and rows, where they are blue, in a picture with two pixels to each of the description.
+fn blue(series: Series) -> Vec<(u32, u32)> {
+    let axis = Axis { range: Some((0.0, 10.0)), ..Axis::default() };
+    let sheet = Sheet {
+        charts: vec![Chart { x: axis.clone(), y: axis, series: vec![series], ..Chart::default() }],
+        columns: 1,
+        size: (500, 400),
+        title: String::new(),
+        note: String::new(),
+        apart: false,
+    };
+    let png = sheet.png(2.0).unwrap();
+    let picture = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
+    let pixels = picture.pixels().iter().zip(0..).filter(|(p, _)| p.blue() > p.red().saturating_add(60));
+    pixels.map(|(_, at)| (at % picture.width(), at / picture.width())).collect()
+}
+
+#[test]
+fn a_bar_is_as_long_as_its_values_and_as_thick_as_it_says() {
+    let extent = |from: f64, to: f64, width: f64| {
+        let found = blue(Series::bar("", (from, to), 5.0, width, PALETTE[1]));
+        let span = |of: fn(&(u32, u32)) -> u32| {
+            let (low, high) = (found.iter().map(of).min().unwrap(), found.iter().map(of).max().unwrap());
+            assert!(low < high);
+            high + 1 - low
+        };
+        (span(|at| at.0), span(|at| at.1))
+    };
+    let (long, thick) = extent(2.0, 8.0, 20.0);
+    let (short, thin) = extent(6.0, 4.0, 10.0);
+    assert!(long.abs_diff(3 * short) <= 3, "{long} {short}");
+    assert!(thick.abs_diff(40) <= 1 && thin.abs_diff(20) <= 1, "{thick} {thin}");
+}
+
 #[test]
 fn a_line_stands_no_higher_than_its_peak() {
-    // The highest coloured row of a line through `points`, pixels.
-    let top = |points: &[(f64, f64)]| {
-        let axis = Axis { range: Some((0.0, 10.0)), ..Axis::default() };
-        let line = Series { marker: None, ..series("", points.to_vec(), 1) };
-        let sheet = Sheet {
-            charts: vec![Chart { x: axis.clone(), y: axis, series: vec![line], ..Chart::default() }],
-            columns: 1,
-            size: (500, 400),
-            title: String::new(),
-            note: String::new(),
-            apart: false,
-        };
-        let png = sheet.png(2.0).unwrap();
-        let picture = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
-        let blue = |p: &resvg::tiny_skia::PremultipliedColorU8| p.blue() > p.red().saturating_add(60);
-        let at = picture.pixels().iter().position(blue).unwrap();
-        at as u32 / picture.width()
-    };
+    // The highest coloured row of a line through `points`.
+    let top = |points: &[(f64, f64)]| blue(Series::line("", points.to_vec(), PALETTE[1]))[0].1;
     let level = top(&[(1.0, 8.0), (9.0, 8.0)]);
     for half in [0.2, 0.5, 0.8, 1.2, 2.0] {
         let peak = top(&[(5.0 - half, 3.0), (5.0, 8.0), (5.0 + half, 3.0)]);

@@ -158,13 +158,7 @@ fn the_laws_of_drives_are_drawn_as_curves() {
         title: (*law).to_owned(),
         x: axis("t", "s", (0.0, 1.0)),
         y: axis("q", "mm", (-55.0, 55.0)),
-        series: vec![Series {
-            label: String::new(),
-            points: motion(law, keys),
-            colour: PALETTE[1 + n % (PALETTE.len() - 1)],
-            line: true,
-            marker: None,
-        }],
+        series: vec![Series::line("", motion(law, keys), PALETTE[1 + n % (PALETTE.len() - 1)])],
         ..Chart::default()
     };
     let sheet = Sheet {

@@ -1,7 +1,7 @@
 //! Tornado of each parameter alone, and its indices, for every output.
 
 use super::Found;
-use crate::chart::{Axis, Chart, Label, Marker, PALETTE, Series, Sheet};
+use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
 use crate::cli::study::{Study, drawn};
 
 /// Width of one chart, height of its frame and of each parameter, pixels.
@@ -13,6 +13,12 @@ const MOST: usize = 20;
 
 /// Space above and below the parameters, in rows.
 const MARGIN: f64 = 0.5;
+/// Width of a bar and of one of two side by side, pixels; how far the latter lie from the middle, in rows.
+const BAR: f64 = 20.0;
+const HALF: f64 = 10.0;
+const ASIDE: f64 = 0.5 * HALF / ROW as f64;
+/// Colour and meaning of the bars of the tornado.
+const ENDS: [(Colour, &str); 2] = [(PALETTE[1], "lower end of the range"), (PALETTE[5], "upper end")];
 
 /// Two charts side by side for each output.
 pub fn sheet(study: &Study, found: &Found) -> Sheet {
@@ -52,61 +58,62 @@ fn order(found: &Found, o: usize) -> Vec<usize> {
     order
 }
 
+/// A bar from the value of the scene to that at each end of a parameter's range, side by side where both are on the same side of it.
 fn tornado(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
     let output = &study.outputs()[o];
     let scaled = |value: f64| drawn(value, output.unit).0;
-    let place = |rank: usize| (order.len() - rank) as f64;
-    let mut series = Vec::new();
-    let mut labels = Vec::new();
-    let (mut low_ends, mut high_ends) = (Vec::new(), Vec::new());
-    for (rank, &i) in order.iter().enumerate() {
-        let [(_, low), (_, high)] = &found.alone.ends[i];
-        let (a, b) = ((scaled(low[o]), place(rank)), (scaled(high[o]), place(rank)));
-        series.push(Series::line("", vec![a, b], PALETTE[0]));
-        low_ends.push(a);
-        high_ends.push(b);
-        labels.push(Label { at: if b.0 > a.0 { b } else { a }, text: study.inputs()[i].key.clone() });
-    }
-    series.push(Series::dots("lower end of the range", low_ends, PALETTE[0], Marker::Disc));
-    series.push(Series::dots("upper end", high_ends, PALETTE[1], Marker::Square));
     let nominal = scaled(found.alone.nominal[o]);
-    let top = order.len() as f64 + MARGIN;
-    series.push(Series::line("values of the scene", vec![(nominal, 1.0 - MARGIN), (nominal, top)], PALETTE[2]));
+    let mut series = Vec::new();
+    for (rank, &i) in order.iter().enumerate() {
+        let ends = found.alone.ends[i].each_ref().map(|(_, outputs)| scaled(outputs[o]));
+        let apart = (ends[0] - nominal) * (ends[1] - nominal) < 0.0;
+        for ((end, side), (colour, label)) in ends.into_iter().zip([1.0, -1.0]).zip(ENDS) {
+            let (width, shift) = if apart { (BAR, 0.0) } else { (HALF, side * ASIDE) };
+            let label = if rank == 0 { label } else { "" };
+            series.push(Series::bar(label, (nominal, end), place(order, rank) + shift, width, colour));
+        }
+    }
+    let line = vec![(nominal, 1.0 - MARGIN), (nominal, order.len() as f64 + MARGIN)];
+    series.push(Series::line("values of the scene", line, PALETTE[0]));
     let x = Axis::new(&output.name, drawn(0.0, output.unit).1);
-    Chart { labels, ..Chart::new("Each parameter alone", x, ranks(order), series) }
+    Chart::new("Each parameter alone", x, names(study, order), series)
 }
 
+/// Bars of the indices, with their intervals as lines.
 fn indices(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
-    let place = |rank: usize| (order.len() - rank) as f64;
     let mut series = Vec::new();
-    let mut labels = Vec::new();
-    let (mut first, mut total) = (Vec::new(), Vec::new());
+    let mut labelled = false;
     if let Some(Ok(indices)) = &found.indices[o] {
         for (rank, &i) in order.iter().enumerate() {
             let Some(at) = found.kept.iter().position(|&kept| kept == i) else {
                 continue;
             };
-            for (estimate, points, colour, shift) in [
-                (&indices.first[at], &mut first, PALETTE[0], 0.12),
-                (&indices.total[at], &mut total, PALETTE[1], -0.12),
-            ] {
-                let y = place(rank) + shift;
-                series.push(Series::line("", vec![(estimate.low, y), (estimate.high, y)], colour));
-                points.push((estimate.value, y));
+            for (estimate, colour, label, side) in
+                [(&indices.first[at], PALETTE[1], "first-order", 1.0), (&indices.total[at], PALETTE[5], "total", -1.0)]
+            {
+                let y = place(order, rank) + side * ASIDE;
+                let label = if labelled { "" } else { label };
+                series.push(Series::bar(label, (0.0, estimate.value), y, HALF, colour));
+                let interval = vec![(estimate.low, y), (estimate.high, y)];
+                series.push(Series::line("", interval, PALETTE[0]));
             }
-            labels
-                .push(Label { at: (indices.total[at].high, place(rank) - 0.12), text: study.inputs()[i].key.clone() });
+            labelled = true;
         }
     }
-    series.push(Series::dots("first-order", first, PALETTE[0], Marker::Disc));
-    series.push(Series::dots("total", total, PALETTE[1], Marker::Square));
     let x = Axis::new("Share of the variance, with intervals of 95 %", "");
     let varies = matches!(found.indices[o], Some(Ok(_)));
     let title = if varies { "All parameters together" } else { "All parameters together: no variance to share" };
-    Chart { labels, ..Chart::new(title, x, ranks(order), series) }
+    Chart::new(title, x, names(study, order), series)
+}
+
+/// Height of the parameter of this rank.
+fn place(order: &[usize], rank: usize) -> f64 {
+    (order.len() - rank) as f64
 }
 
 /// The axis of the parameters, the one with the largest effect on top.
-fn ranks(order: &[usize]) -> Axis {
-    Axis { range: Some((1.0 - MARGIN, order.len() as f64 + MARGIN)), ..Axis::new("Rank from below", "") }
+fn names(study: &Study, order: &[usize]) -> Axis {
+    let named = order.iter().enumerate().map(|(rank, &i)| (place(order, rank), study.inputs()[i].key.clone()));
+    let range = Some((1.0 - MARGIN, order.len() as f64 + MARGIN));
+    Axis { range, names: named.collect(), ..Axis::default() }
 }
