@@ -346,7 +346,8 @@ fn changes_are_refused_with_key_value_and_range() {
         ("spcmm", "contact.clearence", "0.3mm", &["contact.clearence = 0.3mm", "did you mean `contact.clearance`"]),
         ("spcmm", "clearance", "0.3mm", &["did you mean `contact.clearance`"]),
         ("spcmm", "joint.S4.clearance", "0.3mm", &["joint.S4.clearance", "no ball joint `S4`", "S1, S2, S3"]),
-        ("spcmm", "joint.S1.clearence", "0.3mm", &["did you mean `clearance`"]),
+        ("spcmm", "joint.S1.clearence", "0.3mm", &["did you mean `joint.S1.clearance`"]),
+        ("chain", "parameter.links", "3", &["did you mean `chain.links`"]),
         ("spcmm", "clearence", "0.3mm", &["clearence", "did you mean `contact.clearance`"]),
         (
             "slider-crank-driven",

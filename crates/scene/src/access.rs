@@ -7,7 +7,7 @@ use super::numbers::row_of_number;
 use super::read::{file_only, is_of_text};
 use super::table::{contact_part, contact_rows, find, joint_part};
 use super::*;
-use jointplay_physics::suggest::nearest;
+use jointplay_physics::suggest::{did_you_mean, nearest, nearest_name};
 
 /// A key resolved against a scene: its row, and the joint it applies to.
 struct Resolved {
@@ -92,7 +92,8 @@ impl Scene {
         let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
         let balls = &self.machine.ball_joints;
         if balls.iter().any(|joint| joint.name == name) {
-            return format!("unknown key{}", nearest(part, parts.iter().copied()));
+            let near = nearest_name(part, parts.iter().copied()).map(|near| format!("joint.{name}.{near}"));
+            return format!("unknown key{}", did_you_mean(near.as_deref()));
         }
         // The name of a joint in an included file has dots.
         let begins = |joint: &&Joint| {

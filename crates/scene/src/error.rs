@@ -108,7 +108,14 @@ pub(super) fn nearest_parameter<'a>(
     mut keys: impl Iterator<Item = &'a str> + Clone,
     words: &[&'a str],
 ) -> String {
-    let last = |key: &'a str| key.rsplit('.').next().unwrap_or(key);
+    fn last(key: &str) -> &str {
+        key.rsplit('.').next().unwrap_or(key)
+    }
+    // The right name in the wrong section, if only one section has it.
+    let mut elsewhere = keys.clone().filter(|key| last(key) == last(wrong));
+    if let Some(key) = elsewhere.next().filter(|key| elsewhere.all(|other| other == *key)) {
+        return did_you_mean(Some(key));
+    }
     // Omitting the section is a common mistake: compare both forms.
     let forms = keys.clone().map(last).chain(keys.clone());
     let near = nearest_name(wrong, words.iter().copied().chain(forms));
