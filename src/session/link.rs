@@ -414,8 +414,8 @@ impl Link {
     pub fn format_short(&self, wanted: &Scene) -> Result<(String, Option<String>), String> {
         if let Some(name) = wanted.source.beside.keys().next() {
             return Err(format!(
-                "The scene reads the file {}, which a link does not carry. Write what it holds into the scene file, or pass \
-                 both files on instead",
+                "The scene reads the file {}, which a link cannot contain. Copy its contents into the scene file, or \
+                 share both files instead",
                 visible_line(name)
             ));
         }
@@ -435,8 +435,8 @@ impl Link {
             return Ok((start, Some(note)));
         }
         Err(format!(
-            "The scene file is too large for a link: {} characters packed, {LONGEST_LINK} fit. Save the scene file and pass \
-             it on instead",
+            "The scene file is too large for a link: {} characters packed, {LONGEST_LINK} fit. Save the scene file and \
+             share it instead",
             start.len()
         ))
     }

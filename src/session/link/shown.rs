@@ -110,7 +110,7 @@ pub fn read_channels(text: &str) -> Result<Vec<String>, String> {
     for part in parts.filter(|part| *part != "none") {
         if part.len() > LONGEST_NAME || !part.chars().all(fine) {
             return Err(
-                "no names of channels; allowed, separated by commas, are such as `jointplay check --channels` lists, with * for any \
+                "no names of channels; allowed, separated by commas, are those that `jointplay check --channels` lists, with * for any \
                  characters and ? for one"
                     .to_owned(),
             );

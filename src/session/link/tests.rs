@@ -193,7 +193,7 @@ fn what_is_wrong_in_a_link_is_said() {
         ("camera=0,0,nan,0,0,0", "is not a camera"),
         ("magnification=1000", "allowed 1 to 100"),
         ("plots=speed", "no plot `speed`; allowed, separated by commas: normal-force,"),
-        ("channels=S1.force+rod/1", "no names of channels; allowed, separated by commas, are such as"),
+        ("channels=S1.force+rod/1", "no names of channels; allowed, separated by commas, are those"),
         (
             "show=telescope",
             "no instrument `telescope`; allowed, separated by commas: microscope.JOINT, ideal, wear-impulse,",

@@ -217,14 +217,14 @@ impl fmt::Display for Doubt {
             ),
             Self::Late { joints, depth } => write!(
                 f,
-                "{joints}: a contact was found {:.2e} mm deep, after its beginning: its force and rebound are wrong; use a \
-                 smaller tolerance.",
+                "{joints}: a contact was detected late, at a depth of {:.2e} mm: its force and rebound are wrong; use a smaller \
+                 tolerance.",
                 1e3 * depth
             ),
             Self::Rebound { joints, time, achieved, law } => write!(
                 f,
-                "{joints}: an impact that nothing disturbed, over at {time:.6} s, rebounded with {achieved:.3} of its approach \
-                 speed, its law gives {law:.3}; use a smaller step or tolerance."
+                "{joints}: an undisturbed impact, which ended at {time:.6} s, rebounded with {achieved:.3} of its approach speed, \
+                 but its law gives {law:.3}; use a smaller step or tolerance."
             ),
             Self::StartsInside { stop, turns, depth, usual, force } => {
                 let unit = if *turns { "deg" } else { "mm" };
@@ -238,39 +238,45 @@ impl fmt::Display for Doubt {
                 )
             }
             Self::Patch { joints, radii } => {
-                write!(f, "{joints}: the contact patch reached {radii:.2} ball radii: Hertz's theory wants it small.")
+                write!(
+                    f,
+                    "{joints}: the contact patch reached {radii:.2} ball radii; Hertz's theory assumes that it is small."
+                )
             }
             Self::Damping { joints, time, ratio, usual } => write!(
                 f,
-                "{joints}: hit again while touching, at {time:.6} s, its damping reached {ratio:.2} times the elastic \
-                 force, {usual:.2} in an undisturbed impact: that force is an artefact; contact.approach_speed = largest \
-                 bounds it."
+                "{joints}: at {time:.6} s a ball was hit again while in contact, and its damping reached {ratio:.2} times the \
+                 elastic force, {usual:.2} in an undisturbed impact: this force is an artefact; \
+                 contact.approach_speed = largest bounds it."
             ),
             Self::Drift { distance } => write!(
                 f,
-                "formulation lagrange: its constraints were off by {distance:.1e} m; formulation = tree keeps them."
+                "formulation lagrange: the constraints drifted by {distance:.1e} m; formulation = tree has no drift."
             ),
             Self::Energy { residual, share } => write!(
                 f,
-                "energy: {residual:.2e} J, {:.2} % of what the machine held and lost, {}; use a smaller step or tolerance.",
-                100.0 * share,
-                unaccounted(*residual)
+                "energy: the integration {} {:.2e} J, {:.2} % of the energy stored and dissipated; use a smaller step or tolerance.",
+                created(*residual),
+                residual.abs(),
+                100.0 * share
             ),
             Self::Gain { work, value } => write!(
                 f,
-                "energy: the {} is negative, {value:.2e} J, so that it came from nowhere; use a smaller step or tolerance.",
+                "energy: the {} is negative, {value:.2e} J, so that the integration created energy; use a smaller step or \
+                 tolerance.",
                 work.words()
             ),
             Self::Work { work, value, residual } => write!(
                 f,
-                "energy: {residual:.2e} J {}, and the {} is {value:.2e} J; use a smaller step or tolerance.",
-                unaccounted(*residual),
+                "energy: the integration {} {:.2e} J, and the {} is {value:.2e} J; use a smaller step or tolerance.",
+                created(*residual),
+                residual.abs(),
                 work.words()
             ),
             Self::Held { share, tolerance, loosest } => write!(
                 f,
-                "solver.method dopri5: stability held its steps for {:.0} % of the time, and at solver.tolerance \
-                 {tolerance:e} these lose or gain energy in settled contacts; use {loosest:e} or less, or \
+                "solver.method dopri5: stability limited its steps for {:.0} % of the time, and at solver.tolerance \
+                 {tolerance:e} such steps create or destroy energy in settled contacts; use {loosest:e} or less, or \
                  solver.method = automatic.",
                 100.0 * share
             ),
@@ -278,6 +284,6 @@ impl fmt::Display for Doubt {
     }
 }
 
-fn unaccounted(residual: f64) -> &'static str {
-    if residual > 0.0 { "came from nowhere" } else { "went nowhere" }
+fn created(residual: f64) -> &'static str {
+    if residual > 0.0 { "created" } else { "destroyed" }
 }

@@ -198,7 +198,7 @@ struct Record {
 
 /// A state of another model, or one that no run of the model can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the numbers are not those of a run of this scene")]
+#[error("these values do not describe a state of this scene")]
 pub struct StateMismatch;
 
 /// What stepping needs besides [`Model`] and [`State`]: matrices, stages, the latest step for samples within it, and forces of the

@@ -29,7 +29,7 @@ pub enum StopFault {
         open: f64,
     },
     /// Stabilised constraints that have drifted too far to hold the mechanism together.
-    #[error("the constraints of the lagrange form are off by {drift:.1e} m")]
+    #[error("the constraints of formulation lagrange drifted by {drift:.1e} m")]
     Drift {
         /// m, or rad.
         drift: f64,
@@ -74,13 +74,13 @@ pub enum StopFault {
     #[error("the accelerations are not finite")]
     NotFinite,
     /// A step over which no contact forces were found.
-    #[error("no contact forces were found that satisfy a step of {shortest:.0e} s")]
+    #[error("no contact forces satisfy the equations of a step of {shortest:.0e} s")]
     NoForces {
         /// Shortest step tried at this time, s.
         shortest: f64,
     },
     /// A step size as small as rounding.
-    #[error("the step size that the tolerance asks for fell below {shortest:.0e} s")]
+    #[error("the tolerance requires steps shorter than {shortest:.0e} s")]
     ShortStep {
         /// Shortest step tried at this time, s.
         shortest: f64,
