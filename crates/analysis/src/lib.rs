@@ -6,8 +6,9 @@
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
 //!   known answers ([`validation`]).
-//! - Uncertain parameters, without any scene: [`sampling`], [`distribution`] and ISO fits ([`iso286`]); which input matters
-//!   ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits that hold a yield ([`fits`]).
+//! - Uncertain parameters of a scene ([`study`]). Without any scene: [`sampling`], [`distribution`] and ISO fits ([`iso286`]);
+//!   which input matters ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits that hold a
+//!   yield ([`fits`]).
 //!
 //! A sweep of the clearance over two values, with the motion of each and the largest force in its second ball joint:
 //!
@@ -71,8 +72,8 @@ pub mod sampling;
 pub mod section;
 mod setting;
 pub mod source;
-
 pub mod statistic;
+pub mod study;
 pub mod sweep;
 pub mod sweep_task;
 pub mod task;

@@ -10,12 +10,11 @@ use super::{Failure, load, print, warn};
 use crate::analysis::indices::{Bootstrap, IndicesError, SaltelliDesign, SensitivityIndices};
 use crate::analysis::morris::{ElementaryEffects, MorrisPlan};
 use crate::analysis::sampling::Sampling;
+use crate::analysis::study::{self, ENDS};
 use crate::files::Folder;
 
 use self::target::Answer;
 
-/// Fractions of all values taken for the ends of a distribution without limits.
-const ENDS: [f64; 2] = [0.025, 0.975];
 /// Largest number of parameters without a screening, and of those that it leaves over.
 const UNSCREENED: usize = 8;
 /// Trajectories of a screening that was not asked for, and levels of each parameter.
@@ -85,26 +84,13 @@ fn find(study: &mut Study, arguments: &SensitivityArguments, target: Option<f64>
 }
 
 fn alone(study: &mut Study) -> Result<Alone, Failure> {
-    let nominal: Vec<f64> = study.inputs().iter().map(|input| input.nominal).collect();
-    let ends = study.inputs().iter().map(|input| {
-        let (low, high) = input.distribution.support();
-        let [lower, upper] = ENDS.map(|u| input.at(u));
-        [if low.is_finite() { low } else { lower }, if high.is_finite() { high } else { upper }]
-    });
-    let ends: Vec<[f64; 2]> = ends.collect();
-    let mut rows = vec![nominal.clone()];
-    for (i, own) in ends.iter().enumerate() {
-        for end in own {
-            let mut row = nominal.clone();
-            row[i] = *end;
-            rows.push(row);
-        }
-    }
-    rows.extend([0, 1].map(|end| ends.iter().map(|own| own[end]).collect()));
+    let plan = study::Alone::new(study.inputs());
+    let mut rows = plan.rows();
+    rows.extend([0, 1].map(|end| plan.ends().iter().map(|own| own[end]).collect()));
     let mut results = study.run("alone", rows)?.into_iter();
     let mut next = || results.next().unwrap_or_default();
     let nominal = next();
-    let ends = ends.iter().map(|own| own.map(|end| (end, next()))).collect();
+    let ends = plan.ends().iter().map(|own| own.map(|end| (end, next()))).collect();
     Ok(Alone { nominal, ends, together: [next(), next()] })
 }
 

@@ -6,11 +6,12 @@ use serde_json::{Map, Value as Json, json};
 
 use super::target::{Answer, Change};
 use super::{Found, picture};
+use crate::analysis::study::{Input, Output};
 use crate::analysis::yields::Estimate;
 use crate::cli::Failure;
 use crate::cli::args::SensitivityArguments;
 use crate::cli::output::significant;
-use crate::cli::study::{Input, Output, Study, estimate, number, shown};
+use crate::cli::study::{Study, estimate, number, shown, value_of};
 use crate::cli::summary::count;
 use crate::cli::tables::{Table, quoted};
 use crate::files::Folder;
@@ -124,9 +125,9 @@ fn line(study: &Study, found: &Found, o: usize, i: usize) -> Vec<String> {
     };
     vec![
         input.key.clone(),
-        input.shown(*low),
+        value_of(input, *low),
         shown(at_low[o], output.unit),
-        input.shown(*high),
+        value_of(input, *high),
         shown(at_high[o], output.unit),
         interval(first),
         interval(total),
@@ -139,7 +140,7 @@ fn sentence(study: &Study, answer: &Answer) -> String {
     let goal = format!("{} of at most {}", output.name, shown(answer.target, output.unit));
     let change = |change: &Change| {
         let input = &study.inputs()[change.input];
-        format!("{} = {}", input.key, input.shown(change.value))
+        format!("{} = {}", input.key, value_of(input, change.value))
     };
     if !answer.single.is_empty() {
         let ways = answer

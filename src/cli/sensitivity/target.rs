@@ -1,8 +1,9 @@
 //! How far parameters must go from their values in the scene for an output to stay below a target.
 
 use crate::analysis::indices::{IndicesError, SensitivityIndices};
+use crate::analysis::study::Output;
 use crate::cli::Failure;
-use crate::cli::study::{Output, Study};
+use crate::cli::study::Study;
 
 use super::Alone;
 

@@ -1,30 +1,51 @@
-//! Runs of a scene at points with many uncertain parameters, and the outputs of each.
+//! Runs of a scene at points with many uncertain parameters, and the outputs of each: the files of `crate::analysis::study`.
 
-mod inputs;
-mod outputs;
 mod report;
 mod rows;
 
-pub use inputs::{Input, inputs, matching};
-pub use outputs::{Output, outputs};
-pub use report::{drawn, estimate, number, shown};
+pub use report::{drawn, estimate, number, shown, value_of};
 pub use rows::{Row, rows};
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::args::StudyArguments;
 use super::sweep::{Partial, Source as _, compute, meta};
 use super::{Failure, interrupt, progress, quantity, start, threads, warn};
-use crate::analysis::design::{Design, Start};
-use crate::analysis::drive::common_period;
-use crate::analysis::point::{Protocol, Span};
-use crate::analysis::sweep::Sweep;
-use crate::scene::{Scene, Value};
+use crate::analysis::study::{self, Input, Output, RunSpan, StudyError, StudyRuns, Uncertainty};
+use crate::scene::Scene;
 use crate::units::format_quantity;
 
-/// Observed periods of a driven scene, and time of another, s, if no duration is given.
-const PERIODS: f64 = 2.0;
-const UNDRIVEN: f64 = 1.0;
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        Self::usage(error.to_string())
+    }
+}
+
+/// The parameters of the file `--tolerances`, then those of the options `--over KEY[=DISTRIBUTION]`.
+///
+/// # Errors
+/// Usage: as [`study::inputs`], or another form of the file, with its line. Input/output: an unreadable file.
+pub fn inputs(scene: &Scene, tolerances: Option<&Path>, over: &[String]) -> Result<Vec<Input>, Failure> {
+    let mut requested = Vec::new();
+    if let Some(path) = tolerances {
+        let rows = rows("--tolerances", path, ["parameter", "distribution"])?.into_iter();
+        requested.extend(rows.map(|Row { place, cells: [pattern, text] }| Uncertainty {
+            place,
+            pattern,
+            distribution: Some(text),
+        }));
+    }
+    requested.extend(over.iter().map(|option| Uncertainty::parse("--over", option)));
+    Ok(study::inputs(scene, &requested)?)
+}
+
+/// The outputs that `option` names.
+///
+/// # Errors
+/// Usage: as [`study::outputs`].
+pub fn outputs(scene: &Scene, option: &str, text: &str) -> Result<Vec<Output>, Failure> {
+    study::outputs(scene, text).map_err(|error| Failure::usage(format!("{option} {error}")))
+}
 
 /// A run.
 pub struct Run {
@@ -41,7 +62,7 @@ pub struct Study {
     scene: Scene,
     inputs: Vec<Input>,
     outputs: Vec<Output>,
-    protocol: Protocol,
+    span: RunSpan,
     out: PathBuf,
     seed: u64,
     threads: usize,
@@ -62,18 +83,20 @@ impl Study {
         outputs: Vec<Output>,
         arguments: &StudyArguments,
     ) -> Result<Self, Failure> {
-        let (duration, from) = match &arguments.duration {
-            Some(text) => quantity::span(text, arguments.from.as_deref())?,
-            None => default_span(&scene),
+        let span = match &arguments.duration {
+            Some(text) => {
+                let (duration, from) = quantity::span(text, arguments.from.as_deref())?;
+                RunSpan { duration, from }
+            }
+            None => RunSpan::of(&scene),
         };
         start(&scene)?;
-        let protocol = outputs::protocol(&outputs, Span::Duration { duration, from });
         interrupt::listen();
         Ok(Self {
             scene,
             inputs,
             outputs,
-            protocol,
+            span,
             out: arguments.out.clone(),
             seed: arguments.seed,
             threads: threads(arguments.threads),
@@ -103,12 +126,9 @@ impl Study {
         &self.runs
     }
 
-    /// Length of each run and end of its transient, s.
-    pub fn span(&self) -> (f64, f64) {
-        match self.protocol.span {
-            Span::Duration { duration, from } => (duration, from),
-            Span::Sections { .. } | Span::Crossings { .. } => (0.0, 0.0),
-        }
+    /// The observed part of every run.
+    pub fn span(&self) -> RunSpan {
+        self.span
     }
 
     /// The outputs at each of `rows`, which give every input a value, SI. NaN where a run does not start or diverges. `stage`
@@ -117,15 +137,11 @@ impl Study {
     /// # Errors
     /// A row that the scene does not accept; Ctrl-C; the file system.
     pub fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Failure> {
-        let usage = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
-        self.check(&rows)?;
-        let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
-        let values: Vec<Vec<Value>> = rows.iter().map(|row| row.iter().copied().map(Value::Number).collect()).collect();
-        let design = Design::table(&self.scene, &keys, &values, &[Start::Cold]).map_err(|error| usage(&error))?;
-        let sweep = Sweep::untried(self.scene.clone(), design, self.protocol.clone()).map_err(|error| usage(&error))?;
+        let study = StudyRuns::new(&self.scene, &self.inputs, &self.outputs, self.span, &rows)?;
+        let sweep = study.sweep();
         let blocks: Vec<usize> = (0..sweep.design().blocks()).collect();
         let beside = self.out.with_added_extension(stage);
-        let mut partial = Partial::open(&beside, &meta(&sweep), &sweep, &blocks)?;
+        let mut partial = Partial::open(&beside, &meta(sweep), sweep, &blocks)?;
         let todo: Vec<usize> = blocks.iter().copied().filter(|b| !partial.has(*b)).collect();
         let done = blocks.len() - todo.len();
         if done > 0 && !self.quiet {
@@ -138,7 +154,7 @@ impl Study {
         let bar = progress::bar(!self.quiet, blocks.len() as u64);
         bar.set_position(done as u64);
         bar.reset_eta();
-        let outcome = compute(&sweep, &todo, self.threads, &mut partial, &bar);
+        let outcome = compute(sweep, &todo, self.threads, &mut partial, &bar);
         bar.finish_and_clear();
         outcome?;
         if blocks.iter().any(|b| !partial.has(*b)) {
@@ -151,13 +167,7 @@ impl Study {
         let mut records = vec![f64::NAN; rows.len() * length];
         partial.gather(0, length, &mut records)?;
         self.partials.push(partial);
-        let names: Vec<&str> = sweep.layout().columns().iter().map(|column| &column.name[..]).collect();
-        let columns: Vec<Vec<usize>> = self.outputs.iter().map(|output| output.columns(&names)).collect();
-        let results = records.chunks_exact(length).map(|record| {
-            let outputs = self.outputs.iter().zip(&columns);
-            outputs.map(|(output, columns)| output.value(columns.iter().map(|&at| record[at]))).collect()
-        });
-        let results: Vec<Vec<f64>> = results.collect();
+        let results: Vec<Vec<f64>> = records.chunks_exact(length).map(|record| study.outputs_of(record)).collect();
         let runs = rows.into_iter().zip(&results);
         self.runs.extend(runs.map(|(values, outputs)| Run {
             stage: stage.to_owned(),
@@ -167,22 +177,6 @@ impl Study {
         Ok(results)
     }
 
-    /// Requires values that the parameters accept, which a distribution without limits does not grant.
-    fn check(&self, rows: &[Vec<f64>]) -> Result<(), Failure> {
-        for (i, input) in self.inputs.iter().enumerate() {
-            let parameter = self.scene.parameter(&input.key)?;
-            let refused = rows.iter().find_map(|row| {
-                let value = Value::Number(row[i]);
-                parameter.check(&value).err().map(|error| format!("{}: {error}", parameter.show(&value)))
-            });
-            if let Some(error) = refused {
-                let advice = "a distribution with limits, such as normal(MEAN, SD, LOW..HIGH), draws no such value";
-                return Err(Failure::usage(format!("{}: {error}; {advice}", input.key)));
-            }
-        }
-        Ok(())
-    }
-
     /// Removes the files of the finished stages, once the results are written.
     pub fn finish(self) {
         self.partials.into_iter().for_each(Partial::remove);
@@ -190,16 +184,8 @@ impl Study {
 
     /// One line about the runs.
     pub fn describe(&self) -> String {
-        let (duration, from) = self.span();
+        let RunSpan { duration, from } = self.span;
         let observed = format_quantity(duration, "s");
         if from > 0.0 { format!("{observed}, observed from {} on", format_quantity(from, "s")) } else { observed }
-    }
-}
-
-/// After one period, so many periods; or so long from the start.
-fn default_span(scene: &Scene) -> (f64, f64) {
-    match common_period(&scene.machine) {
-        Ok(Some(period)) => ((1.0 + PERIODS) * period, period),
-        _ => (UNDRIVEN, 0.0),
     }
 }

@@ -3,6 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::Study;
+use crate::analysis::study::{Input, RunSpan};
 use crate::analysis::yields::Estimate;
 use crate::chart::{Sheet, SheetError};
 use crate::cli::output::significant;
@@ -12,7 +13,7 @@ use crate::files::Folder;
 use crate::units::format_quantity_digits;
 
 /// Significant digits for people.
-pub const DIGITS: usize = 4;
+const DIGITS: usize = 4;
 /// PNG pixels per pixel of a chart.
 const PNG_SCALE: f32 = 2.0;
 
@@ -20,6 +21,11 @@ const PNG_SCALE: f32 = 2.0;
 pub fn shown(value: f64, unit: &str) -> String {
     let display = if unit == "m" { "mm" } else { unit };
     if value.is_finite() { format_quantity_digits(value, display, DIGITS) } else { "-".to_owned() }
+}
+
+/// One of the values of `input`, with unit.
+pub fn value_of(input: &Input, value: f64) -> String {
+    format_quantity_digits(value, input.unit, DIGITS)
 }
 
 /// A value on an axis, in mm for lengths, and its unit.
@@ -51,7 +57,7 @@ impl Study {
     /// Provenance of the results.
     pub fn meta(&self) -> Map<String, Json> {
         let mut meta = provenance::meta(self.scene());
-        let (duration, from) = self.span();
+        let RunSpan { duration, from } = self.span();
         meta.insert("duration_s".into(), json!(duration));
         meta.insert("from_s".into(), json!(from));
         meta.insert("seed".into(), json!(self.seed));

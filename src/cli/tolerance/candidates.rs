@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::analysis::distribution::Distribution;
+use crate::analysis::study::{Input, matching};
 use crate::cli::Failure;
-use crate::cli::study::{Input, Row, matching, rows};
+use crate::cli::study::{Row, rows};
 use crate::scene::Scene;
 
 /// A candidate.
@@ -38,7 +39,7 @@ pub fn read(scene: &Scene, inputs: &[Input], path: &Path) -> Result<Vec<Candidat
         let is_cost = |cost: &f64| cost.is_finite() && *cost >= 0.0;
         let cost = cost.parse::<f64>().ok().filter(is_cost);
         let cost = cost.ok_or_else(|| wrong(format!("{pattern}: expected a cost, a finite number of at least 0")))?;
-        for key in matching(scene, &pattern).map_err(wrong)? {
+        for key in matching(scene, &pattern).map_err(|error| wrong(error.to_string()))? {
             let none = || wrong(format!("{key}: give the parameter a distribution in --tolerances or --over, too"));
             let input = inputs.iter().position(|input| input.key == key).ok_or_else(none)?;
             let of_key = Input::new(scene, &key, Some(&text)).map_err(|error| wrong(format!("{key}: {error}")))?;

@@ -1,7 +1,8 @@
 //! Limits of outputs.
 
+use crate::analysis::study::Output;
 use crate::cli::Failure;
-use crate::cli::study::{Output, outputs, shown};
+use crate::cli::study::{outputs, shown};
 use crate::scene::Scene;
 
 /// Limits of an output, SI; one of them at least.

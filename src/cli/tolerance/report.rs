@@ -4,10 +4,11 @@ use serde_json::{Map, Value as Json, json};
 
 use super::limit::Limit;
 use super::{Cheapest, Found, PERCENTILES, Quality};
+use crate::analysis::study::Output;
 use crate::analysis::yields::{Estimate, RejectDriver};
 use crate::cli::args::ToleranceArguments;
 use crate::cli::output::significant;
-use crate::cli::study::{Output, Study, estimate, number, shown};
+use crate::cli::study::{Study, estimate, number, shown};
 use crate::cli::summary::count;
 use crate::cli::tables::{Table, quoted};
 

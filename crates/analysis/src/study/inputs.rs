@@ -1,15 +1,12 @@
 //! The uncertain parameters of a study.
 
-use std::path::Path;
+use serde::{Deserialize, Serialize};
 
-use super::report::DIGITS;
-use super::rows::{Row, rows};
-use crate::analysis::distribution::Distribution;
-use crate::analysis::iso286::{Fit, FitError};
-use crate::cli::Failure;
-use crate::scene::{Kind, Scene, Value, contact_parts};
-use crate::simulate::matches_pattern;
-use crate::units::format_quantity_digits;
+use super::StudyError;
+use crate::distribution::Distribution;
+use crate::iso286::{Fit, FitError};
+use jointplay_physics::simulate::matches_pattern;
+use jointplay_scene::{Kind, Scene, Value, contact_parts};
 
 /// Range of an input without one of its own, over its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
@@ -17,6 +14,17 @@ const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
 const MOST_INPUTS: usize = 64;
 /// Process capability of hole and shaft of a fit.
 const CAPABILITY: f64 = 1.0;
+
+/// Parameters with a distribution, as requested.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Uncertainty {
+    /// Option, or file with line, for messages.
+    pub place: String,
+    /// A key, or a pattern that stands for all numeric parameters that it matches.
+    pub pattern: String,
+    /// The distribution, as written; `None`: uniform, from half to one and a half of the value.
+    pub distribution: Option<String>,
+}
 
 /// A parameter with its distribution.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,44 +39,37 @@ pub struct Input {
     pub distribution: Distribution,
 }
 
-/// The parameters of the file `--tolerances`, then those of the options `--over KEY[=DISTRIBUTION]`. A key may be a pattern,
-/// which stands for all numeric parameters that it matches; of a parameter given twice, the later distribution counts. An
-/// option without a distribution stands for a uniform one, from half to one and a half of the value.
+impl Uncertainty {
+    /// Reads `PATTERN[=DISTRIBUTION]`; `option` is what the user wrote it for.
+    pub fn parse(option: &str, text: &str) -> Self {
+        let (pattern, distribution) = match text.split_once('=') {
+            Some((pattern, distribution)) => (pattern, Some(distribution.trim().to_owned())),
+            None => (text, None),
+        };
+        Self { place: format!("{option} {text}"), pattern: pattern.trim().to_owned(), distribution }
+    }
+}
+
+/// The parameters of all `requested`, in order. Of a parameter that is requested twice, the later distribution counts.
 ///
 /// # Errors
-/// Usage: no such parameter, a distribution that one does not accept, or another form of the file, with its line. Input/output:
-/// an unreadable file.
-pub fn inputs(scene: &Scene, tolerances: Option<&Path>, over: &[String]) -> Result<Vec<Input>, Failure> {
+/// With its place: no such parameter, or a distribution that one does not accept. More than 64 parameters.
+pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, StudyError> {
     let mut inputs: Vec<Input> = Vec::new();
-    let mut add = |place: &str, pattern: &str, text: Option<&str>| -> Result<(), Failure> {
-        for key in matching(scene, pattern).map_err(|error| Failure::usage(format!("{place}: {error}")))? {
-            let input =
-                Input::new(scene, &key, text).map_err(|error| Failure::usage(format!("{place}: {key}: {error}")))?;
+    for Uncertainty { place, pattern, distribution } in requested {
+        let at = |place: &str, error| StudyError::At { place: place.to_owned(), error: Box::new(error) };
+        for key in matching(scene, pattern).map_err(|error| at(place, error))? {
+            let input = Input::new(scene, &key, distribution.as_deref());
+            let input = input.map_err(|error| at(place, at(&key, error)))?;
             match inputs.iter_mut().find(|known| known.key == key) {
                 // A later one refines an earlier pattern.
                 Some(known) => *known = input,
                 None => inputs.push(input),
             }
         }
-        Ok(())
-    };
-    if let Some(path) = tolerances {
-        for Row { place, cells: [pattern, text] } in rows("--tolerances", path, ["parameter", "distribution"])? {
-            add(&place, &pattern, Some(&text))?;
-        }
-    }
-    for option in over {
-        let (pattern, text) = match option.split_once('=') {
-            Some((pattern, text)) => (pattern.trim(), Some(text.trim())),
-            None => (option.trim(), None),
-        };
-        add(&format!("--over {option}"), pattern, text)?;
     }
     if inputs.len() > MOST_INPUTS {
-        return Err(Failure::usage(format!(
-            "{} uncertain parameters; at most {MOST_INPUTS} are possible",
-            inputs.len()
-        )));
+        return Err(StudyError::TooMany { found: inputs.len(), most: MOST_INPUTS });
     }
     Ok(inputs)
 }
@@ -76,12 +77,12 @@ pub fn inputs(scene: &Scene, tolerances: Option<&Path>, over: &[String]) -> Resu
 /// Keys of the numeric parameters that match `pattern`; at least one.
 ///
 /// # Errors
-/// A sentence: there are none.
-pub fn matching(scene: &Scene, pattern: &str) -> Result<Vec<String>, String> {
+/// There are none.
+pub fn matching(scene: &Scene, pattern: &str) -> Result<Vec<String>, StudyError> {
     let keys: Vec<String> = keys(scene).into_iter().filter(|key| matches_pattern(pattern, key)).collect();
     if keys.is_empty() {
-        let near = scene.parameter(pattern).err().map(|error| error.to_string());
-        return Err(near.unwrap_or_else(|| format!("no numeric parameter of the scene matches {pattern}")));
+        scene.parameter(pattern)?;
+        return Err(StudyError::NoMatch(pattern.to_owned()));
     }
     Ok(keys)
 }
@@ -90,16 +91,15 @@ impl Input {
     /// Parameter `key` of `scene` with the distribution `text`.
     ///
     /// # Errors
-    /// A sentence: an unknown key, a word in place of a number, or a distribution that the parameter does not accept.
-    pub fn new(scene: &Scene, key: &str, text: Option<&str>) -> Result<Self, String> {
-        let parameter = scene.parameter(key).map_err(|error| error.to_string())?;
-        let Value::Number(nominal) = scene.get(key).map_err(|error| error.to_string())? else {
-            return Err("its values are no real numbers".to_owned());
+    /// An unknown key, a word in place of a number, or a distribution that the parameter does not accept.
+    pub fn new(scene: &Scene, key: &str, text: Option<&str>) -> Result<Self, StudyError> {
+        let parameter = scene.parameter(key)?;
+        let Value::Number(nominal) = scene.get(key)? else {
+            return Err(StudyError::NotReal);
         };
-        let number = |text: &str| match parameter.read(text) {
-            Ok(Value::Number(value)) => Ok(value),
-            Ok(_) => Err("not a number".to_owned()),
-            Err(error) => Err(error.to_string()),
+        let number = |text: &str| match parameter.read(text)? {
+            Value::Number(value) => Ok(value),
+            Value::Count(_) | Value::Choice(_) | Value::Unset => Err(StudyError::NotReal),
         };
         let distribution = match text {
             None => {
@@ -108,22 +108,19 @@ impl Input {
             }
             Some(text) => match text.split_once("..").filter(|_| !text.contains('(')) {
                 Some((low, high)) => Distribution::uniform(number(low.trim())?, number(high.trim())?),
-                None => Distribution::parse(text, number, |fit| of_fit(scene, key, fit)),
+                None => Distribution::parse(
+                    text,
+                    |text| number(text).map_err(|error| error.to_string()),
+                    |fit| of_fit(scene, key, fit),
+                ),
             },
-        };
-        let distribution = distribution.map_err(|error| error.to_string())?;
+        }?;
         let (low, high) = distribution.support();
         for end in [low, high].into_iter().filter(|end| end.is_finite()) {
-            parameter
-                .check(&Value::Number(end))
-                .map_err(|error| format!("{}: {error}", parameter.show(&Value::Number(end))))?;
+            let value = Value::Number(end);
+            parameter.check(&value).map_err(|error| StudyError::End { value: parameter.show(&value), error })?;
         }
         Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), nominal, distribution })
-    }
-
-    /// One of its values, with unit.
-    pub fn shown(&self, value: f64) -> String {
-        format_quantity_digits(value, self.unit, DIGITS)
     }
 
     /// Its value at the fraction `u` of all values, 0 < u < 1.

@@ -1,16 +1,30 @@
 //! The numbers that a run is reduced to.
 
-use crate::analysis::point::{Protocol, Span};
-use crate::analysis::statistic::ChannelStatistic;
-use crate::cli::Failure;
-use crate::scene::Scene;
-use crate::units::{Dimension, parse_quantity};
+use super::StudyError;
+use crate::statistic::ChannelStatistic;
+use jointplay_physics::units::{Dimension, parse_quantity};
+use jointplay_scene::Scene;
 
 /// How an output follows from several columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Of {
     Largest,
     Sum,
+}
+
+/// An output with a name of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct NamedOutput {
+    /// Name on the command line and in files.
+    pub name: &'static str,
+    /// Name in the interface, in sentence case.
+    pub label: &'static str,
+    /// What it is, in a sentence.
+    pub help: &'static str,
+    /// Statistics of channels; "" for impacts, which are columns of the joints.
+    list: &'static str,
+    of: Of,
+    unit: &'static str,
 }
 
 /// A number that a run is reduced to.
@@ -25,35 +39,66 @@ pub struct Output {
     keep: Vec<ChannelStatistic>,
 }
 
-/// Outputs with a name of their own: name, what it stands for, and how several columns combine. Impacts are columns of the
-/// joints.
-const NAMED: [(&str, &str, Of, &str); 5] = [
-    ("tip-error", "tip_error:max", Of::Largest, "m"),
-    ("tip-error-rms", "tip_error:rms", Of::Largest, "m"),
-    ("peak-force", "*.normal:max", Of::Largest, "N"),
-    ("energy-lost", "energy.*_loss:end", Of::Sum, "J"),
-    (IMPACTS, "", Of::Sum, ""),
+/// Outputs with a name of their own.
+pub const NAMED: [NamedOutput; 5] = [
+    NamedOutput {
+        name: "tip-error",
+        label: "Largest tip error",
+        help: "Largest distance of the probe tip from the tip of the machine without play",
+        list: "tip_error:max",
+        of: Of::Largest,
+        unit: "m",
+    },
+    NamedOutput {
+        name: "tip-error-rms",
+        label: "Tip error, RMS",
+        help: "Root-mean-square distance of the probe tip from the tip of the machine without play",
+        list: "tip_error:rms",
+        of: Of::Largest,
+        unit: "m",
+    },
+    NamedOutput {
+        name: "peak-force",
+        label: "Peak normal force",
+        help: "Largest normal force of any ball joint, in continuous time",
+        list: "*.normal:max",
+        of: Of::Largest,
+        unit: "N",
+    },
+    NamedOutput {
+        name: "energy-lost",
+        label: "Energy lost",
+        help: "Energy lost to restitution, friction and damping since the start",
+        list: "energy.*_loss:end",
+        of: Of::Sum,
+        unit: "J",
+    },
+    NamedOutput {
+        name: "impacts",
+        label: "Impacts",
+        help: "Contacts begun in all ball joints",
+        list: "",
+        of: Of::Sum,
+        unit: "",
+    },
 ];
-const IMPACTS: &str = "impacts";
 /// End of the names of the columns that are impacts of the kept time.
 const IMPACTS_COLUMN: &str = "_impacts_kept";
 
-/// Parses the value of `option`: names of [`NAMED`] and CHANNEL:STATISTIC, separated by commas.
+/// Parses names of [`NAMED`] and CHANNEL:STATISTIC, separated by commas.
 ///
 /// # Errors
-/// Usage: an unknown output, channel or statistic.
-pub fn outputs(scene: &Scene, option: &str, text: &str) -> Result<Vec<Output>, Failure> {
+/// An unknown output, channel or statistic; an output that is given twice.
+pub fn outputs(scene: &Scene, text: &str) -> Result<Vec<Output>, StudyError> {
     let mut found: Vec<Output> = Vec::new();
     for entry in text.split(',').map(str::trim) {
-        let named = NAMED.iter().find(|(name, ..)| *name == entry);
+        let named = NAMED.iter().find(|named| named.name == entry);
         let keep = |list: &str| {
-            ChannelStatistic::parse_list(scene, list).map_err(|error| {
-                let names: Vec<&str> = NAMED.iter().map(|(name, ..)| *name).collect();
-                Failure::usage(format!("{option} {entry}: {error}; outputs by name: {}", names.join(", ")))
-            })
+            ChannelStatistic::parse_list(scene, list)
+                .map_err(|error| StudyError::Output { entry: entry.to_owned(), error })
         };
         match named {
-            Some((name, list, of, unit)) => {
+            Some(NamedOutput { name, list, of, unit, .. }) => {
                 let keep = if list.is_empty() { Vec::new() } else { keep(list)? };
                 found.push(Output { name: (*name).to_owned(), unit, of: *of, keep });
             }
@@ -66,21 +111,9 @@ pub fn outputs(scene: &Scene, option: &str, text: &str) -> Result<Vec<Output>, F
         }
     }
     if let Some((i, twice)) = found.iter().enumerate().find(|(i, one)| found[..*i].iter().any(|o| o.name == one.name)) {
-        return Err(Failure::usage(format!("{option} {}: given twice ({} and before)", twice.name, i + 1)));
+        return Err(StudyError::Twice { name: twice.name.clone(), position: i + 1 });
     }
     Ok(found)
-}
-
-/// What the runs must record for `outputs`.
-pub(super) fn protocol(outputs: &[Output], span: Span) -> Protocol {
-    let mut keep: Vec<ChannelStatistic> = Vec::new();
-    for one in outputs.iter().flat_map(|output| &output.keep) {
-        if !keep.contains(one) {
-            keep.push(one.clone());
-        }
-    }
-    let joints = outputs.iter().any(|output| output.keep.is_empty());
-    Protocol { span, keep, joints }
 }
 
 impl Output {
@@ -104,6 +137,11 @@ impl Output {
             let unit = if self.unit.is_empty() { String::new() } else { format!(" in {}", self.unit) };
             format!("expected a number for {}{unit}", self.name)
         })
+    }
+
+    /// Statistics of channels that it follows from; none for impacts.
+    pub(super) fn statistics(&self) -> &[ChannelStatistic] {
+        &self.keep
     }
 
     /// Which of the columns `names` of a record it follows from.

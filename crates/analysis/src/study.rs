@@ -1,0 +1,194 @@
+//! Studies of uncertain parameters: the parameters that vary ([`Input`]), the numbers that a run is reduced to ([`Output`]), and the
+//! runs at given values ([`StudyRuns`]). The caller schedules the runs, as it does those of any [`Sweep`].
+
+mod alone;
+mod inputs;
+mod outputs;
+
+pub use alone::{Alone, ENDS};
+pub use inputs::{Input, Uncertainty, inputs, matching};
+pub use outputs::{NAMED, NamedOutput, Output, outputs};
+
+use serde::{Deserialize, Serialize};
+
+use crate::axis::RangeError;
+use crate::design::{Design, Start};
+use crate::distribution::DistributionError;
+use crate::drive::common_period;
+use crate::point::{Protocol, Span};
+use crate::statistic::StatisticError;
+use crate::sweep::{Sweep, SweepError};
+use jointplay_scene::{Scene, SceneError, Value, ValueError};
+
+/// Observed periods of a driven scene, and time of another, s, if no duration is given.
+const PERIODS: f64 = 2.0;
+const UNDRIVEN: f64 = 1.0;
+
+/// Why there is no such study.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StudyError {
+    /// One of the requested parameters.
+    #[error("{place}: {error}")]
+    At {
+        /// Option, or file with line.
+        place: String,
+        /// What is wrong there.
+        error: Box<Self>,
+    },
+    /// An unknown key.
+    #[error(transparent)]
+    Scene(Box<SceneError>),
+    /// A pattern without a match.
+    #[error("no numeric parameter of the scene matches {0}")]
+    NoMatch(String),
+    /// A parameter whose values are words or counts.
+    #[error("its values are no real numbers")]
+    NotReal,
+    /// Not a value of the parameter.
+    #[error(transparent)]
+    Read(#[from] ValueError),
+    /// A distribution that does not exist.
+    #[error(transparent)]
+    Distribution(#[from] DistributionError),
+    /// An end of a distribution that the parameter does not accept.
+    #[error("{value}: {error}")]
+    End {
+        /// The end, with its unit.
+        value: String,
+        /// What is allowed.
+        error: ValueError,
+    },
+    /// More parameters than a study varies.
+    #[error("{found} uncertain parameters; at most {most} are possible")]
+    TooMany {
+        /// Requested parameters.
+        found: usize,
+        /// Most of them.
+        most: usize,
+    },
+    /// An unknown output, channel or statistic.
+    #[error("{entry}: {error}; outputs by name: {}", NAMED.map(|named| named.name).join(", "))]
+    Output {
+        /// As written.
+        entry: String,
+        /// What is wrong.
+        error: StatisticError,
+    },
+    /// An output that is requested twice.
+    #[error("{name}: given twice ({position} and before)")]
+    Twice {
+        /// Its name.
+        name: String,
+        /// Position of the repetition, from 1.
+        position: usize,
+    },
+    /// A drawn value that the parameter does not accept, which a distribution without limits does not exclude.
+    #[error(
+        "{key}: {value}: {error}; a distribution with limits, such as normal(MEAN, SD, LOW..HIGH), draws no such value"
+    )]
+    Drawn {
+        /// Parameter.
+        key: String,
+        /// The value, with its unit.
+        value: String,
+        /// What is allowed.
+        error: ValueError,
+    },
+    /// Values that define no runs.
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    /// Runs that define no sweep.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+}
+
+impl From<SceneError> for StudyError {
+    fn from(error: SceneError) -> Self {
+        Self::Scene(Box::new(error))
+    }
+}
+
+/// The observed part of every run of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunSpan {
+    /// Length of the run, s.
+    pub duration: f64,
+    /// End of the transient, s, 0 <= from < duration.
+    pub from: f64,
+}
+
+impl RunSpan {
+    /// Three periods of the drives of `scene`, the first a transient; or a second from the start, without a common period.
+    pub fn of(scene: &Scene) -> Self {
+        match common_period(&scene.machine) {
+            Ok(Some(period)) => Self { duration: (1.0 + PERIODS) * period, from: period },
+            _ => Self { duration: UNDRIVEN, from: 0.0 },
+        }
+    }
+}
+
+/// The runs of a scene at given values of its inputs.
+#[derive(Clone, Debug)]
+pub struct StudyRuns {
+    sweep: Sweep,
+    outputs: Vec<Output>,
+    /// Columns of a record from which each output follows.
+    columns: Vec<Vec<usize>>,
+}
+
+impl StudyRuns {
+    /// A run for each of `rows`, which give every input a value, SI. All start cold from the scene's own start.
+    ///
+    /// # Errors
+    /// A value that its parameter does not accept.
+    pub fn new(
+        scene: &Scene,
+        inputs: &[Input],
+        outputs: &[Output],
+        span: RunSpan,
+        rows: &[Vec<f64>],
+    ) -> Result<Self, StudyError> {
+        for (i, input) in inputs.iter().enumerate() {
+            let parameter = scene.parameter(&input.key)?;
+            for row in rows {
+                let value = Value::Number(row[i]);
+                parameter.check(&value).map_err(|error| StudyError::Drawn {
+                    key: input.key.clone(),
+                    value: parameter.show(&value),
+                    error,
+                })?;
+            }
+        }
+        let keys: Vec<String> = inputs.iter().map(|input| input.key.clone()).collect();
+        let values: Vec<Vec<Value>> = rows.iter().map(|row| row.iter().copied().map(Value::Number).collect()).collect();
+        let design = Design::table(scene, &keys, &values, &[Start::Cold])?;
+        let span = Span::Duration { duration: span.duration, from: span.from };
+        let sweep = Sweep::untried(scene.clone(), design, protocol(outputs, span))?;
+        let names: Vec<&str> = sweep.layout().columns().iter().map(|column| &column.name[..]).collect();
+        let columns = outputs.iter().map(|output| output.columns(&names)).collect();
+        Ok(Self { outputs: outputs.to_vec(), columns, sweep })
+    }
+
+    /// The runs as a sweep with one block for each row.
+    pub fn sweep(&self) -> &Sweep {
+        &self.sweep
+    }
+
+    /// The outputs of a run from its record, SI; NaN if it did not start or diverged.
+    pub fn outputs_of(&self, record: &[f64]) -> Vec<f64> {
+        let outputs = self.outputs.iter().zip(&self.columns);
+        outputs.map(|(output, columns)| output.value(columns.iter().map(|&at| record[at]))).collect()
+    }
+}
+
+/// The recorded quantities that `outputs` follow from.
+fn protocol(outputs: &[Output], span: Span) -> Protocol {
+    let mut keep = Vec::new();
+    for one in outputs.iter().flat_map(Output::statistics) {
+        if !keep.contains(one) {
+            keep.push(one.clone());
+        }
+    }
+    let joints = outputs.iter().any(|output| output.statistics().is_empty());
+    Protocol { span, keep, joints }
+}
