@@ -96,7 +96,7 @@ impl Accuracy {
                     });
                 }
                 Some(Message::Done) => self.running = None,
-                Some(Message::Ranges(_) | Message::Point(_)) => {}
+                Some(Message::Ranges(_) | Message::Point(_) | Message::Plan(_) | Message::Run(_)) => {}
                 Some(Message::Failed(why)) => {
                     self.problem = Some(why);
                     self.running = None;

@@ -1,8 +1,15 @@
 //! `sensitivity`: known answers, and what a user may get wrong.
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 
+use jointplay::analysis::alone_task::AloneTask;
+use jointplay::analysis::source::SceneSource;
+use jointplay::analysis::study::{RunSpan, Uncertainty};
+use jointplay::analysis::sweep_task::Share;
+use jointplay::analysis::task::{Job, Message, perform};
+use jointplay::scene::Scene;
 use serde_json::Value as Json;
 
 use crate::program::{folder, jointplay};
@@ -114,6 +121,43 @@ fn threads_change_no_byte() {
         let read = |out: &str| fs::read(folder.path().join(out).join(name)).unwrap();
         assert!(read("a") == read("b"), "{name}");
     }
+}
+
+#[test]
+fn the_job_of_the_window_has_the_bits_of_the_command() {
+    let folder = folder();
+    let outputs = ["tip-error", "tip-error-rms", "peak-force", "energy-lost", "impacts"];
+    let line = format!(
+        "sensitivity spcmm --set spcmm.frequency=5Hz --over joint.*.clearance --output {} --duration 60ms --from 20ms --rows 0 \
+         --quiet --out out",
+        outputs.join(",")
+    );
+    jointplay(folder.path(), &line).expect(0);
+    let found = results(&folder.path().join("out"));
+    let scene = Scene::load("spcmm", &[("spcmm.frequency".to_owned(), "5Hz".to_owned())]).unwrap();
+    let task = AloneTask {
+        scene: SceneSource::of(&scene),
+        over: vec![Uncertainty::parse("--over", "joint.*.clearance")],
+        outputs: outputs.map(str::to_owned).to_vec(),
+        span: RunSpan { duration: 0.06, from: 0.02 },
+    };
+    let mut runs = 0;
+    perform(&Job::Alone(task, Share::WHOLE), &mut || 0.0, &mut |message| {
+        assert!(!matches!(message, Message::Failed(_)), "{message:?}");
+        if let Message::Run(run) = message {
+            runs += 1;
+            for (own, value) in found["outputs"].as_array().unwrap().iter().zip(run.outputs) {
+                let of_command = match run.index {
+                    0 => &own["value"],
+                    end => &own["parameters"][(end - 1) / 2][["alone_low", "alone_high"][(end - 1) % 2]],
+                };
+                assert_eq!(of_command.as_f64(), value, "{} of run {}", own["name"], run.index);
+                assert!(value.is_some());
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    assert_eq!(runs, 7);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Results computed from whole runs. The crate starts no threads, and the caller supplies its clock ([`RunContext`]).
 //!
 //! - Sweeps: [`axis`] and [`design`] define the points, [`sweep`] runs them, [`point`], [`crossing`] and [`statistic`] record the
-//!   results; [`sweep_task`] and [`task`] are the same as plain data for a thread or a worker.
+//!   results; [`sweep_task`] and [`task`] are the same as plain data for a thread or a worker, as is [`alone_task`] of a study.
 //! - Kinds of motion: Poincaré sections ([`section`]), the largest Lyapunov exponent ([`exponent`]) and the [`regime`] that follows.
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
@@ -38,6 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod alone_task;
 pub mod axis;
 pub mod beginning;
 mod cost;

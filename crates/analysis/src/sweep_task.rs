@@ -12,7 +12,7 @@ use super::source::{SceneSource, TaskFault};
 use super::sweep::{BlockRun, Sweep};
 
 /// Simulation steps between two checks for cancellation.
-const STEPS: u32 = 400;
+pub(super) const STEPS: u32 = 400;
 /// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
 pub const COORDINATES: usize = 6;
 /// Largest total number of kept sections that a window holds and draws.

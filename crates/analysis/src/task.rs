@@ -7,6 +7,7 @@ use std::task::{Context, Waker};
 use serde::{Deserialize, Serialize};
 
 use super::RunContext;
+use super::alone_task::{self, AloneMessage, AlonePlan, AloneRun, AloneTask};
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
@@ -24,12 +25,14 @@ pub enum Job {
     },
     /// Points over a range of a parameter, or a share of them.
     Sweep(SweepTask, Share),
+    /// The effect of each uncertain parameter alone, or a share of its runs.
+    Alone(AloneTask, Share),
 }
 
 /// Messages of a running computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Message {
-    /// Fraction done, 0 to 1; for a share of a sweep, as a fraction of the whole.
+    /// Fraction done, 0 to 1; for a share, as a fraction of the whole.
     Progress(f64),
     /// The requested presets, by their words.
     Presets(Vec<(String, Measured)>),
@@ -37,6 +40,10 @@ pub enum Message {
     Ranges(Vec<Range>),
     /// A point of a sweep.
     Point(Box<SweptPoint>),
+    /// The accepted runs of parameters alone; their results follow.
+    Plan(AlonePlan),
+    /// One of these runs.
+    Run(AloneRun),
     /// End of the results.
     Done,
     /// Reason for the lack of a result.
@@ -53,6 +60,16 @@ impl From<SweepMessage> for Message {
     }
 }
 
+impl From<AloneMessage> for Message {
+    fn from(message: AloneMessage) -> Self {
+        match message {
+            AloneMessage::Progress(done) => Self::Progress(done),
+            AloneMessage::Plan(plan) => Self::Plan(plan),
+            AloneMessage::Run(run) => Self::Run(run),
+        }
+    }
+}
+
 /// Runs `job`. `clock` returns seconds from any origin; `tell` receives each message and may cancel. The last message is
 /// [`Message::Done`] or [`Message::Failed`], unless cancelled.
 pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, tell: &mut dyn FnMut(Message) -> ControlFlow<()>) {
@@ -62,7 +79,7 @@ pub fn perform(job: &Job, clock: &mut dyn FnMut() -> f64, tell: &mut dyn FnMut(M
     assert!(end.is_ready(), "nothing in it waits");
 }
 
-/// As [`perform`]; a sweep awaits `rest` every few milliseconds.
+/// As [`perform`]; a computation that can be shared awaits `rest` every few milliseconds.
 pub async fn perform_with_rests(
     job: &Job,
     clock: &mut dyn FnMut() -> f64,
@@ -72,6 +89,7 @@ pub async fn perform_with_rests(
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
         Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
+        Job::Alone(task, share) => alone_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
     };
     let last = match outcome {
         Ok(()) => Message::Done,

@@ -1,0 +1,258 @@
+//! The effect of each uncertain parameter alone as a job in plain data, which reports every run as soon as it is finished.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::orbit::Orbit as _;
+use super::source::{SceneSource, TaskFault};
+use super::study::{Alone, Output, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
+use super::sweep_task::{STEPS, Share};
+use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
+
+/// Runs to be computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AloneTask {
+    /// The scene.
+    pub scene: SceneSource,
+    /// Parameters that vary.
+    pub over: Vec<Uncertainty>,
+    /// Names of outputs, as on the command line.
+    pub outputs: Vec<String>,
+    /// Observed part of each run.
+    pub span: RunSpan,
+}
+
+/// The accepted runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlonePlan {
+    /// Parameters in order.
+    pub inputs: Vec<AloneInput>,
+    /// SI unit of each requested output, "" for a number; `None` for an output that the scene does not have.
+    pub units: Vec<Option<String>>,
+}
+
+/// A varied parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AloneInput {
+    /// Key.
+    pub key: String,
+    /// Value in the scene, SI.
+    pub nominal: f64,
+    /// Lower and upper end of its distribution, SI.
+    pub ends: [f64; 2],
+}
+
+/// A finished run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AloneRun {
+    /// 0: the values of the scene; 1 + 2 i and 2 + 2 i: input i at its lower and at its upper end.
+    pub index: usize,
+    /// The requested outputs, SI; `None` for one that the scene does not have, and if the run did not start or diverged.
+    pub outputs: Vec<Option<f64>>,
+}
+
+/// Messages of a running task.
+pub(super) enum AloneMessage {
+    /// Fraction done, 0 to 1.
+    Progress(f64),
+    /// The accepted runs; their results follow.
+    Plan(AlonePlan),
+    /// A run.
+    Run(AloneRun),
+}
+
+/// Computes a share of the runs of `task` one after another, and awaits `rest` every [`STEPS`] steps.
+pub(super) async fn run(
+    task: &AloneTask,
+    share: Share,
+    tell: &mut dyn FnMut(AloneMessage) -> ControlFlow<()>,
+    rest: &mut impl AsyncFnMut(),
+) -> Result<(), TaskFault> {
+    let mut say = |message| match tell(message) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
+    };
+    let RunSpan { duration, from } = task.span;
+    if !(0.0 <= from && from < duration && duration <= LONGEST_RUN) {
+        return Err(TaskFault::Span { duration, from });
+    }
+    let scene = task.scene.scene()?;
+    Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
+    let inputs = inputs(&scene, &task.over)?;
+    // Another scene may have a probe, or an energy ledger.
+    let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut found| found.pop()));
+    let known: Vec<Option<Output>> = known.collect();
+    let own: Vec<Output> = known.iter().flatten().cloned().collect();
+    let alone = Alone::new(&inputs);
+    let runs = StudyRuns::new(&scene, &inputs, &own, task.span, &alone.rows())?;
+    say(AloneMessage::Plan(AlonePlan {
+        inputs: inputs
+            .into_iter()
+            .zip(alone.ends())
+            .map(|(input, ends)| AloneInput { key: input.key, nominal: input.nominal, ends: *ends })
+            .collect(),
+        units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
+    }))?;
+    let all = runs.sweep().design().blocks();
+    for (finished, index) in (share.index..all).step_by(share.of.max(1)).enumerate() {
+        let mut block = runs.sweep().begin(index);
+        while !block.is_done() {
+            rest().await;
+            block.advance(STEPS);
+            let part = block.current().map_or(0.0, |run| run.machine().time() / duration);
+            say(AloneMessage::Progress((finished as f64 + part) / all as f64))?;
+        }
+        let mut values = runs.outputs_of(&block.records()).into_iter();
+        let mut next =
+            |output: &Option<Output>| output.as_ref().and_then(|_| values.next()).filter(|value| value.is_finite());
+        say(AloneMessage::Run(AloneRun { index, outputs: known.iter().map(&mut next).collect() }))?;
+        say(AloneMessage::Progress((finished + 1) as f64 / all as f64))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::{Job, Message, perform};
+    use jointplay_scene::Scene;
+
+    const OUTPUTS: [&str; 3] = ["tip-error", "peak-force", "impacts"];
+
+    fn task(scene: &str, over: &str) -> AloneTask {
+        let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
+        let scene = Scene::load(scene, if scene == "spcmm" { &changes } else { &[] }).expect("built in");
+        AloneTask {
+            scene: SceneSource::of(&scene),
+            over: vec![Uncertainty::parse("--over", over)],
+            outputs: OUTPUTS.map(str::to_owned).to_vec(),
+            span: RunSpan { duration: 0.06, from: 0.02 },
+        }
+    }
+
+    /// What is told of a share, which is sent as text, by its index.
+    fn told(task: &AloneTask, index: usize, of: usize) -> Vec<Message> {
+        let text = serde_json::to_string(&Job::Alone(task.clone(), Share { index, of })).expect("plain data");
+        let mut said = Vec::new();
+        perform(&serde_json::from_str(&text).expect("its own text"), &mut || 0.0, &mut |message| {
+            let text = serde_json::to_string(&message).expect("plain data");
+            assert_eq!(serde_json::from_str::<Message>(&text).expect("its own text"), message);
+            said.push(message);
+            ControlFlow::Continue(())
+        });
+        said
+    }
+
+    fn runs(said: &[Message]) -> Vec<AloneRun> {
+        let mut runs: Vec<AloneRun> = said
+            .iter()
+            .filter_map(|message| match message {
+                Message::Run(run) => Some(run.clone()),
+                _ => None,
+            })
+            .collect();
+        runs.sort_by_key(|run| run.index);
+        runs
+    }
+
+    #[test]
+    fn shares_have_the_bits_of_the_study_and_the_base_comes_first() {
+        let task = task("spcmm", "joint.*.clearance");
+        let whole = told(&task, 0, 1);
+        assert_eq!(whole.last(), Some(&Message::Done));
+        let first = whole.iter().find(|message| matches!(message, Message::Run(_)));
+        assert!(matches!(first, Some(Message::Run(AloneRun { index: 0, .. }))));
+        let scene = task.scene.scene().expect("built in");
+        let varied = inputs(&scene, &task.over).expect("joints");
+        let kept: Vec<Output> = OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
+        let alone = Alone::new(&varied);
+        let study = StudyRuns::new(&scene, &varied, &kept, task.span, &alone.rows()).expect("runs");
+        let expected: Vec<AloneRun> = (0..study.sweep().design().blocks())
+            .map(|index| {
+                let mut block = study.sweep().begin(index);
+                while !block.is_done() {
+                    block.advance(10_000);
+                }
+                let outputs = study.outputs_of(&block.records());
+                AloneRun { index, outputs: outputs.into_iter().map(Some).collect() }
+            })
+            .collect();
+        assert_eq!(expected.len(), 7);
+        // Each end changes something.
+        assert!(expected[1..].iter().all(|run| run.outputs[..2] != expected[0].outputs[..2]));
+        assert_eq!(runs(&whole), expected);
+        let shared: Vec<Message> = [2, 0, 1].into_iter().flat_map(|index| told(&task, index, 3)).collect();
+        assert_eq!(runs(&shared), expected);
+        let done = |said: &[Message]| {
+            let last = said.iter().rev().find_map(|message| match message {
+                Message::Progress(done) => Some(*done),
+                _ => None,
+            });
+            last.expect("progress")
+        };
+        assert!((done(&whole) - 1.0).abs() < 1e-12);
+        let shares: f64 = (0..3).map(|index| done(&told(&task, index, 3))).sum();
+        assert!((shares - 1.0).abs() < 1e-12, "{shares}");
+        let plan = whole.iter().find_map(|message| match message {
+            Message::Plan(plan) => Some(plan),
+            _ => None,
+        });
+        let plan = plan.expect("a plan");
+        assert_eq!(plan.inputs[1].key, "joint.S2.clearance");
+        assert_eq!(plan.inputs[1].ends, [0.5, 1.5].map(|part| part * plan.inputs[1].nominal));
+        assert_eq!(plan.units, ["m", "N", ""].map(|unit| Some(unit.to_owned())));
+    }
+
+    #[test]
+    fn an_output_that_the_scene_lacks_is_left_out() {
+        let said = told(&task("pendulum", "joint.*.friction"), 0, 1);
+        let Some(Message::Plan(plan)) = said.first() else {
+            panic!("{said:?}");
+        };
+        assert_eq!(plan.units, [None, Some("N".to_owned()), Some(String::new())]);
+        for run in runs(&said) {
+            assert!(run.outputs[0].is_none() && run.outputs[1].is_some_and(|force| force > 0.0), "{run:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        let good = || task("spcmm", "joint.*.clearance");
+        let of = |over: &str| task("spcmm", over);
+        let spans = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
+        for (task, words) in [
+            (of("joint.S9.clearance"), "--over joint.S9.clearance: "),
+            (of("joint.*.clearance=0.4mm..0.2mm"), "joint.S1.clearance: the lower limit"),
+            (of("joint.*.friction=0..99"), "joint.S1.friction: out of range"),
+            (spans(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
+            (spans(f64::NAN, 0.0), "must begin before the end"),
+        ] {
+            let said = told_directly(&task);
+            let [Message::Failed(why)] = &said[..] else {
+                panic!("{words}: {said:?}");
+            };
+            assert!(why.contains(words), "{why}");
+        }
+    }
+
+    /// As [`told`], of a task whose numbers text may not hold.
+    fn told_directly(task: &AloneTask) -> Vec<Message> {
+        let mut said = Vec::new();
+        perform(&Job::Alone(task.clone(), Share::WHOLE), &mut || 0.0, &mut |message| {
+            said.push(message);
+            ControlFlow::Continue(())
+        });
+        said
+    }
+
+    #[test]
+    fn it_ends_when_told() {
+        let mut said = 0;
+        perform(&Job::Alone(task("spcmm", "joint.*.clearance"), Share::WHOLE), &mut || 0.0, &mut |_| {
+            said += 1;
+            if said < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        assert_eq!(said, 3);
+    }
+}
