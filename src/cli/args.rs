@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+mod map;
 mod tolerance;
 
 use std::ffi::OsString;
@@ -10,6 +11,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::analysis::design::Start;
 
+pub use self::map::MapArguments;
 pub use self::tolerance::ToleranceArguments;
 
 /// A 3D laboratory that shows what play in a ball joint does to a machine.
@@ -47,6 +49,8 @@ pub enum Command {
     Sweep(SweepArguments),
     /// Merge the shards of a sweep.
     Merge(MergeArguments),
+    /// Map the error of the tip over drive positions and parameters: at rest, and with every ball anywhere in its play.
+    Map(MapArguments),
     /// Find which parameters move an output most, such as which joint's clearance the tip error: each alone, and all together.
     Sensitivity(SensitivityArguments),
     /// Find what part of a manufactured lot holds its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what

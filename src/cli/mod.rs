@@ -12,6 +12,7 @@ mod interrupt;
 #[cfg_attr(not(feature = "gui"), path = "no_link.rs")]
 mod link;
 mod machine;
+mod map;
 mod measuring;
 pub mod output;
 #[cfg(feature = "gui")]
@@ -100,6 +101,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
+        Some(Command::Map(arguments)) => map::map(&arguments),
         Some(Command::Sensitivity(arguments)) => sensitivity::sensitivity(&arguments),
         Some(Command::Tolerance(arguments)) => tolerance::tolerance(&arguments),
         Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),

@@ -9,6 +9,7 @@ mod cluster;
 mod command_line;
 mod ledger_files;
 mod links;
+mod map;
 mod peaks;
 mod program;
 mod reproduce;

@@ -3,6 +3,7 @@
 
 pub mod invariants;
 pub mod matrix;
+pub mod truss;
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;

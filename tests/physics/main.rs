@@ -34,6 +34,7 @@ mod pays_only;
 mod planar_loops;
 mod promises;
 mod properties;
+mod reachable;
 mod reactions;
 mod ready_sweeps;
 mod reference;

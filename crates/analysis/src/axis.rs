@@ -1,6 +1,11 @@
 //! The values of one varied parameter: equally or geometrically spaced, or listed.
 
-use jointplay_scene::{Scene, SceneError, Value, ValueError};
+use jointplay_physics::units::{Dimension, parse_quantity};
+use jointplay_scene::{Kind, Parameter, Scene, SceneError, Value, ValueError};
+
+/// Option of a sweep, and of a map over the workspace.
+const VARY: &str = "--vary";
+const OVER: &str = "--over";
 
 /// Largest relative distance of a geometrically spaced value from a whole number that counts as rounding.
 const ROUNDING: f64 = 1e-9;
@@ -9,23 +14,31 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RangeError {
     /// Malformed.
-    #[error(
-        "--vary {text}: expected KEY=A..B:N, KEY=A..B:N:log or KEY=V1,V2,…, e.g. contact.clearance=0.01mm..1mm:200"
-    )]
+    #[error("{text}: expected KEY=A..B:N, KEY=A..B:N:log or KEY=V1,V2,…, e.g. contact.clearance=0.01mm..1mm:200")]
     Form {
         /// As written.
         text: String,
     },
     /// An unknown key, or a value that the scene does not accept.
-    #[error("--vary {text}: {error}")]
+    #[error("{text}: {error}")]
     Scene {
         /// As written.
         text: String,
         /// What is wrong.
         error: Box<SceneError>,
     },
+    /// Neither a parameter nor a driven coordinate.
+    #[error("{text}: {error}; {}", driven(.coordinates))]
+    NoSubject {
+        /// As written.
+        text: String,
+        /// What is wrong.
+        error: Box<SceneError>,
+        /// Names of the driven coordinates.
+        coordinates: Vec<String>,
+    },
     /// Not a value of the parameter.
-    #[error("--vary {text}: {value}: {error}")]
+    #[error("{text}: {value}: {error}")]
     Value {
         /// As written.
         text: String,
@@ -35,7 +48,7 @@ pub enum RangeError {
         error: ValueError,
     },
     /// A range of a parameter whose values are words.
-    #[error("--vary {text}: {key} is not a number; list its values, as in {key}={example}")]
+    #[error("{text}: {key} is not a number; list its values, as in {key}={example}")]
     Words {
         /// As written.
         text: String,
@@ -45,7 +58,7 @@ pub enum RangeError {
         example: String,
     },
     /// A whole-number parameter whose spaced values are not whole.
-    #[error("--vary {text}: {key} takes whole numbers, which {count} spaced values from {from} to {to} are not")]
+    #[error("{text}: {key} takes whole numbers, which {count} spaced values from {from} to {to} are not")]
     NotWhole {
         /// As written.
         text: String,
@@ -59,13 +72,13 @@ pub enum RangeError {
         count: usize,
     },
     /// Geometric spacing from or to a number that is not positive.
-    #[error("--vary {text}: both ends of a logarithmic range must be above 0")]
+    #[error("{text}: both ends of a logarithmic range must be above 0")]
     NotPositive {
         /// As written.
         text: String,
     },
     /// No points.
-    #[error("--vary {text}: the range is empty: {what}")]
+    #[error("{text}: the range is empty: {what}")]
     Empty {
         /// As written.
         text: String,
@@ -74,7 +87,7 @@ pub enum RangeError {
     },
     /// The last value is below the first.
     #[error(
-        "--vary {text}: the range is reversed: its first end is above its second; write {to}..{from} (--start \
+        "{text}: the range is reversed: its first end is above its second; write {to}..{from} (--start \
          follow-down runs through it downwards)"
     )]
     Reversed {
@@ -88,6 +101,78 @@ pub enum RangeError {
     /// Axes that do not fit together, or not with the starts.
     #[error("{0}")]
     Together(String),
+}
+
+fn driven(coordinates: &[String]) -> String {
+    if coordinates.is_empty() {
+        return "the scene has no driven coordinate".to_owned();
+    }
+    format!("driven coordinates: {}", coordinates.join(", "))
+}
+
+/// A driven coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Index in the order of [`Machine::driven`](jointplay_physics::machine::Machine::driven).
+    pub index: usize,
+    /// Length or angle.
+    pub dimension: Dimension,
+}
+
+/// What an axis varies.
+enum Subject {
+    Parameter(&'static Parameter),
+    Coordinate(Coordinate),
+}
+
+impl Subject {
+    /// The subject called `key` of an axis written as `text`.
+    fn find(scene: &Scene, option: &str, text: &str, key: &str) -> Result<Self, RangeError> {
+        let error = match scene.parameter(key) {
+            Ok(parameter) => return Ok(Self::Parameter(parameter)),
+            Err(error) => error,
+        };
+        if option != OVER {
+            return Err(of_scene(text, error));
+        }
+        let names = scene.machine.driven().map(|(joint, freedom)| {
+            let dimension = if freedom.turns() { Dimension::Angle } else { Dimension::Length };
+            (format!("{}.{}", joint.name, freedom.word()), dimension)
+        });
+        let names: Vec<(String, Dimension)> = names.collect();
+        match names.iter().position(|(name, _)| name == key) {
+            Some(index) => Ok(Self::Coordinate(Coordinate { index, dimension: names[index].1 })),
+            None => {
+                let coordinates = names.into_iter().map(|(name, _)| name).collect();
+                Err(RangeError::NoSubject { text: text.to_owned(), error: Box::new(error), coordinates })
+            }
+        }
+    }
+
+    fn coordinate(&self) -> Option<Coordinate> {
+        match self {
+            Self::Parameter(_) => None,
+            Self::Coordinate(coordinate) => Some(*coordinate),
+        }
+    }
+
+    fn read(&self, value: &str) -> Result<Value, ValueError> {
+        match self {
+            Self::Parameter(parameter) => parameter.read(value),
+            Self::Coordinate(coordinate) => {
+                let number = parse_quantity(value.trim(), coordinate.dimension);
+                let refuse = |error: jointplay_physics::units::QuantityError| ValueError {
+                    fault: error.into(),
+                    allowed: "a position of the drive".to_owned(),
+                };
+                number.map(Value::Number).map_err(refuse)
+            }
+        }
+    }
+
+    fn has_words(&self) -> bool {
+        matches!(self, Self::Parameter(parameter) if matches!(parameter.kind, Kind::Choice(_)))
+    }
 }
 
 /// Spacing of the values between two ends, both included.
@@ -110,12 +195,36 @@ enum Values {
     Listed(Vec<Value>),
 }
 
-/// One varied parameter with its values in order.
+impl Values {
+    /// Value `i`, SI; NaN for a word.
+    fn number(&self, i: usize) -> f64 {
+        match self {
+            Self::Listed(values) => match values[i] {
+                Value::Number(number) => number,
+                Value::Count(count) => count as f64,
+                Value::Choice(_) | Value::Unset => f64::NAN,
+            },
+            Self::Spaced { to, count, .. } if i + 1 == *count => *to,
+            Self::Spaced { spacing: Spacing::Linear, from, to, count, .. } => {
+                from + (to - from) * i as f64 / (count - 1) as f64
+            }
+            Self::Spaced { spacing: Spacing::Geometric, from, to, count, whole } => {
+                let value = from * libm::pow(to / from, i as f64 / (count - 1) as f64);
+                let nearest = value.round();
+                if *whole && (value - nearest).abs() < ROUNDING * value { nearest } else { value }
+            }
+        }
+    }
+}
+
+/// One varied parameter, or driven coordinate, with its values in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
+    option: &'static str,
     key: String,
-    /// As written, for error messages.
+    /// As written, with the option, for error messages.
     text: String,
+    coordinate: Option<Coordinate>,
     values: Values,
 }
 
@@ -125,19 +234,39 @@ impl Axis {
     /// # Errors
     /// An unknown key, a malformed or empty range, or a value that the parameter does not accept.
     pub fn parse(scene: &Scene, text: &str) -> Result<Self, RangeError> {
+        Self::of_option(VARY, scene, text)
+    }
+
+    /// The same; KEY may also be a driven coordinate by the name of its channel, such as `crank.angle` or `slider.position`.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn parse_over(scene: &Scene, text: &str) -> Result<Self, RangeError> {
+        Self::of_option(OVER, scene, text)
+    }
+
+    fn of_option(option: &'static str, scene: &Scene, written: &str) -> Result<Self, RangeError> {
+        let text = &format!("{option} {written}");
         let form = || RangeError::Form { text: text.to_owned() };
-        let (key, values) = text.split_once('=').ok_or_else(form)?;
+        let (key, values) = written.split_once('=').ok_or_else(form)?;
         let (key, values) = (key.trim(), values.trim());
-        let axis = |values| Self { key: key.to_owned(), text: text.to_owned(), values };
-        if let Some((from, rest)) = values.split_once("..") {
-            return spaced(scene, text, key, from.trim(), rest).map(axis);
-        }
-        let parameter = scene.parameter(key).map_err(|error| of_scene(text, error))?;
-        if !values.contains(',') {
-            return Err(form());
-        }
-        let listed = values.split(',').map(|value| parameter.read(value).map_err(|error| of_value(text, value, error)));
-        Ok(axis(Values::Listed(listed.collect::<Result<_, _>>()?)))
+        let (subject, values) = if let Some((from, rest)) = values.split_once("..") {
+            let range = parts(text, rest)?;
+            let subject = Subject::find(scene, option, text, key)?;
+            let values = spaced(scene, &subject, text, key, from.trim(), range)?;
+            (subject, values)
+        } else {
+            let subject = Subject::find(scene, option, text, key)?;
+            if !values.contains(',') {
+                return Err(form());
+            }
+            let listed =
+                values.split(',').map(|value| subject.read(value).map_err(|error| of_value(text, value, error)));
+            let listed = Values::Listed(listed.collect::<Result<_, _>>()?);
+            (subject, listed)
+        };
+        let coordinate = subject.coordinate();
+        Ok(Self { option, key: key.to_owned(), text: text.to_owned(), coordinate, values })
     }
 
     /// A parameter with listed values.
@@ -145,14 +274,15 @@ impl Axis {
     /// # Errors
     /// An unknown key, no values, or a value that the parameter does not accept.
     pub fn listed(scene: &Scene, key: &str, values: Vec<Value>) -> Result<Self, RangeError> {
-        let parameter = scene.parameter(key).map_err(|error| of_scene(key, error))?;
+        let text = format!("{VARY} {key}");
+        let parameter = scene.parameter(key).map_err(|error| of_scene(&text, error))?;
         if values.is_empty() {
-            return Err(RangeError::Empty { text: key.to_owned(), what: "0 values".to_owned() });
+            return Err(RangeError::Empty { text, what: "0 values".to_owned() });
         }
         for value in &values {
-            parameter.check(value).map_err(|error| of_value(key, &parameter.show(value), error))?;
+            parameter.check(value).map_err(|error| of_value(&text, &parameter.show(value), error))?;
         }
-        Ok(Self { key: key.to_owned(), text: key.to_owned(), values: Values::Listed(values) })
+        Ok(Self { option: VARY, key: key.to_owned(), text, coordinate: None, values: Values::Listed(values) })
     }
 
     /// Tries the first and the last value, or every listed one, in `scene`.
@@ -160,6 +290,9 @@ impl Axis {
     /// # Errors
     /// A value that the scene does not accept.
     pub(super) fn check(&self, scene: &Scene) -> Result<(), RangeError> {
+        if self.coordinate.is_some() {
+            return Ok(());
+        }
         let last = self.count() - 1;
         let all = 0..if self.is_listed() { last } else { 1 };
         for i in all.chain([last]) {
@@ -169,9 +302,19 @@ impl Axis {
         Ok(())
     }
 
-    /// Key of the parameter.
+    /// Key of the parameter, or name of the coordinate.
     pub fn key(&self) -> &str {
         &self.key
+    }
+
+    /// The driven coordinate, if it varies one.
+    pub fn coordinate(&self) -> Option<Coordinate> {
+        self.coordinate
+    }
+
+    /// The option that gave it.
+    pub(super) fn option(&self) -> &'static str {
+        self.option
     }
 
     /// Number of values.
@@ -193,22 +336,7 @@ impl Axis {
 
     /// Value `i`, SI; NaN for a word.
     pub fn number(&self, i: usize) -> f64 {
-        match &self.values {
-            Values::Listed(values) => match values[i] {
-                Value::Number(number) => number,
-                Value::Count(count) => count as f64,
-                Value::Choice(_) | Value::Unset => f64::NAN,
-            },
-            Values::Spaced { to, count, .. } if i + 1 == *count => *to,
-            Values::Spaced { spacing: Spacing::Linear, from, to, count, .. } => {
-                from + (to - from) * i as f64 / (count - 1) as f64
-            }
-            Values::Spaced { spacing: Spacing::Geometric, from, to, count, whole } => {
-                let value = from * libm::pow(to / from, i as f64 / (count - 1) as f64);
-                let nearest = value.round();
-                if *whole && (value - nearest).abs() < ROUNDING * value { nearest } else { value }
-            }
-        }
+        self.values.number(i)
     }
 
     /// All values in order, SI; NaN for words.
@@ -277,24 +405,34 @@ fn no_numbers(scene: &Scene, text: &str, key: &str) -> RangeError {
     RangeError::Words { text: text.to_owned(), key: key.to_owned(), example }
 }
 
-/// Reads the range of `key` that begins with `first` and continues with `rest`: `B:N` or `B:N:log`.
-fn spaced(scene: &Scene, text: &str, key: &str, first: &str, rest: &str) -> Result<Values, RangeError> {
+/// Last value, number of values and spacing of a range that continues with `rest`: `B:N` or `B:N:log`.
+fn parts<'a>(text: &str, rest: &'a str) -> Result<(&'a str, &'a str, Spacing), RangeError> {
+    let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
+    match parts[..] {
+        [last, count] => Ok((last, count, Spacing::Linear)),
+        [last, count, "log"] => Ok((last, count, Spacing::Geometric)),
+        _ => Err(RangeError::Form { text: text.to_owned() }),
+    }
+}
+
+/// Reads the range of `key` that begins with `first` and continues with `rest`, from [`parts`].
+fn spaced(
+    scene: &Scene,
+    subject: &Subject,
+    text: &str,
+    key: &str,
+    first: &str,
+    (last, count, spacing): (&str, &str, Spacing),
+) -> Result<Values, RangeError> {
     let own = || text.to_owned();
     let form = || RangeError::Form { text: own() };
     let empty = |what: String| Err(RangeError::Empty { text: own(), what });
-    let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
-    let (last, count, spacing) = match parts[..] {
-        [last, count] => (last, count, Spacing::Linear),
-        [last, count, "log"] => (last, count, Spacing::Geometric),
-        _ => return Err(form()),
-    };
-    let parameter = scene.parameter(key).map_err(|error| of_scene(text, error))?;
     let count: usize = count.parse().map_err(|_| form())?;
     if count == 0 {
         return empty("0 values".to_owned());
     }
-    let read = |end: &str| parameter.read(end).map_err(|error| of_value(text, end, error));
-    if matches!(parameter.kind, jointplay_scene::Kind::Choice(_)) {
+    let read = |end: &str| subject.read(end).map_err(|error| of_value(text, end, error));
+    if subject.has_words() {
         return Err(no_numbers(scene, text, key));
     }
     let (from, to, whole) = match (read(first)?, read(last)?) {
@@ -316,11 +454,10 @@ fn spaced(scene: &Scene, text: &str, key: &str, first: &str, rest: &str) -> Resu
         return Err(RangeError::NotPositive { text: own() });
     }
     let values = Values::Spaced { spacing, from, to, count, whole };
-    let axis = Axis { key: key.to_owned(), text: own(), values };
-    if whole && axis.numbers().any(|value| value.fract() != 0.0) {
+    if whole && (0..count).any(|i| values.number(i).fract() != 0.0) {
         return Err(RangeError::NotWhole { text: own(), key: key.to_owned(), from: from as u64, to: to as u64, count });
     }
-    Ok(axis.values)
+    Ok(values)
 }
 
 #[cfg(test)]

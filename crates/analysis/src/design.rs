@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::axis::{Axis, RangeError};
+use super::axis::{Axis, Coordinate, RangeError};
 use jointplay_scene::{Scene, SceneError, Value};
 
 /// Points per block in a `follow` sweep: each block starts cold at its first point, so that neither threads nor shards
@@ -117,7 +117,7 @@ impl Design {
         }
         let mut keys = BTreeSet::new();
         if let Some(twice) = axes.iter().find(|axis| !keys.insert(axis.key())) {
-            return wrong(format!("--vary {} is given twice", twice.key()));
+            return wrong(format!("{} {} is given twice", twice.option(), twice.key()));
         }
         let mut known = BTreeSet::new();
         match starts.iter().find(|start| !known.insert(start.word())) {
@@ -233,8 +233,14 @@ impl Design {
     /// Key and value of every varied parameter at a point.
     pub fn settings(&self, point: usize) -> Vec<(&str, Value)> {
         let indices = self.indices(point).into_iter();
-        let pairs = self.axes.iter().zip(indices);
+        let pairs = self.axes.iter().zip(indices).filter(|(axis, _)| axis.coordinate().is_none());
         pairs.map(|(axis, i)| (axis.key(), axis.value(i))).collect()
+    }
+
+    /// Every varied driven coordinate at a point with its value, m or rad.
+    pub fn coordinates(&self, point: usize) -> impl Iterator<Item = (Coordinate, f64)> {
+        let pairs = self.axes.iter().zip(self.indices(point));
+        pairs.filter_map(|(axis, i)| Some((axis.coordinate()?, axis.number(i))))
     }
 
     /// The scene of a point.

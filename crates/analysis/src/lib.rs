@@ -6,6 +6,7 @@
 //! - Cost and error of the methods: [`work_precision`](fn@work_precision), [`front`](fn@front), [`loose_speed`], [`presets`], [`model_costs`].
 //! - The paper's section 4 ([`paper`], [`reproduction`]), responses compared with the ideal motion ([`response`]), and cases with
 //!   known answers ([`validation`]).
+//! - The tip's error over the workspace, with the drives held ([`map`]).
 //! - Uncertain parameters of a scene ([`study`]). Without any scene: [`sampling`], [`distribution`] and ISO fits ([`iso286`]);
 //!   which input matters ([`morris`], [`indices`]); percentiles, yield and rejects ([`yields`]); the cheapest fits that hold a
 //!   yield ([`fits`]).
@@ -54,6 +55,7 @@ pub mod indices;
 pub mod iso286;
 pub mod layout;
 mod many_joints;
+pub mod map;
 pub mod morris;
 mod normal;
 pub mod orbit;

@@ -8,7 +8,7 @@ mod table;
 
 pub use csv::{ChecksumWriter, significant};
 pub use json::write_meta;
-pub use npz::{as_io, write_archive};
+pub use npz::{add_array, as_io, write_archive};
 pub use table::{RowError, Table};
 
 use std::path::{Path, PathBuf};

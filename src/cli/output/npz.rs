@@ -2,8 +2,8 @@
 
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 
-use ndarray::Array1;
-use ndarray_npy::{NpzWriter, WriteNpzError};
+use ndarray::{Array1, ArrayD, IxDyn};
+use ndarray_npy::{NpzWriter, WritableElement, WriteNpzError};
 use serde_json::{Map, Value as Json};
 
 use super::Table;
@@ -49,6 +49,20 @@ pub fn write_archive<W: Write + Seek>(
     let ended = archive.finish().map_err(as_io).map(|_| ());
     let outcome = filled.and(ended).and_then(|()| out.flush());
     out.get_mut().failure.take().map_or(outcome, Err)
+}
+
+/// Adds an array with these values, in row-major order.
+///
+/// # Errors
+/// Input/output, or a number of values other than that of the shape.
+pub fn add_array<W: Write + Seek, T: WritableElement>(
+    archive: &mut NpzWriter<W>,
+    name: &str,
+    shape: Vec<usize>,
+    values: Vec<T>,
+) -> io::Result<()> {
+    let array = ArrayD::from_shape_vec(IxDyn(&shape), values).map_err(io::Error::other)?;
+    archive.add_array(name, &array).map_err(as_io)
 }
 
 /// Sink for the bytes of an archive. After its first failure it accepts everything and writes nothing: the archive writer

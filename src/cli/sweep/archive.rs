@@ -2,8 +2,7 @@
 
 use std::io;
 
-use ndarray::{Array1, ArrayD, IxDyn};
-use ndarray_npy::NpzWriter;
+use ndarray::Array1;
 use serde_json::{Map, Value as Json, json};
 
 use super::options::Shard;
@@ -13,7 +12,7 @@ use crate::analysis::design::Arrangement;
 use crate::analysis::layout::Column;
 use crate::analysis::sweep::Sweep;
 use crate::cli::Failure;
-use crate::cli::output::{as_io, write_archive};
+use crate::cli::output::{add_array, as_io, write_archive};
 use crate::files::OutputFile;
 use crate::scene::{Kind, Scene};
 use crate::units::si_unit;
@@ -244,9 +243,9 @@ impl Archive {
                     }
                     if column.whole {
                         let whole = values.iter().map(|value| *value as i64).collect();
-                        add(archive, &column.name, shape, whole)?;
+                        add_array(archive, &column.name, shape, whole)?;
                     } else {
-                        add(archive, &column.name, shape, values)?;
+                        add_array(archive, &column.name, shape, values)?;
                     }
                 }
                 let meta = Json::Object(self.meta.clone()).to_string();
@@ -275,14 +274,4 @@ pub(super) fn unit_suffix(scene: &Scene, axis: &Axis) -> String {
     };
     let unit = unit.replace([' ', '^'], "").replace('/', "_");
     if unit.is_empty() { unit } else { format!("_{unit}") }
-}
-
-fn add<W: io::Write + io::Seek, T: ndarray_npy::WritableElement>(
-    archive: &mut NpzWriter<W>,
-    name: &str,
-    shape: Vec<usize>,
-    values: Vec<T>,
-) -> io::Result<()> {
-    let array = ArrayD::from_shape_vec(IxDyn(&shape), values).map_err(io::Error::other)?;
-    archive.add_array(name, &array).map_err(as_io)
 }

@@ -13,6 +13,7 @@ mod word;
 pub(super) use archive::{Archive, Source};
 pub use merge::merge;
 pub(super) use partial::Partial;
+pub(super) use word::Word;
 
 use std::collections::HashSet;
 use std::time::Instant;

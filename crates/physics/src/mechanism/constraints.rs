@@ -9,6 +9,8 @@ use super::tree::{Tree, visit_columns};
 use crate::machine::{Mat3, Vec3};
 use std::ops::Range;
 
+mod openings;
+
 /// Rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n, row-major from `offset`.
 struct Side {
     block: usize,
@@ -490,6 +492,19 @@ impl Constraints {
         largest
     }
 
+    /// Sets the multipliers of all rows to their negative openings at `motion`. Returns the largest distance or angle.
+    fn put_residuals(&mut self, model: &Model, motion: &[Kinematics]) -> f64 {
+        let mut largest: f64 = 0.0;
+        for (k, &j) in self.joints.iter().enumerate() {
+            let e = model.joints[j].eccentricity(motion);
+            largest = largest.max(e.norm());
+            for i in 0..3 {
+                self.multipliers[3 * k + i] = -e[i];
+            }
+        }
+        largest.max(self.put_unit_residuals(model, motion, 0))
+    }
+
     /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and stores the multipliers. Bias
     /// accelerations and mass matrices of the tree must be up to date at the same state.
     pub fn correct(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64], vdot: &mut [f64]) {
@@ -513,26 +528,6 @@ impl Constraints {
         self.add_weighted(model, &self.multipliers, vdot);
     }
 
-    /// Removes the part of the accelerations `vdot` that would open the joints: the linear part of [`Self::correct`], with its
-    /// matrices.
-    pub fn project_accelerations(&mut self, model: &Model, vdot: &mut [f64]) {
-        for k in 0..self.joints.len() {
-            let residual = self.apply(model, k, vdot);
-            for i in 0..3 {
-                self.scratch[3 * k + i] = -residual[i];
-            }
-        }
-        for (u, unit) in self.units.iter().enumerate() {
-            let moved = self.apply(model, self.joints.len() + u, vdot);
-            let own = self.scratch[unit.range()].iter_mut();
-            for (x, along) in own.zip(&unit.along) {
-                *x = -along.dot(&moved);
-            }
-        }
-        self.matrix.solve(&mut self.scratch);
-        self.add_weighted(model, &self.scratch, vdot);
-    }
-
     /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
     ///
     /// Returns the remaining closure error, m or rad: above `1e-12`, the loops could not be closed.
@@ -541,15 +536,7 @@ impl Constraints {
         let mut error = f64::INFINITY;
         for _ in 0..30 {
             tree.update_kinematics(model, t, y);
-            let mut largest: f64 = 0.0;
-            for (k, &j) in self.joints.iter().enumerate() {
-                let e = model.joints[j].eccentricity(&tree.motion);
-                largest = largest.max(e.norm());
-                for i in 0..3 {
-                    self.multipliers[3 * k + i] = -e[i];
-                }
-            }
-            largest = largest.max(self.put_unit_residuals(model, &tree.motion, 0));
+            let largest = self.put_residuals(model, &tree.motion);
             // Newton converges quadratically: stop once another step would only change rounding errors. Dependent rows leave a
             // residual, the inconsistency of the dimensions.
             let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };

@@ -13,7 +13,7 @@ use super::constraints::Constraints;
 use super::drives::trajectory_of;
 use super::lu::Lu;
 use super::model::{Body, Model, Motion};
-use super::settled::settle;
+use super::settled::{settle, without_play};
 use super::start::{CLOSED, factor_at};
 use super::tree::Tree;
 use super::{ActiveSet, Mechanism, MechanismError};
@@ -53,24 +53,20 @@ const AT_REST: f64 = 1e-13;
 const ROUNDING: f64 = 2e-9;
 const DRIFT: f64 = 1e-8;
 
-/// Start in equilibrium of `machine` at t = 0.
+/// Start in equilibrium of `machine` at t = 0, assembled from the tree coordinates `near` it, if given, in place of its start values.
 ///
 /// The machine without play rests first. Its balls are then laid on their walls where it presses them, and the search continues
 /// from there: on the long way, walls that a ball must follow would allow short steps only.
 ///
 /// # Errors
 /// The machine does not start settled, has too many coordinates, or comes to rest nowhere.
-pub(super) fn rest(machine: &Machine) -> Result<Settled, MechanismError> {
-    let Settled { mut state, assembly } = settle(machine, None)?;
+pub(super) fn rest(machine: &Machine, near: Option<&[f64]>) -> Result<Settled, MechanismError> {
+    let Settled { mut state, assembly } = settle(machine, near)?;
     let mut still = at_start(machine);
     still.formulation = Formulation::Tree;
     let play = |joint: &BallJoint| joint.contact.clearance > 0.0;
     if still.ball_joints.iter().any(play) {
-        let mut ideal = still.clone();
-        ideal.start = StartRule::Ideal;
-        for joint in &mut ideal.ball_joints {
-            joint.contact.clearance = 0.0;
-        }
+        let ideal = without_play(&still);
         // If it does not rest without play, the search with play says where it ended.
         if let Ok(rests) = rest_near(&ideal, state.clone()) {
             state = settle(&still, Some(&rests))?.state;
@@ -81,7 +77,7 @@ pub(super) fn rest(machine: &Machine) -> Result<Settled, MechanismError> {
 }
 
 /// State of rest of `machine`, whose laws are constant, near the tree coordinates `state`.
-fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f64>, MechanismError> {
+pub(super) fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f64>, MechanismError> {
     let Model { nq, nv, .. } = Model::new(machine);
     if nv > MOST_COORDINATES {
         return Err(MechanismError::TooLargeForRest { velocities: nv, most: MOST_COORDINATES });
@@ -98,7 +94,7 @@ fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f64>, Mechani
 }
 
 /// `machine` with the values that every law has at t = 0.
-fn at_start(machine: &Machine) -> Machine {
+pub(super) fn at_start(machine: &Machine) -> Machine {
     let mut still = machine.clone();
     let forms = super::model::closed_form_of(machine);
     let forms = forms.map(|form| form.at(0.0).driven);
@@ -216,6 +212,7 @@ impl<'a> Search<'a> {
                 // A step that needed corrections, or that the accelerations rose in, was long enough.
                 let growth = match size / now.max(f64::MIN_POSITIVE) {
                     _ if iterations > FEW => 1.0,
+                    _ if now == 0.0 => GROWTH.1,
                     fall if fall > 0.8 => fall.clamp(GROWTH.0, GROWTH.1),
                     fall if fall * RISE > 1.0 => 1.0,
                     _ => CUT,

@@ -20,13 +20,16 @@ mod equilibrium;
 mod factor;
 mod flight;
 mod forest;
+mod held;
 mod kinematics;
 mod lagrange;
 mod lu;
 mod model;
+mod norm_sum;
 mod pairs;
 mod path;
 mod power;
+mod reachable;
 mod rows;
 mod settled;
 mod spcmm;
@@ -48,8 +51,10 @@ pub use drives::periods_of;
 pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, Touch};
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};
+pub use held::{HeldError, HeldMachine};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
+pub use reachable::{Farthest, TipFreedoms};
 pub use spcmm::Unreachable;
 pub use summary::Summary;
 pub use systems::Evaluator;
@@ -343,7 +348,7 @@ impl Mechanism {
                 guess.map(|guess| Settled { state: guess.to_vec(), assembly: Assembly::default() })
             }
             StartRule::Settled => Some(settled::settle(machine, None)?),
-            StartRule::Equilibrium => Some(equilibrium::rest(machine)?),
+            StartRule::Equilibrium => Some(equilibrium::rest(machine, None)?),
         };
         Ok(Self::with_model(machine, Arc::new(model)))
     }

@@ -16,12 +16,7 @@ const ROUNDS: usize = 4;
 /// # Errors
 /// That machine does not start.
 pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled, MechanismError> {
-    let mut twin = machine.clone();
-    for joint in &mut twin.ball_joints {
-        joint.contact.clearance = 0.0;
-    }
-    twin.start = StartRule::Ideal;
-    twin.formulation = Formulation::Tree;
+    let mut twin = without_play(machine);
     let mut mechanism = Mechanism::near(&twin, near)?;
     let mut state = mechanism.start()?;
     let assembly = mechanism.assembly().clone();
@@ -47,6 +42,15 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
         state = mechanism.start()?;
     }
     Ok(Settled { state, assembly })
+}
+
+/// `machine` with every ball joint ideal, in tree coordinates, to be assembled.
+pub(super) fn without_play(machine: &Machine) -> Machine {
+    let mut twin = machine.clone();
+    for joint in &mut twin.ball_joints {
+        joint.contact.clearance = 0.0;
+    }
+    Machine { start: StartRule::Ideal, formulation: Formulation::Tree, ..twin }
 }
 
 /// Ball centre relative to the socket centre, m, where the wall exerts `force`, N, on the ball. An unloaded ball stays centred.

@@ -1,0 +1,153 @@
+//! The set of tip errors that are reachable with every ball anywhere in its play and the drives held: its farthest point in a
+//! direction. Contact between bodies, springs and inertia play no part.
+//!
+//! A unit force u at the tip, balanced by forces l_k on the balls of the mechanism without play, does the virtual work u . e =
+//! sum(l_k . d_k) while the balls are displaced by d_k in their sockets. Every ball with play c_k therefore lies at
+//! c_k l_k / |l_k| where the tip is farthest along u (Venanzi & Parenti-Castelli, ASME J. Mech. Des. 127, 2005, pp. 446-455; the set
+//! itself: Voglewede & Ebert-Uphoff, ASME J. Mech. Des. 126, 2004, pp. 283-290), and to first order the largest u . e, the support of
+//! the set, is sum(c_k |l_k|). If joints share the load, the support is the least such sum over all l_k in balance, by duality: the
+//! d_k of a redundant mechanism have to agree.
+//!
+//! The same statement holds for small changes of any pose with displaced balls. Applied to the pose that it leads to, until nothing
+//! changes, it ends where no small change within the play takes the tip farther along u.
+
+use super::constraints::Constraints;
+use super::held::{HELD, HeldMachine, IMMOBILE};
+use super::norm_sum::minimise;
+use super::start::factor_at;
+use super::tree::Tree;
+use crate::machine::{Mat3, Vec3};
+
+/// Maximum number of poses; those after which displacements are averaged with the ones before, and fixed. In a direction
+/// perpendicular to a face of the set they may alternate between its ends.
+const MOST_POSES: usize = 40;
+const AVERAGED: usize = 12;
+const FIXED: usize = 24;
+/// Shift of the tip from one pose to the next, over the largest clearance, at which they agree, and error of the openings at which
+/// a pose counts as closed: a ball without load may lie anywhere.
+const AGREES: f64 = 1e-9;
+const CLOSES: f64 = 1e-6;
+/// Change that is rounding, m.
+const ROUNDING: f64 = 1e-14;
+
+/// The tip's farthest error in one direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Farthest {
+    /// Unit vector u, world axes.
+    pub direction: Vec3,
+    /// Support of the set along u to first order in the clearances, m.
+    pub support: f64,
+    /// Part of each ball joint in it, c_k |l_k|, m.
+    pub shares: Vec<f64>,
+    /// Error of the pose with displaced balls, m, world axes; `None` if its loops do not close.
+    pub error: Option<Vec3>,
+}
+
+/// Directions of the tip with the drives held, orthonormal, world axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TipFreedoms {
+    /// In which the tip moves without play: nothing bounds the error.
+    pub unbounded: Vec<Vec3>,
+    /// Perpendicular to those, in which it moves by play alone. A planar mechanism has two.
+    pub bounded: Vec<Vec3>,
+}
+
+impl HeldMachine {
+    /// Directions in which the tip can err.
+    pub fn freedoms(&mut self) -> TipFreedoms {
+        self.factor(&self.ideal.clone());
+        let unconstrained = self.mobility(|_| {}).trace();
+        let tight: Vec<usize> = (0..self.play.len()).filter(|&k| self.play[k] == 0.0).collect();
+        let mut without_loose = Constraints::new(&self.model, &tight);
+        if without_loose.rows() > 0 {
+            // Those of all joints may be dependent, and then some of these are, too.
+            without_loose.treat_as_dependent(without_loose.rows());
+        }
+        factor_at(&self.model, &mut without_loose, &mut self.tree, HELD, &self.ideal);
+        let loose = self.mobility(|vdot| without_loose.project_accelerations(&self.model, vdot));
+        self.factor(&self.ideal.clone());
+        let closed = self.closed_mobility();
+        let least = IMMOBILE * unconstrained;
+        let unbounded = range(&closed, least);
+        let mut across = Mat3::identity();
+        for free in &unbounded {
+            across -= free * free.transpose();
+        }
+        TipFreedoms { bounded: range(&(across * loose * across), least), unbounded }
+    }
+
+    /// The farthest error along the unit vector `direction`, one of those that [`TipFreedoms::bounded`] span.
+    pub fn farthest(&mut self, direction: &Vec3) -> Farthest {
+        let rows = self.constraints.rows();
+        let most = self.play.iter().copied().fold(0.0, f64::max);
+        let mut y = self.ideal.clone();
+        let (mut openings, mut targets, mut step) = (vec![0.0; rows], vec![0.0; rows], vec![0.0; self.model.nv]);
+        let (mut support, mut shares, mut error) = (0.0, vec![0.0; self.play.len()], None);
+        let mut tip = self.ideal_tip;
+        for pose in 0..MOST_POSES {
+            self.factor(&y);
+            let mut loads = vec![0.0; rows];
+            let mut vdot = self.tip_load(direction);
+            self.tree.solve(&self.model, &mut vdot);
+            self.constraints.bear(&self.model, &mut vdot, &mut loads);
+            self.constraints.openings(&self.model, &self.tree.motion, &mut openings);
+            let null: Vec<Vec<f64>> = self.constraints.system().null_multipliers().map(<[f64]>::to_vec).collect();
+            let displaced = minimise(&self.play, &null, &openings, &mut loads);
+            if pose == 0 {
+                for ((share, load), play) in shares.iter_mut().zip(loads.chunks_exact(3)).zip(&self.play) {
+                    *share = play * load.iter().map(|x| x * x).sum::<f64>().sqrt();
+                }
+                support = shares.iter().sum();
+            }
+            let taken = match pose {
+                ..AVERAGED => 1.0,
+                AVERAGED..FIXED => 0.5,
+                _ => 0.0,
+            };
+            for (target, displaced) in targets.iter_mut().zip(&displaced) {
+                *target += taken * (displaced - *target);
+            }
+            let change: Vec<f64> = targets.iter().zip(&openings).map(|(target, opening)| target - opening).collect();
+            let size = change.iter().fold(0.0, |most: f64, part| if part.abs() <= most { most } else { part.abs() });
+            let shifted = (self.tip() - tip).norm();
+            tip = self.tip();
+            error = (size <= (CLOSES * most).max(ROUNDING)).then_some(tip - self.ideal_tip);
+            let agrees = shifted <= (AGREES * most).max(ROUNDING) && pose > 0;
+            if (agrees && error.is_some()) || !size.is_finite() {
+                break;
+            }
+            self.constraints.open_by(&self.model, &change, &mut step);
+            Tree::displace(&self.model, &mut y, &step);
+        }
+        Farthest { direction: *direction, support, shares, error }
+    }
+
+    /// Matrices of the constraints at the pose `y`.
+    fn factor(&mut self, y: &[f64]) {
+        factor_at(&self.model, &mut self.constraints, &mut self.tree, HELD, y);
+    }
+}
+
+/// Orthonormal basis of the directions in which the symmetric matrix `m` exceeds `least`: along world axes as far as possible.
+fn range(m: &Mat3, least: f64) -> Vec<Vec3> {
+    let eigen = (0.5 * (m + m.transpose())).symmetric_eigen();
+    let along = |is: fn(f64, f64) -> bool| -> Vec<Vec3> {
+        let chosen = (0..3).filter(|&i| is(eigen.eigenvalues[i], least));
+        chosen.map(|i| upward(eigen.eigenvectors.column(i).into())).collect()
+    };
+    let inside = along(|value, least| value > least);
+    match (&inside[..], &along(|value, least| value <= least)[..]) {
+        ([_, _, _], _) => vec![Vec3::x(), Vec3::y(), Vec3::z()],
+        ([_, _], [normal]) => {
+            let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
+            let first = (axis - normal * normal.dot(&axis)).normalize();
+            vec![first, normal.cross(&first)]
+        }
+        _ => inside,
+    }
+}
+
+/// `v` or its opposite, with a positive largest component.
+fn upward(v: Vec3) -> Vec3 {
+    if v[v.iamax()] < 0.0 { -v } else { v }
+}

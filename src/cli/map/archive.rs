@@ -1,0 +1,116 @@
+//! A map as a NumPy archive, and as points for ParaView.
+
+use std::io;
+
+use ndarray::Array1;
+
+use super::results::Results;
+use super::vtk::Points;
+use crate::cli::output::{add_array, as_io, write_archive};
+use crate::cli::sweep::Word;
+use crate::files::{FileError, OutputFile, PendingFile};
+use crate::machine::Vec3;
+
+/// Codes of `status`.
+const NO_POSE: i64 = 1;
+const NO_REST: i64 = 2;
+
+/// Writes all arrays and `meta`.
+///
+/// # Errors
+/// Input/output.
+pub fn npz(results: &Results, target: OutputFile) -> Result<PendingFile, FileError> {
+    let shape = results.map.design().shape();
+    let with = |more: &[usize]| [&shape[..], more].concat();
+    let points = || 0..results.points.len();
+    let vectors = |of: &dyn Fn(usize) -> Vec3| -> Vec<f64> {
+        points().flat_map(|p| of(p).iter().copied().collect::<Vec<_>>()).collect()
+    };
+    let directions = results.directions();
+    // A point with fewer directions than others has NaN in their place.
+    let of_directions = |length: usize, of: &dyn Fn(&crate::mechanism::Farthest) -> Vec<f64>| -> Vec<f64> {
+        let of_point = |point: usize| {
+            let own = results.points[point].as_ref().map_or(&[][..], |own| &own.farthest);
+            let mut values: Vec<f64> = own.iter().flat_map(of).collect();
+            values.resize(directions * length, f64::NAN);
+            values
+        };
+        points().flat_map(of_point).collect()
+    };
+    let parts = |v: &Vec3| v.iter().copied().collect::<Vec<f64>>();
+    let unknown = || vec![f64::NAN; 3];
+    let status = |point: usize| match &results.points[point] {
+        Err(_) => NO_POSE,
+        Ok(own) if own.settled.is_err() => NO_REST,
+        Ok(_) => 0,
+    };
+    target.fill(|file| {
+        write_archive(*file.get_ref(), |archive| {
+            for axis in results.map.design().axes() {
+                let written = match axis.words() {
+                    Some(words) => {
+                        let words: Array1<Word> = words.into_iter().map(|word| Word(word.to_owned())).collect();
+                        archive.add_array(axis.key(), &words)
+                    }
+                    None => archive.add_array(axis.key(), &Array1::from_iter(axis.numbers())),
+                };
+                written.map_err(as_io)?;
+            }
+            add_array(archive, "status", shape.clone(), points().map(status).collect())?;
+            let unbounded = points().map(|point| results.unbounded(point).len() as i64);
+            add_array(archive, "unbounded", shape.clone(), unbounded.collect())?;
+            for (name, of) in [
+                ("ideal_tip_m", &(|p| results.ideal_tip(p)) as &dyn Fn(usize) -> Vec3),
+                ("settled_error_m", &|p| results.settled(p)),
+                ("largest_error_m", &|p| results.largest(p)),
+                ("largest_direction", &|p| results.largest_direction(p)),
+            ] {
+                add_array(archive, name, with(&[3]), vectors(of))?;
+            }
+            let joint = points().map(|point| results.largest_joint(point).map_or(-1, |joint| joint as i64));
+            add_array(archive, "largest_joint", shape.clone(), joint.collect())?;
+            let joints = results.map.scene().machine.ball_joints.len();
+            add_array(archive, "share_m", with(&[joints]), points().flat_map(|p| results.shares(p)).collect())?;
+            let direction = of_directions(3, &|farthest| parts(&farthest.direction));
+            add_array(archive, "direction", with(&[directions, 3]), direction)?;
+            let support = of_directions(1, &|farthest| vec![farthest.support]);
+            add_array(archive, "support_m", with(&[directions]), support)?;
+            let error = of_directions(3, &|farthest| farthest.error.as_ref().map_or_else(unknown, parts));
+            add_array(archive, "error_m", with(&[directions, 3]), error)?;
+            let meta = serde_json::to_vec(&results.meta()).map_err(io::Error::from)?;
+            archive.add_array("meta", &Array1::from(meta)).map_err(as_io)
+        })
+    })
+}
+
+/// Writes the points that have a pose, with their errors.
+///
+/// # Errors
+/// Input/output.
+pub fn vtk(results: &Results, target: OutputFile) -> Result<PendingFile, FileError> {
+    let posed: Vec<usize> = (0..results.points.len()).filter(|&point| results.points[point].is_ok()).collect();
+    let vectors = |of: &dyn Fn(usize) -> Vec3| posed.iter().map(|&point| of(point)).collect::<Vec<Vec3>>();
+    let numbers = |of: &dyn Fn(usize) -> f64| posed.iter().map(|&point| of(point)).collect::<Vec<f64>>();
+    let mut scalars = vec![
+        ("settled_error_size_m".to_owned(), numbers(&|p| results.settled(p).norm())),
+        ("largest_error_size_m".to_owned(), numbers(&|p| results.largest(p).norm())),
+        ("largest_joint".to_owned(), numbers(&|p| results.largest_joint(p).map_or(-1.0, |joint| joint as f64))),
+        ("unbounded".to_owned(), numbers(&|p| results.unbounded(p).len() as f64)),
+    ];
+    for (a, axis) in results.map.design().axes().iter().enumerate() {
+        let value = |point: usize| axis.number(results.map.design().indices(point)[a]);
+        scalars.push((axis.key().to_owned(), numbers(&value)));
+    }
+    let title =
+        format!("jointplay map of {}: reachable errors ignore contact between bodies", results.map.scene().name);
+    let content = Points {
+        title: &title,
+        points: vectors(&|p| results.ideal_tip(p)),
+        vectors: vec![
+            ("settled_error_m", vectors(&|p| results.settled(p))),
+            ("largest_error_m", vectors(&|p| results.largest(p))),
+        ],
+        scalars,
+    };
+    target.fill(|file| content.write(file))
+}

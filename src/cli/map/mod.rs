@@ -1,0 +1,101 @@
+//! `map`: the tip's error over the workspace, at rest and over all positions of the balls in their play.
+
+mod archive;
+mod report;
+mod results;
+mod vtk;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value as Json;
+
+use self::results::Results;
+use super::args::{MapArguments, SummaryForm};
+use super::output::check_distinct;
+use super::workers::run_jobs;
+use super::{Failure, interrupt, load, print, progress, threads};
+use crate::analysis::map::{MapPoint, PointFault, WorkspaceMap};
+use crate::files::{OutputFile, PendingFile, publish};
+
+/// Format of an output, by its extension.
+#[derive(Clone, Copy)]
+enum Format {
+    Npz,
+    Vtk,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, Failure> {
+        let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        match &*ending.to_ascii_lowercase() {
+            "npz" => Ok(Self::Npz),
+            "vtk" => Ok(Self::Vtk),
+            _ => Err(Failure::usage(format!(
+                "--out {}: a map is written as a NumPy archive or for ParaView; use the extension .npz or .vtk",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// Runs `map`.
+///
+/// # Errors
+/// Bad input, before anything is computed; later Ctrl-C or the file system.
+pub fn map(arguments: &MapArguments) -> Result<(), Failure> {
+    let outputs = arguments.out.iter().map(|path| ("--out".to_owned(), path.clone()));
+    let names: Vec<(String, PathBuf)> =
+        std::iter::once(("the scene".to_owned(), arguments.scene.name())).chain(outputs).collect();
+    check_distinct(&names)?;
+    let targets = arguments.out.iter().map(|path| {
+        let format = Format::of(path)?;
+        Ok((format, OutputFile::claim(path, arguments.force)?))
+    });
+    let targets = targets.collect::<Result<Vec<_>, Failure>>()?;
+    let scene = load(&arguments.scene)?;
+    let map = WorkspaceMap::new(scene, &arguments.over, arguments.directions);
+    let map = map.map_err(|error| Failure::usage(error.to_string()))?;
+    interrupt::listen();
+    let bar = progress::bar(!arguments.quiet, map.design().points() as u64);
+    let points = compute(&map, threads(arguments.threads), || bar.inc(1));
+    bar.finish_and_clear();
+    let results = Results { map, points: points? };
+    if let Some(Err(fault)) = results.points.first().filter(|_| results.points.iter().all(Result::is_err)) {
+        return Err(Failure::usage(format!("no point has a pose of the machine without play; at the first: {fault}")));
+    }
+    let files = targets.into_iter().map(|(format, target)| match format {
+        Format::Npz => archive::npz(&results, target),
+        Format::Vtk => archive::vtk(&results, target),
+    });
+    publish(files.collect::<Result<Vec<PendingFile>, _>>()?)?;
+    print(&match arguments.summary {
+        SummaryForm::Text => report::text(&results, &arguments.out),
+        SummaryForm::Json => format!("{:#}\n", Json::Object(report::json(&results, &arguments.out))),
+    })
+}
+
+/// All points of `map`; `done` is called after each.
+fn compute(
+    map: &WorkspaceMap,
+    threads: usize,
+    mut done: impl FnMut(),
+) -> Result<Vec<Result<MapPoint, PointFault>>, Failure> {
+    let todo: Vec<usize> = (0..map.design().points()).collect();
+    let mut points: Vec<Option<Result<MapPoint, PointFault>>> = todo.iter().map(|_| None).collect();
+    run_jobs(
+        &todo,
+        threads,
+        |point, _| Some(Ok(map.point(point))),
+        |point, result| {
+            points[point] = Some(result);
+            done();
+            Ok(())
+        },
+    )?;
+    let computed = points.iter().flatten().count();
+    let points: Option<Vec<_>> = points.into_iter().collect();
+    points.ok_or_else(|| {
+        let message = format!("interrupted with {computed} of {} points done; nothing is written", todo.len());
+        Failure::new(Failure::INTERRUPTED, message)
+    })
+}

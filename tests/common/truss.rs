@@ -1,0 +1,108 @@
+//! A point that rods hold in the plane of x and z, with play at both ends of each: a truss whose error polygon is known.
+
+use std::fmt::Write as _;
+
+/// A rod from a fixed point to the tip, in m, with the plays of its joints there, in m.
+#[derive(Clone, Copy, Debug)]
+pub struct Rod {
+    pub from: [f64; 2],
+    pub play: [f64; 2],
+}
+
+impl Rod {
+    /// Length, m, and unit vector from the tip at `tip` to the rod's fixed point.
+    pub fn way(&self, tip: [f64; 2]) -> (f64, [f64; 2]) {
+        let way = [self.from[0] - tip[0], self.from[1] - tip[1]];
+        let length = way[0].hypot(way[1]);
+        (length, way.map(|part| part / length))
+    }
+
+    /// Play of both joints together, m.
+    pub fn both(&self) -> f64 {
+        self.play[0] + self.play[1]
+    }
+}
+
+/// How the tip is kept in the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Guide {
+    /// By two slides, along x and z.
+    Plane,
+    /// By one, along x.
+    Line,
+    /// Not at all.
+    None,
+}
+
+/// The scene of `rods` that meet at `tip`; the fixed end of the first is on a driven slide along x, `base.position`, at 0.
+/// Without friction, gravity is along -z.
+pub fn truss(rods: &[Rod], tip: [f64; 2], guide: Guide, more: &str) -> String {
+    let mut text = format!(
+        "start = \"ideal\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[contact]\nball_radius = \"8 mm\"\n{more}\n[output]\nbody = \"tip\"\n"
+    );
+    let mut body = |name: &str, mass: f64, joint: &str| {
+        let _ = write!(
+            text,
+            "[[body]]\nname = \"{name}\"\nmass = \"{mass} kg\"\ninertia = \"1e-4 1e-4 1e-4 kg m^2\"\n\
+             [[joint]]\nname = \"{name}\"\nchild = \"{name}\"\n{joint}\n"
+        );
+    };
+    body("base", 1.0, "kind = \"prismatic\"\naxis = [1, 0, 0]\ndrive = { law = \"constant\", velocity = \"0 m/s\" }");
+    let [x, z] = tip;
+    let slide =
+        |axis: &str, at: f64| format!("kind = \"prismatic\"\naxis = {axis}\nstart = {{ position = \"{at} m\" }}");
+    match guide {
+        Guide::Plane => {
+            body("carriage", 0.5, &slide("[1, 0, 0]", x));
+            body("tip", 0.5, &format!("parent = \"carriage\"\n{}", slide("[0, 0, 1]", z)));
+        }
+        Guide::Line => body("tip", 0.5, &format!("parent_point = [0, 0, \"{z} m\"]\n{}", slide("[1, 0, 0]", x))),
+        Guide::None => body("tip", 0.5, &format!("kind = \"free\"\nstart = {{ position = \"{x} 0 {z} m\" }}")),
+    }
+    for (n, rod) in rods.iter().enumerate() {
+        let (_, [ux, uz]) = rod.way(tip);
+        let [x, z] = rod.from;
+        let start = format!("position = \"{x} 0 {z} m\", rotation = {{ x = [{}, 0, {}], y = [0, 1, 0] }}", -ux, -uz);
+        body(&format!("rod{}", n + 1), 2e-3, &format!("kind = \"free\"\nstart = {{ {start} }}"));
+    }
+    for (n, rod) in rods.iter().enumerate() {
+        let (length, _) = rod.way(tip);
+        let [x, z] = rod.from;
+        let ground = if n == 0 { "base" } else { "world" };
+        let sockets = [
+            ("A", format!("body = \"{ground}\", at = \"{x} 0 {z} m\""), 0.0),
+            ("B", "body = \"tip\"".to_owned(), length),
+        ];
+        for ((end, socket, at), play) in sockets.into_iter().zip(rod.play) {
+            let _ = write!(
+                text,
+                "[[ball_joint]]\nname = \"{end}{n}\"\nsocket = {{ {socket} }}\nball = {{ body = \"rod{}\", at = \"{at} 0 0 m\" }}\n\
+                 opening = [0, 1, 0]\nclearance = \"{play} m\"\n",
+                n + 1,
+                n = n + 1
+            );
+        }
+    }
+    text
+}
+
+/// Two rods at about right angles.
+pub const TWO: [Rod; 2] =
+    [Rod { from: [-0.2, 0.15], play: [0.1e-3, 0.15e-3] }, Rod { from: [0.1, 0.3], play: [0.05e-3, 0.2e-3] }];
+/// Where they meet.
+pub const TIP: [f64; 2] = [0.03, 0.02];
+
+/// Support of the errors e with |n_i . e| <= C_i of rods with the unit vectors n_i along the unit vector `u`: the least sum of C_i |l_i|
+/// over all l with sum(l_i n_i) = u, which a pair of rods attains.
+pub fn support(rods: &[Rod], tip: [f64; 2], u: [f64; 2]) -> f64 {
+    let mut least = f64::INFINITY;
+    for (i, a) in rods.iter().enumerate() {
+        for b in &rods[..i] {
+            let ((_, n), (_, m)) = (a.way(tip), b.way(tip));
+            let det = n[0] * m[1] - n[1] * m[0];
+            let (l, k) = ((u[0] * m[1] - u[1] * m[0]) / det, (n[0] * u[1] - n[1] * u[0]) / det);
+            least = least.min(a.both() * l.abs() + b.both() * k.abs());
+        }
+    }
+    least
+}
