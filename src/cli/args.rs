@@ -291,7 +291,7 @@ pub struct SensitivityArguments {
     pub output: String,
     /// Parameters that vary: a key, in which `*` stands for any characters, and a range or distribution, e.g.
     /// `joint.*.clearance=0.05mm..0.2mm`, `contact.friction=normal(0.15, 0.02)`, `joint.S1.clearance=H7/g6`; may be repeated
-    /// [default range: half to one and a half of the value].
+    /// [default range: half to one and a half of the value, within what is allowed].
     #[arg(long, value_name = "PATTERN[=RANGE]", required = true)]
     pub over: Vec<String>,
     /// Rows N of the design for the indices, N (k + 2) runs for k parameters; a power of two is best; 0 leaves them out.

@@ -26,7 +26,7 @@ pub struct ToleranceArguments {
     pub tolerances: Option<PathBuf>,
     /// Uncertain parameters: a key, in which `*` stands for any characters, and a range or distribution, e.g.
     /// `joint.*.clearance=0.05mm..0.2mm`, `contact.friction=normal(0.15, 0.02)`, `joint.S1.clearance=H7/g6`; may be repeated and
-    /// overrides --tolerances [default range: half to one and a half of the value].
+    /// overrides --tolerances [default range: half to one and a half of the value, within what is allowed].
     #[arg(long, value_name = "PATTERN[=RANGE]")]
     pub over: Vec<String>,
     /// Units of the lot, one run each; with `sobol` a power of two is best.

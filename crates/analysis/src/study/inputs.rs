@@ -22,7 +22,7 @@ pub struct Uncertainty {
     pub place: String,
     /// A key, or a pattern that stands for all numeric parameters that it matches.
     pub pattern: String,
-    /// The distribution, as written; `None`: uniform, from half to one and a half of the value.
+    /// The distribution, as written; `None`: uniform, from half to one and a half of the value, within what is allowed.
     pub distribution: Option<String>,
 }
 
@@ -103,7 +103,11 @@ impl Input {
         };
         let distribution = match text {
             None => {
-                let [low, high] = DEFAULT_RANGE.map(|part| part * nominal);
+                let allowed = |value: f64| match parameter.kind {
+                    Kind::Number { min, max, .. } => value.clamp(min, max),
+                    _ => value,
+                };
+                let [low, high] = DEFAULT_RANGE.map(|part| allowed(part * nominal));
                 Distribution::uniform(low.min(high), low.max(high))
             }
             Some(text) => match text.split_once("..").filter(|_| !text.contains('(')) {
@@ -148,4 +152,18 @@ fn keys(scene: &Scene) -> Vec<String> {
     let of_joints = joints.flat_map(|joint| contact_parts().map(move |part| format!("joint.{}.{part}", joint.name)));
     let all = own.chain(of_joints);
     all.filter(|key| matches!(scene.get(key), Ok(Value::Number(_)))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_that_nobody_gave_is_one_that_the_parameter_allows() {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        let ends = |key: &str| Input::new(&scene, key, None).expect("a range").distribution.support();
+        assert_eq!(ends("contact.restitution"), (0.45, 1.0));
+        let nominal = scene.machine.ball_joints[0].contact.clearance;
+        assert_eq!(ends("joint.A.clearance"), (0.5 * nominal, 1.5 * nominal));
+    }
 }
