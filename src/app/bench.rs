@@ -1,16 +1,21 @@
-//! The chaos bench: phase portrait and Poincaré section of the running scene, sweeps in the background, and a twin run.
+//! The bench beside the picture: the chaos bench (phase portrait and Poincaré section of the running scene, sweeps in the background,
+//! a twin run), or what play costs.
 
 mod asked;
 mod coordinate;
+mod cost_study;
+mod costs;
 mod diagram;
 mod divergence;
 mod plane;
 mod portrait;
+mod shares;
 mod sweep;
 mod swept;
 mod throttle;
+mod tornado;
 
-use eframe::egui::{CollapsingHeader, RichText, Ui};
+use eframe::egui::{Button, CollapsingHeader, Response, RichText, Ui};
 
 use super::host::Host;
 use super::player::Player;
@@ -19,6 +24,8 @@ use crate::analysis::ready::ReadySweep;
 use crate::scene::Scene;
 pub use asked::Asked;
 use coordinate::Coordinate;
+pub use cost_study::CostStudy;
+use costs::Costs;
 use portrait::Portrait;
 use sweep::SweepPanel;
 pub use swept::Swept;
@@ -29,17 +36,51 @@ pub struct Bench {
     coordinate: Coordinate,
     portrait: Portrait,
     sweep: SweepPanel,
+    /// What play costs, while that is open in place of the chaos bench.
+    costs: Option<Box<Costs>>,
 }
 
 impl Bench {
-    /// Takes messages from a sweep; returns whether one is running.
+    /// Takes messages from computations; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
-        self.sweep.update(host)
+        self.costs.take_if(|costs| !costs.stays_open());
+        let computes = self.costs.as_mut().is_some_and(|costs| costs.update(host));
+        self.sweep.update(host) || computes
     }
 
     /// Reports a frame at time `now`, s; `moves`: whether the picture is animated.
     pub fn seen(&mut self, now: f64, moves: bool) {
         self.sweep.seen(now, moves);
+        if let Some(costs) = &mut self.costs {
+            costs.seen(now, moves);
+        }
+    }
+
+    /// Opens or closes what play costs, in place of the chaos bench.
+    pub(super) fn show_costs(&mut self, open: bool) {
+        self.costs = if open { Some(self.costs.take().unwrap_or_default()) } else { None };
+    }
+
+    /// Whether what play costs is shown.
+    pub fn shows_costs(&self) -> bool {
+        self.costs.as_ref().is_some_and(|costs| !costs.is_aside())
+    }
+
+    /// Keeps the results of what play costs while a slider in a small window, or a presentation, takes its place.
+    pub(super) fn step_aside(&mut self) {
+        if let Some(costs) = &mut self.costs {
+            costs.step_aside();
+        }
+    }
+
+    /// The latest study of what play costs.
+    pub fn cost_study(&self) -> Option<&CostStudy> {
+        self.costs.as_ref()?.study()
+    }
+
+    /// Whether such a study is running.
+    pub fn is_computing_costs(&self) -> bool {
+        self.costs.as_ref().is_some_and(|costs| costs.is_running())
     }
 
     /// Starts a ready sweep over the displayed `scene`.
@@ -79,15 +120,21 @@ impl Bench {
 
     /// The whole bench; returns the user's request to the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
-        const TITLE: &str = "Chaos bench";
         let title = ui.horizontal_wrapped(|ui| {
-            let title = ui.label(RichText::new(TITLE).strong());
-            ui.label("Coordinate");
-            self.coordinate.ui(ui);
+            let title = self.tabs(ui);
+            if self.costs.is_none() {
+                ui.label("Coordinate");
+                self.coordinate.ui(ui);
+            }
             title
         });
-        spoken::titled(ui, &title.inner, TITLE);
-        let Self { coordinate, portrait, sweep } = self;
+        if let Some((tab, title)) = title.inner {
+            spoken::titled(ui, &tab, title);
+        }
+        let Self { coordinate, portrait, sweep, costs } = self;
+        if let Some(costs) = costs {
+            return costs.ui(ui, player);
+        }
         let help = "How fast neighbouring motions of the running scene diverge";
         part(ui, "Divergence of neighbouring motions", help, |ui| {
             divergence::ui(ui, player);
@@ -98,6 +145,23 @@ impl Bench {
         });
         let help = "The scene at many values of a parameter: the bifurcation diagram";
         part(ui, "Sweep", help, |ui| sweep.ui(ui, player, *coordinate)).flatten()
+    }
+
+    /// Choice between the chaos bench and what play costs; returns the chosen one, which is the heading.
+    fn tabs(&mut self, ui: &mut Ui) -> Option<(Response, &'static str)> {
+        let (open, mut heading) = (self.costs.is_some(), None);
+        for (costs, title, help) in [
+            (false, "Chaos bench", "Phase portrait, Poincaré section, sweeps, twin run (key B)"),
+            (true, "What play costs", "How far an output moves with the play of each joint alone (key W)"),
+        ] {
+            let tab = ui.add(Button::selectable(costs == open, title)).on_hover_text(help);
+            if costs == open {
+                heading = Some((tab, title));
+            } else if tab.clicked() {
+                self.show_costs(costs);
+            }
+        }
+        heading
     }
 }
 

@@ -19,7 +19,7 @@ use crate::units::{format_quantity_digits, from_display, to_display};
 /// Shown with its resulting accuracy.
 const PRESET: &str = "solver.preset";
 /// Parameters shown first.
-const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
+pub(super) const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
 
 /// Width from which a touch slider has its value beside it, points.
 const BESIDE: f32 = 220.0;
@@ -34,6 +34,8 @@ const MARGIN: i8 = 6;
 pub struct Controls {
     drafts: HashMap<String, Draft>,
     joint: usize,
+    /// Key of a joint whose slider comes into sight, with the focus.
+    revealed: Option<String>,
 }
 
 #[derive(Default)]
@@ -63,6 +65,12 @@ impl Controls {
     pub fn clear(&mut self) {
         self.drafts.clear();
         self.joint = 0;
+    }
+
+    /// Brings the slider of `key`, which belongs to a ball joint, into sight and focuses it.
+    pub fn reveal(&mut self, key: &str) {
+        self.drafts.remove(key);
+        self.revealed = Some(key.to_owned());
     }
 
     /// Discards only partially typed values.
@@ -145,7 +153,13 @@ impl Controls {
             return;
         }
         self.joint = self.joint.min(names.len() - 1);
-        let header = ui.collapsing(RichText::new("One joint").strong(), |ui| {
+        if let Some(key) = &self.revealed {
+            let is_own =
+                |name: &String| key.strip_prefix("joint.").is_some_and(|rest| rest.starts_with(&format!("{name}.")));
+            self.joint = names.iter().position(is_own).unwrap_or(self.joint);
+        }
+        let opens = self.revealed.is_some().then_some(true);
+        let header = egui::CollapsingHeader::new(RichText::new("One joint").strong()).open(opens).show(ui, |ui| {
             ui.horizontal(|ui| {
                 ui.label("Joint");
                 ComboBox::from_id_salt("one joint")
@@ -164,6 +178,9 @@ impl Controls {
                 self.control(ui, player, parameter, &format!("joint.{joint}.{last}"));
             }
         });
+        if header.fully_open() {
+            self.revealed = None;
+        }
         header.header_response.on_hover_text("Values of one ball joint only; they override those of the whole scene.");
     }
 
@@ -243,6 +260,10 @@ impl Controls {
             .show_value(false);
         let response = keys::slider(ui, slider);
         tooltip(ui, &response, player, row);
+        if self.revealed.as_deref() == Some(row.key) {
+            response.request_focus();
+            response.scroll_to_me(None);
+        }
         let changed = response.changed();
         spoken::value(&response, &row.shown());
         response.accessible_name(&row.name);

@@ -98,7 +98,7 @@ impl App {
                 (
                     &mut self.show_bench,
                     "Bench",
-                    "Chaos bench shown or hidden (key B): phase portrait, Poincaré section, sweeps, twin run",
+                    "Bench shown or hidden: chaos bench (key B) with sweeps and twin run; what play costs (key W)",
                 ),
             ];
             for (on, name, help) in panels {

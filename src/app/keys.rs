@@ -33,6 +33,7 @@ pub enum Action {
     Panel,
     Plots,
     Bench,
+    Costs,
     Present,
     /// Go to the next or the previous step of a lesson.
     TurnPage {
@@ -62,7 +63,7 @@ const fn bind(group: Group, key: Key, action: Action, written: &'static str, hel
 }
 
 /// All key bindings.
-pub const BINDINGS: [Binding; 41] = [
+pub const BINDINGS: [Binding; 42] = [
     bind(Group::Run, Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(Group::Run, Key::ArrowRight, Action::Step, "Right arrow", "One step of the solver"),
     bind(Group::Run, Key::ArrowLeft, Action::StepBack, "Left arrow", "Undo the latest step"),
@@ -108,6 +109,7 @@ pub const BINDINGS: [Binding; 41] = [
     bind(Group::Window, Key::C, Action::Panel, "C", "Controls shown or hidden"),
     bind(Group::Window, Key::P, Action::Plots, "P", "Plots shown or hidden; in a presentation the next of them"),
     bind(Group::Window, Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
+    bind(Group::Window, Key::W, Action::Costs, "W", "What play costs, shown or hidden"),
     bind(
         Group::Window,
         Key::F5,

@@ -38,7 +38,7 @@ pub enum Sheet {
     Controls,
     /// Plots.
     Plots,
-    /// Chaos bench.
+    /// Chaos bench, or what play costs.
     Bench,
     /// The lesson in progress.
     Lesson,
@@ -414,7 +414,7 @@ impl App {
         let mut tabs = vec![
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
             (Sheet::Plots, "Plots", "Plots shown or hidden"),
-            (Sheet::Bench, "Bench", "Chaos bench shown or hidden"),
+            (Sheet::Bench, "Bench", "Chaos bench and what play costs, shown or hidden"),
         ];
         if self.course().is_some() {
             tabs.insert(0, (Sheet::Lesson, "Lesson", "Lesson shown or hidden"));

@@ -547,6 +547,21 @@ impl App {
         &mut self.plots
     }
 
+    /// Whether what play costs is shown.
+    pub fn shows_costs(&self) -> bool {
+        self.bench.shows_costs()
+    }
+
+    /// Shows or closes what play costs.
+    pub fn show_costs(&mut self, open: bool) {
+        self.bench.show_costs(open);
+        if self.compact {
+            self.sheet = open.then_some(Sheet::Bench);
+        } else {
+            self.show_bench = open;
+        }
+    }
+
     /// The chaos bench.
     pub fn bench(&self) -> &Bench {
         &self.bench
@@ -568,6 +583,18 @@ impl App {
     fn bench_asks(&mut self, asked: bench::Asked) {
         match asked {
             bench::Asked::Section(load) => self.start_load(load),
+            bench::Asked::Value { key, text } => match self.player.set(&key, &text) {
+                Err(error) => self.problem = Some(error.to_string()),
+                Ok(_) => {
+                    self.controls.reveal(&key);
+                    if self.compact {
+                        self.bench.step_aside();
+                        self.sheet = Some(Sheet::Controls);
+                    } else {
+                        self.show_controls = true;
+                    }
+                }
+            },
             bench::Asked::Ready(sweep) => match sweep.scene() {
                 Err(error) => self.problem = Some(error.to_string()),
                 Ok(scene) => {
@@ -899,6 +926,7 @@ impl App {
             }
             Action::TurnPage { forward } => self.turn_page(forward),
             Action::Present => self.present(ctx, !self.is_presenting()),
+            Action::Costs => self.show_costs(!self.shows_costs()),
             Action::Bench if self.compact => self.fold(Sheet::Bench),
             Action::Bench => self.show_bench = !self.show_bench,
             Action::Plots if self.is_presenting() => self.turn_plot(),

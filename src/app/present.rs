@@ -71,6 +71,7 @@ impl App {
                 self.viewport.options.arrows.thickness = before.thickness;
             }
             None => {
+                self.bench.step_aside();
                 let height = screen_height(ctx);
                 self.presentation = Some(Presentation {
                     zoom: ctx.zoom_factor(),

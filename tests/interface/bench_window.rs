@@ -18,7 +18,7 @@ use jointplay::analysis::ready::READY;
 use jointplay::analysis::task::{Job, Message, perform};
 use jointplay::app::{App, DesktopHost, Host, Link, OpenedFile, Player, Replay, Running, Verdict};
 
-/// Computes at once, shared by so many, and is heard of as many points of a sweep as the test allows: it is neither too quick nor
+/// Computes at once, shared by so many, and is heard of as many points of a sweep, or runs of a study, as the test allows: it is neither too quick nor
 /// too slow.
 struct Held(Rc<Cell<usize>>, usize);
 
@@ -49,7 +49,7 @@ impl Host for Held {
 impl Running for Saying {
     fn poll(&mut self) -> Option<Message> {
         let Self(said, points) = self;
-        if let Message::Point(_) = said.front()? {
+        if let Message::Point(_) | Message::Run(_) = said.front()? {
             points.set(points.get().checked_sub(1)?);
         }
         said.pop_front()
@@ -63,12 +63,12 @@ impl Running for Saying {
 }
 
 /// Gives the window a host that is held, and the number of points that it may still tell.
-fn hold(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
+pub fn hold(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
     hold_shared(harness, 1)
 }
 
 /// The same, of a host that shares sweeps among so many.
-fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>> {
+pub fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>> {
     let points = Rc::new(Cell::new(0));
     let host = Held(points.clone(), workers);
     harness.state_mut().set_host(Box::new(host));
@@ -76,7 +76,7 @@ fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>
 }
 
 /// The window on `scene` with some changes, paused at t = 0, its bench open.
-fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+pub fn sized(scene: &str, changes: &[(&str, &str)], size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut harness = opened(scene, changes, size, theme, crate::common::looks::<100>);
     harness.state_mut().set_host(Box::new(DesktopHost::default()));
     harness.run();
@@ -90,15 +90,15 @@ fn window(scene: &str, changes: &[(&str, &str)]) -> Harness<'static, App> {
     sized(scene, changes, [1400.0, 1600.0], egui::Theme::Light)
 }
 
-const FAST: (&str, &str) = ("spcmm.frequency", "5 Hz");
+pub const FAST: (&str, &str) = ("spcmm.frequency", "5 Hz");
 
-fn click(harness: &mut Harness<'_, App>, role: Role, label: &str) {
+pub fn click(harness: &mut Harness<'_, App>, role: Role, label: &str) {
     harness.get_by_role_and_label(role, label).click();
     harness.step();
     harness.step();
 }
 
-fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
+pub fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
     harness.get_by_role_and_label(Role::SpinButton, label).set_value_accesskit(number);
     harness.step();
     harness.step();
@@ -114,7 +114,7 @@ fn sweep(harness: &mut Harness<'_, App>, from: &str, to: &str, values: f64) {
     click(harness, Role::Button, "Start sweep");
 }
 
-fn wait(harness: &mut Harness<'_, App>, mut done: impl FnMut(&App) -> bool) {
+pub fn wait(harness: &mut Harness<'_, App>, mut done: impl FnMut(&App) -> bool) {
     let begun = std::time::Instant::now();
     while !done(harness.state()) {
         assert!(begun.elapsed().as_secs() < 600, "no end");

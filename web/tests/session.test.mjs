@@ -289,6 +289,15 @@ test('computations run in workers: they say how far they are, the page goes on, 
     await lab.activate('button', 'Cancel sweep');
     await lab.find('Button', 'Start sweep');
     await ended();
+
+    // The tornado fills run by run, and ends with its panel.
+    await lab.activate('button', 'What play costs');
+    for (const [name, value] of [['Duration', 0.06], ['Observed from', 0.02]]) await lab.adjust('spinbutton', name, { value });
+    await lab.activate('button', 'Start runs');
+    for (let run = 0; run < 3; run += 1) await lab.hear('Run');
+    await lab.until(async () => (await lab.widgets()).some(({ label }) => /; 3 of 7 runs$/.test(label)), 'no runs are shown');
+    await lab.activate('button', 'Bench');
+    await ended();
     await lab.close();
 });
 

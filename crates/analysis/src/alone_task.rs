@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::orbit::Orbit as _;
 use super::source::{SceneSource, TaskFault};
-use super::study::{Alone, Output, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
+use super::study::{Alone, Output, RunSpan, StudyRuns, outputs};
 use super::sweep_task::{STEPS, Share};
 use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
 
@@ -15,8 +15,10 @@ use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
 pub struct AloneTask {
     /// The scene.
     pub scene: SceneSource,
-    /// Parameters that vary.
-    pub over: Vec<Uncertainty>,
+    /// Keys of the parameters that vary.
+    pub keys: Vec<String>,
+    /// Lower and upper end of each, SI.
+    pub ends: Vec<[f64; 2]>,
     /// Names of outputs, as on the command line.
     pub outputs: Vec<String>,
     /// Observed part of each run.
@@ -26,27 +28,16 @@ pub struct AloneTask {
 /// The accepted runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AlonePlan {
-    /// Parameters in order.
-    pub inputs: Vec<AloneInput>,
+    /// Value of each parameter in the scene, SI.
+    pub nominal: Vec<f64>,
     /// SI unit of each requested output, "" for a number; `None` for an output that the scene does not have.
     pub units: Vec<Option<String>>,
-}
-
-/// A varied parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AloneInput {
-    /// Key.
-    pub key: String,
-    /// Value in the scene, SI.
-    pub nominal: f64,
-    /// Lower and upper end of its distribution, SI.
-    pub ends: [f64; 2],
 }
 
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AloneRun {
-    /// 0: the values of the scene; 1 + 2 i and 2 + 2 i: input i at its lower and at its upper end.
+    /// 0: the values of the scene; 1 + 2 i and 2 + 2 i: parameter i at its lower and at its upper end.
     pub index: usize,
     /// The requested outputs, SI; `None` for one that the scene does not have, and if the run did not start or diverged.
     pub outputs: Vec<Option<f64>>,
@@ -79,19 +70,14 @@ pub(super) async fn run(
     }
     let scene = task.scene.scene()?;
     Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
-    let inputs = inputs(&scene, &task.over)?;
+    let alone = Alone::between(&scene, &task.keys, &task.ends)?;
     // Another scene may have a probe, or an energy ledger.
     let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut found| found.pop()));
     let known: Vec<Option<Output>> = known.collect();
     let own: Vec<Output> = known.iter().flatten().cloned().collect();
-    let alone = Alone::new(&inputs);
-    let runs = StudyRuns::new(&scene, &inputs, &own, task.span, &alone.rows())?;
+    let runs = StudyRuns::new(&scene, &task.keys, &own, task.span, &alone.rows())?;
     say(AloneMessage::Plan(AlonePlan {
-        inputs: inputs
-            .into_iter()
-            .zip(alone.ends())
-            .map(|(input, ends)| AloneInput { key: input.key, nominal: input.nominal, ends: *ends })
-            .collect(),
+        nominal: alone.nominal().to_vec(),
         units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
     }))?;
     let all = runs.sweep().design().blocks();
@@ -115,17 +101,21 @@ pub(super) async fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::{Uncertainty, inputs};
     use crate::task::{Job, Message, perform};
     use jointplay_scene::Scene;
 
     const OUTPUTS: [&str; 3] = ["tip-error", "peak-force", "impacts"];
 
-    fn task(scene: &str, over: &str) -> AloneTask {
+    /// The parameters that match a pattern, by half of their values.
+    fn task(scene: &str, pattern: &str) -> AloneTask {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load(scene, if scene == "spcmm" { &changes } else { &[] }).expect("built in");
+        let varied = inputs(&scene, &[Uncertainty::parse("--over", pattern)]).expect("parameters");
         AloneTask {
             scene: SceneSource::of(&scene),
-            over: vec![Uncertainty::parse("--over", over)],
+            keys: varied.iter().map(|input| input.key.clone()).collect(),
+            ends: Alone::new(&varied).ends().to_vec(),
             outputs: OUTPUTS.map(str::to_owned).to_vec(),
             span: RunSpan { duration: 0.06, from: 0.02 },
         }
@@ -164,10 +154,9 @@ mod tests {
         let first = whole.iter().find(|message| matches!(message, Message::Run(_)));
         assert!(matches!(first, Some(Message::Run(AloneRun { index: 0, .. }))));
         let scene = task.scene.scene().expect("built in");
-        let varied = inputs(&scene, &task.over).expect("joints");
         let kept: Vec<Output> = OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
-        let alone = Alone::new(&varied);
-        let study = StudyRuns::new(&scene, &varied, &kept, task.span, &alone.rows()).expect("runs");
+        let alone = Alone::between(&scene, &task.keys, &task.ends).expect("ends");
+        let study = StudyRuns::new(&scene, &task.keys, &kept, task.span, &alone.rows()).expect("runs");
         let expected: Vec<AloneRun> = (0..study.sweep().design().blocks())
             .map(|index| {
                 let mut block = study.sweep().begin(index);
@@ -199,8 +188,8 @@ mod tests {
             _ => None,
         });
         let plan = plan.expect("a plan");
-        assert_eq!(plan.inputs[1].key, "joint.S2.clearance");
-        assert_eq!(plan.inputs[1].ends, [0.5, 1.5].map(|part| part * plan.inputs[1].nominal));
+        assert_eq!(task.keys[1], "joint.S2.clearance");
+        assert_eq!(task.ends[1], [0.5, 1.5].map(|part| part * plan.nominal[1]));
         assert_eq!(plan.units, ["m", "N", ""].map(|unit| Some(unit.to_owned())));
     }
 
@@ -219,12 +208,13 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told() {
         let good = || task("spcmm", "joint.*.clearance");
-        let of = |over: &str| task("spcmm", over);
+        let of = |key: &str, ends| AloneTask { keys: vec![key.to_owned()], ends: vec![ends], ..good() };
         let spans = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
         for (task, words) in [
-            (of("joint.S9.clearance"), "--over joint.S9.clearance: "),
-            (of("joint.*.clearance=0.4mm..0.2mm"), "joint.S1.clearance: the lower limit"),
-            (of("joint.*.friction=0..99"), "joint.S1.friction: out of range"),
+            (of("joint.S9.clearance", [1e-4, 2e-4]), "joint.S9.clearance: "),
+            (of("joint.S1.clearance", [4e-4, 2e-4]), "joint.S1.clearance: the lower limit"),
+            (of("joint.S1.friction", [0.0, 99.0]), "joint.S1.friction: 99: out of range"),
+            (of("solver.preset", [0.0, 1.0]), "solver.preset: its values are no real numbers"),
             (spans(0.1, 0.1), "runs of 0.1 s, observed from 0.1 s on"),
             (spans(f64::NAN, 0.0), "must begin before the end"),
         ] {

@@ -137,31 +137,30 @@ pub struct StudyRuns {
 }
 
 impl StudyRuns {
-    /// A run for each of `rows`, which give every input a value, SI. All start cold from the scene's own start.
+    /// A run for each of `rows`, which give each of `keys` a value, SI. All start cold from the scene's own start.
     ///
     /// # Errors
     /// A value that its parameter does not accept.
     pub fn new(
         scene: &Scene,
-        inputs: &[Input],
+        keys: &[String],
         outputs: &[Output],
         span: RunSpan,
         rows: &[Vec<f64>],
     ) -> Result<Self, StudyError> {
-        for (i, input) in inputs.iter().enumerate() {
-            let parameter = scene.parameter(&input.key)?;
+        for (i, key) in keys.iter().enumerate() {
+            let parameter = scene.parameter(key)?;
             for row in rows {
                 let value = Value::Number(row[i]);
                 parameter.check(&value).map_err(|error| StudyError::Drawn {
-                    key: input.key.clone(),
+                    key: key.clone(),
                     value: parameter.show(&value),
                     error,
                 })?;
             }
         }
-        let keys: Vec<String> = inputs.iter().map(|input| input.key.clone()).collect();
         let values: Vec<Vec<Value>> = rows.iter().map(|row| row.iter().copied().map(Value::Number).collect()).collect();
-        let design = Design::table(scene, &keys, &values, &[Start::Cold])?;
+        let design = Design::table(scene, keys, &values, &[Start::Cold])?;
         let span = Span::Duration { duration: span.duration, from: span.from };
         let sweep = Sweep::untried(scene.clone(), design, protocol(outputs, span))?;
         let names: Vec<&str> = sweep.layout().columns().iter().map(|column| &column.name[..]).collect();

@@ -9,4 +9,11 @@ pub enum Asked {
     Section(Load),
     /// Start a ready sweep with its scene.
     Ready(&'static ReadySweep),
+    /// Set a parameter, and show its slider.
+    Value {
+        /// Key.
+        key: String,
+        /// Value, as a user writes it.
+        text: String,
+    },
 }

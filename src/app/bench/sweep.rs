@@ -1,19 +1,19 @@
 //! Background sweep: settings, progress, and the points so far.
 
-use eframe::egui::{Align, Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, TextEdit, Ui, vec2};
 
 use super::asked::Asked;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
+use super::shares::Shares;
 use super::swept::{Swept, start_word};
-use super::throttle::Throttle;
 use crate::analysis::design::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
 use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;
-use crate::analysis::sweep_task::{Share, SweepTask};
+use crate::analysis::sweep_task::SweepTask;
 use crate::analysis::task::{Job, Message};
-use crate::app::host::{Host, Running};
+use crate::app::host::Host;
 use crate::app::layout::reserved;
 use crate::app::load::Load;
 use crate::app::player::Player;
@@ -25,9 +25,6 @@ const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 
 /// Width of the start/stop button, points; fixed, so that it does not move.
 const GO: f32 = 120.0;
-
-/// Elapsed time below which no remaining time is estimated, s.
-const SOON: f64 = 1.0;
 
 /// Settings of the next sweep.
 struct Settings {
@@ -43,23 +40,12 @@ struct Settings {
     exponent: bool,
 }
 
-/// A running sweep, shared by several workers.
+/// A running sweep.
 struct Sweeping {
     task: SweepTask,
-    shares: Vec<Sharing>,
+    shares: Shares,
     /// Whether its ranges are known.
     begun: bool,
-    throttle: Throttle,
-    /// Time of the first frame since the start, and of the latest frame, s.
-    since: Option<f64>,
-    now: f64,
-}
-
-/// A worker, and its completed fraction of the whole sweep.
-struct Sharing {
-    running: Box<dyn Running>,
-    done: f64,
-    finished: bool,
 }
 
 /// The panel.
@@ -80,64 +66,49 @@ impl SweepPanel {
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some(task) = self.asked.take() {
             self.problem = None;
-            self.running = Sweeping::start(task, host);
+            let shares = Shares::start(host, usize::MAX, |share| Job::Sweep(task.clone(), share));
+            self.running = shares.map(|shares| Sweeping { task, shares, begun: false });
             if self.running.is_none() {
                 self.problem = Some("Sweeps cannot be computed here".to_owned());
             }
         }
-        let Some(sweeping) = &mut self.running else {
+        let Some(Sweeping { task, shares, begun }) = &mut self.running else {
             return false;
         };
-        for sharing in &mut sweeping.shares {
-            while let Some(message) = sharing.running.poll() {
-                match message {
-                    Message::Progress(done) => sharing.done = done,
-                    Message::Ranges(ranges) if !sweeping.begun => {
-                        sweeping.begun = true;
-                        let task = &sweeping.task;
-                        self.swept = ranges.into_iter().next().map(|range| Swept {
-                            task: task.clone(),
-                            points: vec![None; range.count],
-                            scene: task.scene.scene().ok(),
-                            range,
-                        });
-                        self.diagram.clear();
-                    }
-                    Message::Point(point) => {
-                        if let Some(swept) = &mut self.swept
-                            && let Some(slot) = swept.points.get_mut(point.index)
-                        {
-                            *slot = Some(*point);
-                            self.diagram.renew();
-                        }
-                    }
-                    Message::Ranges(_) | Message::Presets(_) => {}
-                    Message::Done => sharing.finished = true,
-                    Message::Failed(why) => {
-                        self.problem = Some(in_words(&why, &sweeping.task));
-                        self.running = None;
-                        return false;
-                    }
+        let polled = shares.poll(|message| match message {
+            Message::Ranges(ranges) if !*begun => {
+                *begun = true;
+                self.swept = ranges.into_iter().next().map(|range| Swept {
+                    task: task.clone(),
+                    points: vec![None; range.count],
+                    scene: task.scene.scene().ok(),
+                    range,
+                });
+                self.diagram.clear();
+            }
+            Message::Point(point) => {
+                if let Some(swept) = &mut self.swept
+                    && let Some(slot) = swept.points.get_mut(point.index)
+                {
+                    *slot = Some(*point);
+                    self.diagram.renew();
                 }
             }
+            _ => {}
+        });
+        match polled {
+            Ok(true) => return true,
+            Ok(false) => {}
+            Err(why) => self.problem = Some(in_words(&why, task)),
         }
-        if sweeping.shares.iter().all(|sharing| sharing.finished) {
-            self.running = None;
-        }
-        self.running.is_some()
+        self.running = None;
+        false
     }
 
     /// Reports a frame at `now`, s, so that a running sweep yields time to the picture; `moves`: whether the picture is animated.
     pub fn seen(&mut self, now: f64, moves: bool) {
-        let Some(sweeping) = &mut self.running else {
-            return;
-        };
-        sweeping.since.get_or_insert(now);
-        sweeping.now = now;
-        if let Some(rest) = sweeping.throttle.frame(now, moves) {
-            for sharing in &mut sweeping.shares {
-                sharing.running.rest(rest);
-            }
+        if let Some(sweeping) = &mut self.running {
+            sweeping.shares.seen(now, moves);
         }
     }
 
@@ -351,20 +322,8 @@ impl SweepPanel {
         let clicked = ui.horizontal(|ui| {
             let button = Button::new(name).min_size(vec2(GO, 0.0));
             let clicked = ui.add(button).on_hover_text(help).clicked();
-            if running {
-                let running = self.running.as_ref();
-                let done = running.map_or(0.0, Sweeping::done);
-                let mut words = format!("{} %", (100.0 * done).floor());
-                if let Some(left) = running.and_then(Sweeping::time_left) {
-                    words += &format!(", {left}");
-                }
-                let bar = ProgressBar::new(done as f32).text(words);
-                ui.add(bar.desired_width(ui.available_width()))
-                    .on_hover_text(
-                        "Fraction of the points computed so far. While the picture moves, the sweep leaves time for \
-                         20 frames per second; it is faster when the run is paused",
-                    )
-                    .accessible_name("Swept so far");
+            if let Some(sweeping) = &self.running {
+                sweeping.shares.ui(ui, "Swept so far", "points");
             }
             clicked
         });
@@ -388,30 +347,6 @@ impl SweepPanel {
                 exponent: settings.exponent,
             });
         }
-    }
-}
-
-impl Sweeping {
-    /// Starts `task` on all workers of `host`; `None` if that is impossible.
-    fn start(task: SweepTask, host: &mut dyn Host) -> Option<Self> {
-        let of = host.workers().max(1);
-        let share = |index| {
-            let running = host.start(Job::Sweep(task.clone(), Share { index, of }))?;
-            Some(Sharing { running, done: 0.0, finished: false })
-        };
-        let shares: Option<Vec<_>> = (0..of).map(share).collect();
-        Some(Self { shares: shares?, task, begun: false, throttle: Throttle::default(), since: None, now: 0.0 })
-    }
-
-    /// Completed fraction of the points, 0 to 1.
-    fn done(&self) -> f64 {
-        self.shares.iter().map(|sharing| sharing.done).sum()
-    }
-
-    /// Estimated remaining time at the average speed so far; `None` while too little is known.
-    fn time_left(&self) -> Option<String> {
-        let (spent, done) = (self.now - self.since?, self.done());
-        (spent >= SOON && done > 0.0).then(|| in_time(spent * (1.0 - done).max(0.0) / done))
     }
 }
 
@@ -463,16 +398,6 @@ impl Settings {
     }
 }
 
-/// Formats a remaining time, s.
-fn in_time(left: f64) -> String {
-    match left {
-        _ if left < 10.0 => "a few seconds left".to_owned(),
-        _ if left < 90.0 => format!("about {} s left", 10.0 * (left / 10.0).round()),
-        _ if left < 5400.0 => format!("about {} min left", (left / 60.0).round()),
-        _ => format!("about {} h left", (left / 3600.0).round()),
-    }
-}
-
 /// Buttons of the ready sweeps with descriptions; returns the clicked one.
 fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
     let mut chosen = None;
@@ -511,21 +436,4 @@ fn in_words(why: &str, task: &SweepTask) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
     first.unwrap_or_default() + letters.as_str()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_time_left_is_told_no_finer_than_it_is_known() {
-        for (left, words) in [
-            (3.0, "a few seconds left"),
-            (42.0, "about 40 s left"),
-            (130.0, "about 2 min left"),
-            (7500.0, "about 2 h left"),
-        ] {
-            assert_eq!(in_time(left), words);
-        }
-    }
 }

@@ -39,6 +39,7 @@ impl App {
         if self.before_lesson.is_some() {
             return;
         }
+        self.bench.show_costs(false);
         self.before_lesson = Some(Box::new(WindowBefore {
             panels: [self.show_controls, self.show_plots, self.show_bench],
             sheet: self.sheet,

@@ -137,7 +137,8 @@ impl Study {
     /// # Errors
     /// A row that the scene does not accept; Ctrl-C; the file system.
     pub fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Failure> {
-        let study = StudyRuns::new(&self.scene, &self.inputs, &self.outputs, self.span, &rows)?;
+        let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
+        let study = StudyRuns::new(&self.scene, &keys, &self.outputs, self.span, &rows)?;
         let sweep = study.sweep();
         let blocks: Vec<usize> = (0..sweep.design().blocks()).collect();
         let beside = self.out.with_added_extension(stage);

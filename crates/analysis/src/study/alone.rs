@@ -1,6 +1,9 @@
 //! Runs that show the effect of each parameter alone.
 
-use super::Input;
+use super::StudyError;
+use super::inputs::{Input, check_count, check_end, real_parameter};
+use crate::distribution::Distribution;
+use jointplay_scene::Scene;
 
 /// Fractions of all values taken for the ends of a distribution without limits.
 pub const ENDS: [f64; 2] = [0.025, 0.975];
@@ -21,6 +24,31 @@ impl Alone {
             [if low.is_finite() { low } else { lower }, if high.is_finite() { high } else { upper }]
         });
         Self { nominal: inputs.iter().map(|input| input.nominal).collect(), ends: ends.collect() }
+    }
+
+    /// The `ends` of the parameters `keys` of `scene`, SI. The page needs no other distribution.
+    ///
+    /// # Errors
+    /// With its key: no such real parameter, an end that it does not accept, or a lower end that is not below the upper one.
+    /// More than 64 parameters.
+    pub fn between(scene: &Scene, keys: &[String], ends: &[[f64; 2]]) -> Result<Self, StudyError> {
+        check_count(keys.len())?;
+        let nominal = keys.iter().zip(ends).map(|(key, [low, high])| {
+            let checked = || {
+                let (parameter, nominal) = real_parameter(scene, key)?;
+                Distribution::uniform(*low, *high)?;
+                check_end(parameter, *low)?;
+                check_end(parameter, *high)?;
+                Ok(nominal)
+            };
+            checked().map_err(|error| StudyError::At { place: key.clone(), error: Box::new(error) })
+        });
+        Ok(Self { nominal: nominal.collect::<Result<_, _>>()?, ends: ends.to_vec() })
+    }
+
+    /// Value of each input in the scene, SI.
+    pub fn nominal(&self) -> &[f64] {
+        &self.nominal
     }
 
     /// Lower and upper end of each input, SI.

@@ -1,12 +1,10 @@
 //! The uncertain parameters of a study.
 
-use serde::{Deserialize, Serialize};
-
 use super::StudyError;
 use crate::distribution::Distribution;
 use crate::iso286::{Fit, FitError};
 use jointplay_physics::simulate::matches_pattern;
-use jointplay_scene::{Kind, Scene, Value, contact_parts};
+use jointplay_scene::{Kind, Parameter, Scene, Value, contact_parts};
 
 /// Range of an input without one of its own, over its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
@@ -16,7 +14,7 @@ const MOST_INPUTS: usize = 64;
 const CAPABILITY: f64 = 1.0;
 
 /// Parameters with a distribution, as requested.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Uncertainty {
     /// Option, or file with line, for messages.
     pub place: String,
@@ -68,10 +66,28 @@ pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, St
             }
         }
     }
-    if inputs.len() > MOST_INPUTS {
-        return Err(StudyError::TooMany { found: inputs.len(), most: MOST_INPUTS });
-    }
+    check_count(inputs.len())?;
     Ok(inputs)
+}
+
+/// Requires no more inputs than a study varies.
+pub(super) fn check_count(found: usize) -> Result<(), StudyError> {
+    if found > MOST_INPUTS { Err(StudyError::TooMany { found, most: MOST_INPUTS }) } else { Ok(()) }
+}
+
+/// Row and value, SI, of the real parameter `key`.
+pub(super) fn real_parameter(scene: &Scene, key: &str) -> Result<(&'static Parameter, f64), StudyError> {
+    let parameter = scene.parameter(key)?;
+    match scene.get(key)? {
+        Value::Number(nominal) => Ok((parameter, nominal)),
+        Value::Count(_) | Value::Choice(_) | Value::Unset => Err(StudyError::NotReal),
+    }
+}
+
+/// Requires an end, SI, that the parameter accepts.
+pub(super) fn check_end(parameter: &Parameter, end: f64) -> Result<(), StudyError> {
+    let value = Value::Number(end);
+    parameter.check(&value).map_err(|error| StudyError::End { value: parameter.show(&value), error })
 }
 
 /// Keys of the numeric parameters that match `pattern`; at least one.
@@ -93,10 +109,7 @@ impl Input {
     /// # Errors
     /// An unknown key, a word in place of a number, or a distribution that the parameter does not accept.
     pub fn new(scene: &Scene, key: &str, text: Option<&str>) -> Result<Self, StudyError> {
-        let parameter = scene.parameter(key)?;
-        let Value::Number(nominal) = scene.get(key)? else {
-            return Err(StudyError::NotReal);
-        };
+        let (parameter, nominal) = real_parameter(scene, key)?;
         let number = |text: &str| match parameter.read(text)? {
             Value::Number(value) => Ok(value),
             Value::Count(_) | Value::Choice(_) | Value::Unset => Err(StudyError::NotReal),
@@ -121,8 +134,7 @@ impl Input {
         }?;
         let (low, high) = distribution.support();
         for end in [low, high].into_iter().filter(|end| end.is_finite()) {
-            let value = Value::Number(end);
-            parameter.check(&value).map_err(|error| StudyError::End { value: parameter.show(&value), error })?;
+            check_end(parameter, end)?;
         }
         Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), nominal, distribution })
     }

@@ -1,0 +1,316 @@
+//! What play costs: how far an output moves with the play of each joint alone, as a tornado that fills while it is computed.
+
+use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, Ui, vec2};
+
+use super::asked::Asked;
+use super::cost_study::{CostSettings, CostStudy, Varied};
+use super::shares::Shares;
+use super::tornado::Tornado;
+use crate::analysis::alone_task::AloneTask;
+use crate::analysis::study::NAMED;
+use crate::analysis::task::{Job, Message};
+use crate::app::host::Host;
+use crate::app::layout::reserved;
+use crate::app::player::Player;
+use crate::app::{theme, value};
+use crate::scene::{Kind, Scene, Value};
+use crate::simulate::LONGEST_RUN;
+
+/// Width of the start/stop button, points; fixed, so that it does not move.
+const GO: f32 = 120.0;
+/// Largest part of a run that is a transient.
+const LATEST: f64 = 0.99;
+/// Shortest run, s.
+const SHORTEST: f64 = 1e-3;
+
+/// The panel. It exists while it is open.
+pub struct Costs {
+    /// Whether it was drawn since the last frame, or will be.
+    drawn: bool,
+    /// Whether something else has its place, and its results are kept.
+    aside: bool,
+    /// Text of the scene that the settings belong to.
+    scene: String,
+    settings: Option<CostSettings>,
+    asked: Option<AloneTask>,
+    running: Option<Running>,
+    study: Option<CostStudy>,
+    problem: Option<String>,
+    /// Index of the output on show.
+    output: usize,
+    /// Whether to scroll to the tornado.
+    reveal: bool,
+    tornado: Tornado,
+}
+
+/// A study being computed.
+struct Running {
+    task: AloneTask,
+    shares: Shares,
+    begun: bool,
+}
+
+impl Default for Costs {
+    fn default() -> Self {
+        Self {
+            drawn: true,
+            aside: false,
+            scene: String::new(),
+            settings: None,
+            asked: None,
+            running: None,
+            study: None,
+            problem: None,
+            output: 0,
+            reveal: false,
+            tornado: Tornado::default(),
+        }
+    }
+}
+
+impl Costs {
+    /// Whether it is still open: drawn since the last call, or aside. What is not drawn computes nothing.
+    pub fn stays_open(&mut self) -> bool {
+        let drawn = std::mem::take(&mut self.drawn);
+        if !drawn {
+            (self.asked, self.running) = (None, None);
+        }
+        drawn || self.aside
+    }
+
+    /// Leaves its place to something else until it is drawn again.
+    pub fn step_aside(&mut self) {
+        self.aside = true;
+    }
+
+    /// Whether something else has its place.
+    pub fn is_aside(&self) -> bool {
+        self.aside
+    }
+
+    /// The latest study.
+    pub fn study(&self) -> Option<&CostStudy> {
+        self.study.as_ref()
+    }
+
+    /// Whether a study is running.
+    pub fn is_running(&self) -> bool {
+        self.running.is_some() || self.asked.is_some()
+    }
+
+    /// Whether the latest results belong to the requested study, or none is to come.
+    fn has_begun(&self) -> bool {
+        self.asked.is_none() && self.running.as_ref().is_none_or(|running| running.begun)
+    }
+
+    /// Starts a requested study and takes messages from a running one; returns whether one is running.
+    pub fn update(&mut self, host: &mut dyn Host) -> bool {
+        if let Some(task) = self.asked.take() {
+            self.problem = None;
+            let most = 1 + 2 * task.keys.len();
+            let shares = Shares::start(host, most, |share| Job::Alone(task.clone(), share));
+            self.running = shares.map(|shares| Running { task, shares, begun: false });
+            if self.running.is_none() {
+                self.problem = Some("Runs cannot be computed here".to_owned());
+            }
+        }
+        let Some(Running { task, shares, begun }) = &mut self.running else {
+            return false;
+        };
+        let polled = shares.poll(|message| match message {
+            Message::Plan(plan) if !*begun => {
+                *begun = true;
+                // An output that the scene does not have gives way to the first that it has.
+                let has = |output: &usize| plan.units[*output].is_some();
+                self.output = Some(self.output).filter(has).or((0..NAMED.len()).find(has)).unwrap_or_default();
+                self.study = Some(CostStudy::new(task.clone(), plan));
+                self.tornado.clear();
+            }
+            Message::Run(run) => {
+                if let Some(study) = &mut self.study {
+                    study.take(run);
+                }
+            }
+            _ => {}
+        });
+        match polled {
+            Ok(true) => return true,
+            Ok(false) => {}
+            Err(why) => self.problem = Some(why),
+        }
+        self.running = None;
+        false
+    }
+
+    /// Reports a frame at `now`, s, so that a running study yields time to the picture; `moves`: whether the picture is animated.
+    pub fn seen(&mut self, now: f64, moves: bool) {
+        if let Some(running) = &mut self.running {
+            running.shares.seen(now, moves);
+        }
+    }
+
+    /// Settings, progress and tornado; returns the user's request to the run.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<Asked> {
+        (self.drawn, self.aside) = (true, false);
+        let scene = player.pending();
+        if self.scene != scene.source.text {
+            let output = self.output;
+            *self = Self { scene: scene.source.text.clone(), output, ..Self::default() };
+        }
+        if scene.machine.ball_joints.is_empty() {
+            ui.label(RichText::new("This scene has no ball joint").weak());
+            return None;
+        }
+        ui.scope(|ui| {
+            // All settings and the first bars fit on a phone.
+            theme::tighten(ui);
+            self.settings_ui(ui, scene);
+        });
+        let progress = ui.cursor().top();
+        self.go_ui(ui, scene);
+        let differences = self.study.as_ref().map_or_else(Vec::new, |study| study.differences(player));
+        reserved(ui, "costs say", 3, |ui| self.state_ui(ui, &differences));
+        let study = self.study.as_ref()?;
+        let choice = ui.cursor().top();
+        output_ui(ui, &mut self.output, study);
+        let tornado = ui.cursor().top();
+        let clicked = self.tornado.ui(ui, study, self.output, player, !differences.is_empty());
+        if self.reveal && self.has_begun() {
+            self.reveal = false;
+            let (all, room) = (ui.min_rect(), ui.clip_rect().height());
+            let fits = [progress, choice].into_iter().find(|top| all.bottom() - top <= room);
+            let rect = all.with_min_y(fits.unwrap_or(tornado));
+            ui.scroll_to_rect(rect, (rect.height() > room).then_some(Align::TOP));
+        }
+        let (input, end) = clicked?;
+        let text = study.parameter(input)?.write(&Value::Number(study.task.ends[input][end]));
+        Some(Asked::Value { key: study.task.keys[input].clone(), text })
+    }
+
+    fn settings_ui(&mut self, ui: &mut Ui, scene: &Scene) {
+        let settings = self.settings.get_or_insert_with(|| CostSettings::new(scene));
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Vary");
+            for Varied { parameter, on, .. } in &mut settings.varied {
+                let help = format!("Of each ball joint alone. {}", value::typeset(parameter.help));
+                ui.checkbox(on, parameter.label).on_hover_text(help);
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.label("By");
+            let part = "A part of the value that each joint has, as far as its parameter allows";
+            ui.selectable_value(&mut settings.ranges, false, "Percent").on_hover_text(part);
+            let range = "The same two values for every joint";
+            ui.selectable_value(&mut settings.ranges, true, "Range").on_hover_text(range);
+            if !settings.ranges {
+                ui.add(DragValue::new(&mut settings.percent).range(1.0..=100.0).prefix("± ").suffix(" %"))
+                    .on_hover_text(part)
+                    .accessible_name("Part of each value");
+            }
+        });
+        for Varied { parameter, range, .. } in settings.varied.iter_mut().filter(|varied| settings.ranges && varied.on)
+        {
+            ui.horizontal_wrapped(|ui| {
+                let Kind::Number { min, max, display, slider, .. } = parameter.kind else {
+                    return;
+                };
+                ui.label(parameter.label).on_hover_text(value::typeset(parameter.help));
+                let shown = |si| crate::units::to_display(si, display);
+                let unit = value::typeset(display);
+                let suffix = if unit.is_empty() { unit } else { format!(" {unit}") };
+                for (end, word) in range.iter_mut().zip(["from", "to"]) {
+                    ui.label(word);
+                    let speed = 0.002 * (shown(slider.1) - shown(slider.0));
+                    ui.add(DragValue::new(end).range(shown(min)..=shown(max)).speed(speed).suffix(&suffix))
+                        .on_hover_text(format!("{}: {word} this value", parameter.label))
+                        .accessible_name(format!("{} {word}", parameter.label));
+                }
+            });
+        }
+        ui.horizontal_wrapped(|ui| {
+            let span = &mut settings.span;
+            let mut time = |name: &str, time: &mut f64, range, help: &str| {
+                ui.label(name);
+                ui.add(DragValue::new(time).range(range).speed(0.01).suffix(" s"))
+                    .on_hover_text(help)
+                    .accessible_name(name);
+            };
+            let help = "Length of each run, from the scene's own start; at first three periods of its drives, or 1 s";
+            time("Duration", &mut span.duration, SHORTEST..=LONGEST_RUN, help);
+            let help = "End of the transient: what happens before it does not count; energy is counted from the start";
+            time("Observed from", &mut span.from, 0.0..=LATEST * span.duration, help);
+        });
+    }
+
+    fn go_ui(&mut self, ui: &mut Ui, scene: &Scene) {
+        let running = self.is_running();
+        let (name, help) = if running {
+            ("Stop runs", "Ends the computation; bars so far remain")
+        } else {
+            (
+                "Start runs",
+                "Runs the scene with its current settings, then with each value alone at its lower and at its upper end, in the \
+                 background; the numbers are those of `jointplay sensitivity`",
+            )
+        };
+        let clicked = ui.horizontal(|ui| {
+            let clicked = ui.add(Button::new(name).min_size(vec2(GO, 0.0))).on_hover_text(help).clicked();
+            if let Some(running) = &self.running {
+                running.shares.ui(ui, "Computed so far", "runs");
+            }
+            clicked
+        });
+        if clicked.inner && running {
+            (self.running, self.asked) = (None, None);
+        } else if clicked.inner {
+            (self.asked, self.problem) = match self.settings.as_ref().map(|settings| settings.task(scene)) {
+                Some(Ok(task)) => (Some(task), None),
+                refused => (None, refused.and_then(Result::err)),
+            };
+            self.reveal = self.asked.is_some();
+        }
+    }
+
+    /// The error message, or whether the tornado belongs to the current setting.
+    fn state_ui(&self, ui: &mut Ui, differences: &[String]) {
+        let weak = |ui: &mut Ui, words: String| ui.label(RichText::new(words).small().weak());
+        if let Some(problem) = &self.problem {
+            theme::error(ui, value::typeset(problem));
+            return;
+        }
+        match self.study.as_ref().filter(|_| self.has_begun()) {
+            None if self.is_running() => drop(weak(ui, "Starting…".to_owned())),
+            None => drop(weak(ui, "No results yet".to_owned())),
+            Some(_) if !differences.is_empty() => {
+                let words = format!("Of an earlier setting. {}", differences.join("; "));
+                theme::warning(ui, words).on_hover_text("Start the runs again for bars of the current setting");
+            }
+            Some(study) => {
+                let (finished, all) = study.counts();
+                let help = "Number of runs computed so far, all with the settings of the scene except for one value";
+                weak(ui, format!("Of the current setting; {finished} of {all} runs")).on_hover_text(help);
+            }
+        }
+    }
+}
+
+/// Choice of the output on show.
+fn output_ui(ui: &mut Ui, output: &mut usize, study: &CostStudy) {
+    ui.horizontal(|ui| {
+        ui.label("Effect on");
+        ComboBox::from_id_salt("output")
+            .selected_text(NAMED[*output].label)
+            .show_ui(ui, |ui| {
+                for (index, named) in NAMED.iter().enumerate() {
+                    let has = study.plan.units[index].is_some();
+                    ui.add_enabled_ui(has, |ui| ui.selectable_value(output, index, named.label))
+                        .inner
+                        .on_hover_text(named.help)
+                        .on_disabled_hover_text("The scene has no such output");
+                }
+            })
+            .response
+            .on_hover_text("The number that every run is reduced to; all are computed at once")
+            .accessible_name("Effect on");
+    });
+}

@@ -1,0 +1,305 @@
+//! What play costs: the tornado beside the picture, and the sliders that it moves.
+
+use std::rc::Rc;
+
+use eframe::egui::{self, Color32, Key, Modifiers, Rect, Shape, accesskit::Role};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::analysis::study::{Alone, NAMED, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
+use jointplay::app::{App, Event};
+use jointplay::scene::Value;
+
+use crate::bench_window::{FAST, click, hold, hold_shared, set_number, sized, wait};
+use crate::golden::PLAIN;
+use crate::hands::compare_window;
+
+/// Colours of the bars to the lower and to the upper ends in a light window.
+const COLOURS: [Color32; 2] = [Color32::from_rgb(0x00, 0x72, 0xB2), Color32::from_rgb(0xD5, 0x5E, 0x00)];
+const SPAN: RunSpan = RunSpan { duration: 0.3, from: 0.1 };
+const RUNS: usize = 7;
+
+/// The window on the paper's scene with the panel open, and settings of short runs.
+fn window(size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+    let mut harness = sized("spcmm", &[&[FAST], &PLAIN[..]].concat(), size, theme);
+    click(&mut harness, Role::Button, "What play costs");
+    set_number(&mut harness, "Duration", SPAN.duration);
+    set_number(&mut harness, "Observed from", SPAN.from);
+    harness
+}
+
+fn large() -> Harness<'static, App> {
+    window([1280.0, 800.0], egui::Theme::Light)
+}
+
+/// Computes the whole study.
+fn compute(harness: &mut Harness<'_, App>) {
+    harness.get_by_role_and_label(Role::Button, "Start runs").scroll_to_me();
+    harness.run();
+    click(harness, Role::Button, "Start runs");
+    wait(harness, |app| app.bench().cost_study().is_some() && !app.bench().is_computing_costs());
+    harness.run();
+}
+
+/// The button of an end by the beginning of its label: `Clearance of S1 0.15 mm:`.
+fn end<'h>(harness: &'h Harness<'_, App>, end: &'h str) -> egui_kittest::Node<'h> {
+    harness.get_by_label_contains(end)
+}
+
+fn clearance(harness: &Harness<'_, App>, joint: &str) -> f64 {
+    match harness.state().player().pending().get(&format!("joint.{joint}.clearance")) {
+        Ok(Value::Number(si)) => si,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Rectangles of each colour of [`COLOURS`], as drawn.
+fn bars(harness: &Harness<'_, App>) -> [Vec<Rect>; 2] {
+    fn add(shape: &Shape, bars: &mut [Vec<Rect>; 2]) {
+        match shape {
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| add(shape, bars)),
+            Shape::Rect(drawn) => {
+                for (own, colour) in bars.iter_mut().zip(COLOURS) {
+                    if drawn.fill == colour {
+                        own.push(drawn.rect);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut bars = Default::default();
+    for part in &harness.output().shapes {
+        add(&part.shape, &mut bars);
+    }
+    bars
+}
+
+#[test]
+fn the_tornado_fills_with_the_numbers_of_the_study_and_its_bars_end_there() {
+    let mut harness = large();
+    let points = hold_shared(&mut harness, 2);
+    click(&mut harness, Role::Button, "Start runs");
+    harness.run_steps(2);
+    harness.get_by_label("Of the current setting; 0 of 7 runs");
+    let places = |harness: &Harness<'_, App>| {
+        ["S1", "S2", "S3"].map(|joint| {
+            let label = format!("Clearance of {joint} 0.15 mm");
+            harness.get_by_label_contains(&label).rect()
+        })
+    };
+    let first = places(&harness);
+    assert!(first[0].bottom() < first[1].top() && first[1].bottom() < first[2].top());
+    for finished in 1..RUNS {
+        points.set(1);
+        harness.run_steps(2);
+        harness.get_by_label(&format!("Of the current setting; {finished} of 7 runs"));
+        assert_eq!(places(&harness), first, "nothing moves while it computes");
+        assert!(harness.state().bench().is_computing_costs());
+    }
+    let bar = harness.get_by_label("Computed so far");
+    assert!(bar.accesskit_node().numeric_value().expect("a number") > 80.0);
+    // It does not move under the pointer, either.
+    harness.hover_at(first[1].center());
+    points.set(1);
+    harness.run_steps(3);
+    assert!(!harness.state().bench().is_computing_costs());
+    assert_eq!(places(&harness), first);
+    harness.hover_at(egui::pos2(700.0, 300.0));
+    harness.run();
+
+    // The bits of the study of the command line.
+    let scene = harness.state().player().pending();
+    let varied = inputs(scene, &[Uncertainty::parse("--over", "joint.*.clearance")]).expect("joints");
+    let names: Vec<&str> = NAMED.iter().map(|named| named.name).collect();
+    let kept = outputs(scene, &names.join(",")).expect("outputs");
+    let alone = Alone::new(&varied);
+    let keys: Vec<String> = varied.iter().map(|input| input.key.clone()).collect();
+    let study = StudyRuns::new(scene, &keys, &kept, SPAN, &alone.rows()).expect("runs");
+    let run = |index| {
+        let mut block = study.sweep().begin(index);
+        while !block.is_done() {
+            block.advance(10_000);
+        }
+        study.outputs_of(&block.records())
+    };
+    let expected: Vec<Vec<f64>> = (0..RUNS).map(run).collect();
+    let found = harness.state().bench().cost_study().expect("a study");
+    for output in 0..NAMED.len() {
+        assert_eq!(found.base(output), Some(expected[0][output]));
+        for (index, run) in expected.iter().enumerate().skip(1) {
+            assert_eq!(found.end(output, (index - 1) / 2, (index - 1) % 2), Some(Some(run[output])));
+        }
+    }
+
+    // Sorted by the largest tip error, with bars from the line to each end.
+    let tip: Vec<f64> = expected.iter().map(|run| run[0]).collect();
+    let spread = |input: usize| {
+        let all = [tip[0], tip[1 + 2 * input], tip[2 + 2 * input]];
+        all.iter().fold(f64::MIN, |a, b| a.max(*b)) - all.iter().fold(f64::MAX, |a, b| a.min(*b))
+    };
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| spread(*b).total_cmp(&spread(*a)));
+    let sorted = places(&harness);
+    assert!(order.windows(2).all(|pair| sorted[pair[0]].bottom() < sorted[pair[1]].top()), "{order:?} {sorted:?}");
+    let bars = bars(&harness);
+    let all = || bars.iter().flatten();
+    let (left, right) =
+        (all().map(|bar| bar.left()).fold(f32::MAX, f32::min), all().map(|bar| bar.right()).fold(f32::MIN, f32::max));
+    let (least, most) = tip.iter().fold((f64::MAX, f64::MIN), |(a, b), &value| (a.min(value), b.max(value)));
+    let across = |value: f64| left + ((value - least) / (most - least)) as f32 * (right - left);
+    assert!(right - left > 80.0, "{left} {right}");
+    for (end, bars) in bars.iter().enumerate() {
+        assert_eq!(bars.len(), 3);
+        for (row, bar) in bars.iter().enumerate() {
+            let (base, there) = (across(tip[0]), across(tip[1 + 2 * order[row] + end]));
+            let (from, to) = (base.min(there), base.max(there));
+            assert!((bar.left() - from).abs() < 0.1 && (bar.right() - to).abs() < 0.1, "{bar} {from} {to}");
+        }
+    }
+
+    // Another output of the same runs.
+    harness.get_by_role_and_label(Role::ComboBox, "Effect on").click();
+    harness.run();
+    harness.get_by_role_and_label(Role::Button, "Peak normal force").click();
+    harness.run();
+    let words = format!("With the values of the scene: {}", value(expected[0][2], "N"));
+    harness.get_by_label(&words);
+}
+
+/// As shown: four digits.
+fn value(si: f64, unit: &str) -> String {
+    jointplay::units::format_quantity_digits(si, unit, 4)
+}
+
+#[test]
+fn a_click_on_an_end_moves_the_slider_of_its_joint_and_is_undone() {
+    let mut harness = large();
+    compute(&mut harness);
+    let original = clearance(&harness, "S2");
+    harness.key_press(Key::C);
+    harness.run();
+    assert!(harness.query_by_label("Accuracy").is_none(), "the controls are closed");
+    end(&harness, "Clearance of S2 0.45 mm:").click();
+    harness.run();
+    assert_eq!(clearance(&harness, "S2"), 1.5 * original);
+    let log = harness.state().player().log();
+    let sets =
+        |entry: &jointplay::app::Entry| matches!(&entry.event, Event::Set { key, .. } if key == "joint.S2.clearance");
+    assert!(log.entries.iter().any(sets), "{log:?}");
+    // The slider has the focus, in sight.
+    let slider = harness.get_by_role_and_label(Role::Slider, "Clearance of S2");
+    assert!(slider.accesskit_node().is_focused());
+    assert!(Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0)).contains_rect(slider.rect()));
+    harness.get_by_label("Of an earlier setting. Clearance of S2: 0.3 mm instead of 0.45 mm");
+    assert!(bars(&harness).iter().all(Vec::is_empty), "its bars are pale");
+    assert_eq!(harness.state().undo_words(false).as_deref(), Some("Undo: Clearance of S2, to 0.3 mm"));
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run();
+    assert_eq!(clearance(&harness, "S2"), original);
+    harness.get_by_label("Of the current setting; 7 of 7 runs");
+    assert_eq!(bars(&harness).map(|own| own.len()), [3, 3]);
+    // By keyboard.
+    end(&harness, "Clearance of S3 0.15 mm:").focus();
+    harness.step();
+    harness.key_press(Key::Enter);
+    harness.run();
+    assert_eq!(clearance(&harness, "S3"), 0.5 * original);
+}
+
+#[test]
+fn closing_it_cancels_and_forgets() {
+    let mut harness = large();
+    let points = hold(&mut harness);
+    for close in ["What play costs", "Bench", "tab"] {
+        click(&mut harness, Role::Button, "Start runs");
+        harness.run_steps(2);
+        assert!(harness.state().bench().is_computing_costs());
+        let running = Rc::strong_count(&points);
+        match close {
+            "tab" => click(&mut harness, Role::Button, "Chaos bench"),
+            "Bench" => click(&mut harness, Role::Button, "Bench"),
+            _ => harness.key_press(Key::W),
+        }
+        harness.run();
+        assert_eq!(Rc::strong_count(&points), running - 1, "{close}: its worker has ended");
+        let bench = harness.state().bench();
+        assert!(!bench.is_computing_costs() && bench.cost_study().is_none() && !bench.shows_costs());
+        assert!(!harness.state().shows_costs());
+        harness.key_press(Key::W);
+        harness.run();
+        assert!(harness.state().shows_costs());
+        harness.get_by_label("No results yet");
+    }
+}
+
+#[test]
+fn what_varies_and_by_how_much_is_chosen() {
+    let mut harness = large();
+    for name in ["Clearance", "Restitution"] {
+        click(&mut harness, Role::CheckBox, name);
+    }
+    click(&mut harness, Role::Button, "Range");
+    set_number(&mut harness, "Restitution from", 0.2);
+    set_number(&mut harness, "Restitution to", 0.7);
+    compute(&mut harness);
+    let study = harness.state().bench().cost_study().expect("a study");
+    assert_eq!(study.task.keys, ["joint.S1.restitution", "joint.S2.restitution", "joint.S3.restitution"]);
+    assert_eq!(study.task.ends, [[0.2, 0.7]; 3]);
+    end(&harness, "Restitution of S1 0.7:");
+    // A part ends where the parameter does.
+    click(&mut harness, Role::Button, "Percent");
+    compute(&mut harness);
+    let study = harness.state().bench().cost_study().expect("a study");
+    assert_eq!(study.task.ends, [[0.45, 1.0]; 3]);
+    // A reversed range, and nothing at all.
+    click(&mut harness, Role::Button, "Range");
+    set_number(&mut harness, "Restitution to", 0.1);
+    click(&mut harness, Role::Button, "Start runs");
+    harness.get_by_label("Restitution: the first value must be below the second");
+    click(&mut harness, Role::CheckBox, "Restitution");
+    click(&mut harness, Role::Button, "Start runs");
+    harness.get_by_label_contains("Nothing varies");
+    assert!(!harness.state().bench().is_computing_costs());
+}
+
+#[test]
+fn on_a_phone_a_slider_takes_its_place_and_gives_it_back() {
+    let mut harness = window([390.0, 844.0], egui::Theme::Light);
+    compute(&mut harness);
+    let own = end(&harness, "Clearance of S1 0.45 mm:");
+    own.scroll_to_me();
+    harness.run();
+    end(&harness, "Clearance of S1 0.45 mm:").click();
+    harness.run();
+    let slider = harness.get_by_role_and_label(Role::Slider, "Clearance of S1");
+    assert!(slider.accesskit_node().is_focused());
+    let bottom = slider.rect().bottom();
+    assert!(bottom < 844.0, "{bottom}");
+    assert!(!harness.state().shows_costs());
+    click(&mut harness, Role::Button, "Bench");
+    harness.run();
+    harness.get_by_label_contains("Of an earlier setting.");
+    end(&harness, "Clearance of S1 0.45 mm:");
+}
+
+#[test]
+fn the_panel_shows_what_is_stored() {
+    for (name, size, theme) in [
+        ("costs_light", [1280.0, 720.0], egui::Theme::Light),
+        ("costs_dark", [1280.0, 720.0], egui::Theme::Dark),
+        ("costs_phone", [390.0, 844.0], egui::Theme::Light),
+        ("costs_lying", [844.0, 390.0], egui::Theme::Dark),
+    ] {
+        let mut harness = window(size, theme);
+        compute(&mut harness);
+        harness.remove_cursor();
+        harness.run();
+        compare_window(&mut harness, name);
+        if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+            let image = harness.render().expect("drawn");
+            image.save(std::path::Path::new(&keep).join(format!("{name}.png"))).expect("writable");
+        }
+    }
+}
