@@ -120,21 +120,17 @@ impl Bench {
 
     /// The whole bench; returns the user's request to the run.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
-        let title = ui.horizontal_wrapped(|ui| {
-            let title = self.tabs(ui);
-            if self.costs.is_none() {
-                ui.label("Coordinate");
-                self.coordinate.ui(ui);
-            }
-            title
-        });
-        if let Some((tab, title)) = title.inner {
+        if let Some((tab, title)) = ui.horizontal_wrapped(|ui| self.tabs(ui)).inner {
             spoken::titled(ui, &tab, title);
         }
         let Self { coordinate, portrait, sweep, costs } = self;
         if let Some(costs) = costs {
             return costs.ui(ui, player);
         }
+        ui.horizontal(|ui| {
+            ui.label("Coordinate");
+            coordinate.ui(ui);
+        });
         let help = "How fast neighbouring motions of the running scene diverge";
         part(ui, "Divergence of neighbouring motions", help, |ui| {
             divergence::ui(ui, player);

@@ -2,8 +2,8 @@
 //! selects the end.
 
 use eframe::egui::{
-    Align2, CursorIcon, FontId, Rect, RichText, Role, Sense, Stroke, StrokeKind, TextStyle, TextWrapMode, Ui,
-    WidgetInfo, WidgetText, pos2, vec2,
+    Align2, CursorIcon, Id, Rect, RichText, Role, Sense, Stroke, StrokeKind, TextStyle, TextWrapMode, Ui, WidgetInfo,
+    WidgetText, pos2, vec2,
 };
 
 use super::cost_study::CostStudy;
@@ -20,6 +20,8 @@ const GAP: f32 = 8.0;
 const MARGIN: f32 = 2.0;
 /// Largest part of the width for the names.
 const NAMES: f32 = 0.3;
+/// Opacity of the bars of an earlier setting.
+const PALE: f32 = 0.45;
 /// Digits of a value on show.
 const DIGITS: usize = 4;
 
@@ -92,68 +94,103 @@ impl Tornado {
         let height = self.order.len() as f32 * (2.0 * bar + GAP);
         let (area, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
         self.area = Some(area);
-        let font = TextStyle::Small.resolve(ui.style());
-        let widest =
-            |texts: &mut dyn Iterator<Item = &str>| texts.map(|text| width(ui, text, &font)).fold(0.0, f32::max) + GAP;
         let names: Vec<[&str; 2]> = self.order.iter().map(|&input| name(&study.task.keys[input])).collect();
-        let first = widest(&mut names.iter().flatten().copied()).min(NAMES * area.width());
-        let column = |at: usize| widest(&mut ends.iter().flatten().map(|end| &*end.texts[at]));
-        let (left, right) = (area.left() + first + column(0), area.right() - column(1));
-        let span = if most > least { most - least } else { 1.0 };
-        let across = |si: f64| left + ((si - least) / span) as f32 * (right - left).max(0.0);
-
-        let visuals = ui.visuals().clone();
-        let ink = visuals.text_color();
+        let column = |at: usize| widest(ui, ends.iter().flatten().map(|end| &*end.texts[at]));
+        let first = widest(ui, names.iter().flatten().copied()).min(NAMES * area.width());
+        let place = Place {
+            area,
+            bar,
+            names: first,
+            plane: [area.left() + first + column(0), area.right() - column(1)],
+            values: [least, most],
+            base,
+            earlier,
+        };
         let mut clicked = None;
         for (row, (&input, ends)) in self.order.iter().zip(&ends).enumerate() {
-            let top = area.top() + row as f32 * (2.0 * bar + GAP) + 0.5 * GAP;
-            for (line, text) in names[row].iter().enumerate() {
-                let galley = WidgetText::from(*text).into_galley(
-                    ui,
-                    Some(TextWrapMode::Truncate),
-                    first - GAP,
-                    TextStyle::Small,
-                );
-                let at = pos2(area.left(), top + (line as f32 + 0.5) * bar - 0.5 * galley.size().y);
-                let colour = if line == 0 { visuals.strong_text_color() } else { visuals.weak_text_color() };
-                ui.painter().galley_with_override_text_color(at, galley, colour);
-            }
-            for (end, own) in ends.iter().enumerate() {
-                let place = Rect::from_x_y_ranges(
-                    area.left() + first - 0.5 * GAP..=area.right(),
-                    top + end as f32 * bar..=top + (end + 1) as f32 * bar,
-                );
-                let id = ui.scope_id().with((&study.task.keys[input], end));
-                let response = ui.interact(place, id, Sense::click());
-                response.widget_info(|| WidgetInfo::labeled(Role::Button, ui.is_enabled(), &own.words));
-                let painter = ui.painter();
-                if own.here {
-                    painter.rect_filled(place, 3.0, visuals.selection.bg_fill);
-                } else if response.hovered() {
-                    painter.rect_filled(place, 3.0, visuals.widgets.hovered.weak_bg_fill);
-                }
-                if response.has_focus() {
-                    painter.rect_stroke(place, 3.0, visuals.widgets.hovered.fg_stroke, StrokeKind::Inside);
-                }
-                let middle = place.center().y;
-                let [of_input, of_output] = &own.texts;
-                painter.text(pos2(left - 0.5 * GAP, middle), Align2::RIGHT_CENTER, of_input, font.clone(), ink);
-                painter.text(pos2(area.right(), middle), Align2::RIGHT_CENTER, of_output, font.clone(), ink);
-                if let Some((base, end_value)) = base.zip(own.value) {
-                    let (a, b) = (across(base), across(end_value));
-                    let drawn = Rect::from_x_y_ranges(a.min(b)..=a.max(b), place.y_range()).shrink2(vec2(0.0, MARGIN));
-                    let colour = theme::series(end, visuals.dark_mode);
-                    painter.rect_filled(drawn, 0.0, if earlier { colour.gamma_multiply(0.45) } else { colour });
-                }
-                if response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(&own.words).clicked() {
-                    clicked = Some((input, end));
+            for (line, own) in ends.iter().enumerate() {
+                let strip = place.strip(row, line);
+                place.name_ui(ui, strip, names[row][line], line == 0);
+                let id = ui.scope_id().with((&study.task.keys[input], line));
+                if place.end_ui(ui, strip, id, own, line) {
+                    clicked = Some((input, line));
                 }
             }
         }
         if let Some(base) = base {
-            ui.painter().vline(across(base), area.y_range(), Stroke::new(1.0, ink));
+            let ink = Stroke::new(1.0, ui.visuals().text_color());
+            ui.painter().vline(place.across(base), area.y_range(), ink);
         }
         clicked
+    }
+}
+
+/// Where things are drawn.
+struct Place {
+    area: Rect,
+    /// Height of a bar.
+    bar: f32,
+    /// Width of the names.
+    names: f32,
+    /// Left and right edge of the bars.
+    plane: [f32; 2],
+    /// The values there, SI.
+    values: [f64; 2],
+    /// The value from which the bars begin, SI.
+    base: Option<f64>,
+    /// Whether the bars are pale.
+    earlier: bool,
+}
+
+impl Place {
+    /// Position of a value, points.
+    fn across(&self, si: f64) -> f32 {
+        let ([left, right], [least, most]) = (self.plane, self.values);
+        let span = if most > least { most - least } else { 1.0 };
+        left + ((si - least) / span) as f32 * (right - left).max(0.0)
+    }
+
+    /// The line of an end.
+    fn strip(&self, row: usize, line: usize) -> Rect {
+        let top = self.area.top() + row as f32 * (2.0 * self.bar + GAP) + 0.5 * GAP + line as f32 * self.bar;
+        Rect::from_x_y_ranges(self.area.x_range(), top..=top + self.bar)
+    }
+
+    fn name_ui(&self, ui: &Ui, strip: Rect, text: &str, strong: bool) {
+        let fits = self.names - GAP;
+        let galley = WidgetText::from(text).into_galley(ui, Some(TextWrapMode::Truncate), fits, TextStyle::Small);
+        let at = strip.left_center() - vec2(0.0, 0.5 * galley.size().y);
+        let visuals = ui.visuals();
+        let colour = if strong { visuals.strong_text_color() } else { visuals.weak_text_color() };
+        ui.painter().galley_with_override_text_color(at, galley, colour);
+    }
+
+    /// Bar and values of an end; returns whether it was clicked.
+    fn end_ui(&self, ui: &Ui, strip: Rect, id: Id, own: &End, end: usize) -> bool {
+        let strip = strip.with_min_x(strip.left() + self.names - 0.5 * GAP);
+        let response = ui.interact(strip, id, Sense::click());
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, ui.is_enabled(), &own.words));
+        let (painter, visuals) = (ui.painter(), ui.visuals());
+        if own.here {
+            painter.rect_filled(strip, 3.0, visuals.selection.bg_fill);
+        } else if response.hovered() {
+            painter.rect_filled(strip, 3.0, visuals.widgets.hovered.weak_bg_fill);
+        }
+        if response.has_focus() {
+            painter.rect_stroke(strip, 3.0, visuals.widgets.hovered.fg_stroke, StrokeKind::Inside);
+        }
+        let (font, ink) = (TextStyle::Small.resolve(ui.style()), visuals.text_color());
+        let middle = strip.center().y;
+        for (text, right) in own.texts.iter().zip([self.plane[0] - 0.5 * GAP, strip.right()]) {
+            painter.text(pos2(right, middle), Align2::RIGHT_CENTER, text, font.clone(), ink);
+        }
+        if let Some((base, value)) = self.base.zip(own.value) {
+            let (a, b) = (self.across(base), self.across(value));
+            let bar = Rect::from_x_y_ranges(a.min(b)..=a.max(b), strip.y_range()).shrink2(vec2(0.0, MARGIN));
+            let colour = theme::series(end, visuals.dark_mode);
+            painter.rect_filled(bar, 0.0, if self.earlier { colour.gamma_multiply(PALE) } else { colour });
+        }
+        response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(&own.words).clicked()
     }
 }
 
@@ -213,7 +250,9 @@ fn unit(si: &str, most: f64) -> &str {
     }
 }
 
-fn width(ui: &Ui, text: &str, font: &FontId) -> f32 {
-    let colour = ui.visuals().text_color();
-    ui.painter().layout_no_wrap(text.to_owned(), font.clone(), colour).size().x
+/// Width of a column of `texts`, with the gap beside it, points.
+fn widest<'t>(ui: &Ui, texts: impl Iterator<Item = &'t str>) -> f32 {
+    let (font, colour) = (TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
+    let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), colour).size().x;
+    texts.map(width).fold(0.0, f32::max) + GAP
 }
