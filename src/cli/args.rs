@@ -56,6 +56,9 @@ pub enum Command {
     /// Find what part of a manufactured lot holds its limits, such as a tip error of at most 50 um: percentiles, yield, capability, what
     /// drives the rejects, and the cheapest fits that hold a yield.
     Tolerance(ToleranceArguments),
+    /// Print a robot description, URDF or MJCF, as a scene file: bodies, inertias, hinges, slides, ball joints, shapes and meshes. What is
+    /// not taken is named on standard error and at the head of the scene.
+    Import(ImportArguments),
     /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
     /// Compute the validation cases and print the results beside the known values: `docs/validation.md` (Markdown).
@@ -66,6 +69,13 @@ pub enum Command {
     Reference,
     /// Print a JSON schema with which editors complete and check scene files.
     Schema,
+}
+
+/// `import`.
+#[derive(Debug, Args)]
+pub struct ImportArguments {
+    /// The description: a file whose root is <robot> (URDF) or <mujoco> (MJCF). Its meshes are read beside it or in folders below it.
+    pub file: PathBuf,
 }
 
 /// A scene and what to change in it.

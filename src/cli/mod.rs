@@ -8,6 +8,7 @@ mod check;
 mod drivers;
 mod failure;
 mod impacts;
+mod import;
 mod interrupt;
 #[cfg_attr(not(feature = "gui"), path = "no_link.rs")]
 mod link;
@@ -104,6 +105,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Map(arguments)) => map::map(&arguments),
         Some(Command::Sensitivity(arguments)) => sensitivity::sensitivity(&arguments),
         Some(Command::Tolerance(arguments)) => tolerance::tolerance(&arguments),
+        Some(Command::Import(arguments)) => import::import(&arguments),
         Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
         Some(Command::Validate(arguments)) => validate::validate(&arguments),
         Some(Command::Parameters) => print(&reference_page()),

@@ -7,6 +7,7 @@ mod channels;
 mod chart;
 mod cluster;
 mod command_line;
+mod import;
 mod ledger_files;
 mod links;
 mod map;

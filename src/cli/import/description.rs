@@ -1,0 +1,220 @@
+//! What a robot description says, in the terms of a scene: bodies, joints, shapes, and what it says besides.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path};
+
+use super::inertia::Inertial;
+use crate::machine::{Mat3, Quat, Vec3};
+
+/// A place: position, m, and orientation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Position of the origin, m.
+    pub position: Vec3,
+    /// Orientation.
+    pub rotation: Quat,
+}
+
+impl Place {
+    /// The same frame.
+    pub fn identity() -> Self {
+        Self { position: Vec3::zeros(), rotation: Quat::identity() }
+    }
+
+    /// A point in the outer frame.
+    pub fn point(&self, inner: Vec3) -> Vec3 {
+        self.position + self.rotation * inner
+    }
+
+    /// `inner`, a place in this one, in the outer frame.
+    pub fn then(&self, inner: &Self) -> Self {
+        Self { position: self.point(inner.position), rotation: self.rotation * inner.rotation }
+    }
+
+    /// An inertial in this place, in the outer frame.
+    pub fn inertial(&self, inner: Inertial) -> Inertial {
+        let turn: Mat3 = *self.rotation.to_rotation_matrix().matrix();
+        Inertial {
+            mass: inner.mass,
+            centre: self.point(inner.centre),
+            inertia: turn * inner.inertia * turn.transpose(),
+        }
+    }
+}
+
+/// Form of a shape, with its centre and axes in its place.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// Radius, m.
+    Sphere(f64),
+    /// Half edges, m.
+    Box([f64; 3]),
+    /// Radius and half length along z, m.
+    Cylinder(f64, f64),
+    /// Radius and half length of the cylinder along z, m.
+    Capsule(f64, f64),
+    /// File beside the description, and the length of its unit, m.
+    Mesh(String, f64),
+}
+
+/// A shape of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Form.
+    pub form: Form,
+    /// Where it is on the body.
+    pub place: Place,
+    /// Red, green, blue, 0 to 1.
+    pub colour: Option<[f64; 3]>,
+    /// Line of the description.
+    pub line: u32,
+}
+
+/// A moving body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Name in the description.
+    pub name: String,
+    /// Mass and its distribution, in the body's axes.
+    pub inertial: Inertial,
+    /// What it looks like.
+    pub shapes: Vec<Shape>,
+}
+
+/// How a joint moves; axes in the child's axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// About the axis.
+    Hinge(Vec3),
+    /// Along the axis.
+    Slide(Vec3),
+    /// Along and about the axis.
+    Cylindrical(Vec3),
+    /// About an axis fixed in the parent, then about one fixed in the child.
+    Universal(Vec3, Vec3),
+    /// About any axis.
+    Ball,
+    /// In every way.
+    Free,
+}
+
+/// A joint that carries a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Name in the description.
+    pub name: String,
+    /// How it moves.
+    pub kind: Kind,
+    /// Index of the body that carries it; `None` for the world.
+    pub parent: Option<usize>,
+    /// Index of the body that it carries.
+    pub child: usize,
+    /// Pose of the child in the parent where all coordinates are 0.
+    pub place: Place,
+    /// Point of the child about which it turns, m, in the child.
+    pub anchor: Vec3,
+    /// Springs and dampers of its coordinates.
+    pub springs: Vec<Spring>,
+}
+
+/// A spring with a damper on a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// Coordinate of a joint that has two.
+    pub coordinate: Option<&'static str>,
+    /// Whether the coordinate is an angle.
+    pub turns: bool,
+    /// N/m or N m/rad.
+    pub stiffness: f64,
+    /// N s/m or N m s/rad.
+    pub damping: f64,
+    /// Coordinate without force, m or rad.
+    pub rest: f64,
+}
+
+/// A ball joint that closes a loop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Closure {
+    /// Name in the description.
+    pub name: String,
+    /// Bodies of socket and ball; `None` for the world.
+    pub bodies: [Option<usize>; 2],
+    /// The common point on each, m.
+    pub points: [Vec3; 2],
+}
+
+/// A robot description.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Description {
+    /// Its name.
+    pub name: String,
+    /// Gravity, m/s^2.
+    pub gravity: Vec3,
+    /// Moving bodies; the joint that carries a body has the same index.
+    pub bodies: Vec<Body>,
+    /// One for each body, a parent's before its child's.
+    pub joints: Vec<Joint>,
+    /// Ball joints that close loops.
+    pub closures: Vec<Closure>,
+    /// Shapes that do not move.
+    pub fixed: Vec<Shape>,
+    /// What is not taken: first line and number of times, by what it is.
+    left: BTreeMap<String, (u32, usize)>,
+}
+
+impl Description {
+    /// One without parts, under the gravity of the Earth along -z, as both formats have it.
+    pub fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), gravity: Vec3::new(0.0, 0.0, -9.81), ..Self::default() }
+    }
+
+    /// Notes that something on `line` is not taken.
+    pub fn leave_out(&mut self, line: u32, what: impl Into<String>) {
+        let (first, count) = self.left.entry(what.into()).or_insert((line, 0));
+        *first = line.min(*first);
+        *count += 1;
+    }
+
+    /// What is not taken, in the order of the file.
+    pub fn left_out(&self) -> Vec<String> {
+        let mut all: Vec<_> = self.left.iter().map(|(what, (line, count))| (*line, what, *count)).collect();
+        all.sort();
+        let many = |count: usize| if count > 1 { format!(", and {} more", count - 1) } else { String::new() };
+        all.into_iter().map(|(line, what, count)| format!("not taken: {what} (line {line}{})", many(count))).collect()
+    }
+
+    /// Pose in the world of each body where all coordinates are 0.
+    pub fn poses(&self) -> Vec<Place> {
+        let mut poses: Vec<Place> = Vec::new();
+        for joint in &self.joints {
+            let parent = joint.parent.map_or_else(Place::identity, |parent| poses[parent]);
+            poses.push(parent.then(&joint.place));
+        }
+        poses
+    }
+
+    /// Leaves out meshes that a scene in `folder` could not read.
+    pub fn keep_existing_meshes(&mut self, folder: &Path) {
+        let mut missing = Vec::new();
+        let mut keep = |shape: &Shape| {
+            let Form::Mesh(file, _) = &shape.form else {
+                return true;
+            };
+            let below = Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
+            let ending = [".stl", ".obj", ".gltf", ".glb"].iter().any(|end| file.to_lowercase().ends_with(end));
+            let why = match (ending, below, below && folder.join(file).is_file()) {
+                (false, ..) => "is not STL, OBJ or glTF",
+                (_, false, _) => "is not in the folder of the description or below it",
+                (.., false) => "does not exist",
+                _ => return true,
+            };
+            missing.push((shape.line, format!("mesh {file}, which {why}")));
+            false
+        };
+        self.fixed.retain(&mut keep);
+        self.bodies.iter_mut().for_each(|body| body.shapes.retain(&mut keep));
+        for (line, what) in missing {
+            self.leave_out(line, what);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Mass, centroid and inertia of solids, and of bodies that are made of several.
+
+use std::f64::consts::PI;
+
+use crate::machine::{Mat3, Vec3};
+
+/// Mass and its distribution, in the axes of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertial {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centroid, m.
+    pub centre: Vec3,
+    /// Inertia about the centroid, kg m^2.
+    pub inertia: Mat3,
+}
+
+/// A solid with its centre at the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solid {
+    /// Half axes along x, y and z, m.
+    Ellipsoid([f64; 3]),
+    /// Half edges along x, y and z, m.
+    Box([f64; 3]),
+    /// Radius and half length along z, m.
+    Cylinder(f64, f64),
+    /// Radius and half length of the cylinder along z, between two hemispheres, m.
+    Capsule(f64, f64),
+}
+
+impl Solid {
+    /// Volume, m^3.
+    pub fn volume(self) -> f64 {
+        match self {
+            Self::Ellipsoid([a, b, c]) => 4.0 / 3.0 * PI * a * b * c,
+            Self::Box([a, b, c]) => 8.0 * a * b * c,
+            Self::Cylinder(r, h) => 2.0 * PI * r * r * h,
+            Self::Capsule(r, h) => PI * r * r * (2.0 * h + 4.0 / 3.0 * r),
+        }
+    }
+
+    /// Principal inertias about its centre, over its mass, m^2.
+    pub fn gyration(self) -> Vec3 {
+        let by = |part: f64, [a, b, c]: [f64; 3]| part * Vec3::new(b * b + c * c, a * a + c * c, a * a + b * b);
+        let round = |across: f64, along: f64| Vec3::new(across, across, along);
+        match self {
+            Self::Ellipsoid(axes) => by(0.2, axes),
+            Self::Box(edges) => by(1.0 / 3.0, edges),
+            Self::Cylinder(r, h) => round(0.25 * r * r + h * h / 3.0, 0.5 * r * r),
+            Self::Capsule(r, h) => {
+                // Cylinder, and two hemispheres whose centroids are 3/8 r beyond its ends.
+                let (barrel, caps) = (2.0 * h, 4.0 / 3.0 * r);
+                let (barrel, caps) = (barrel / (barrel + caps), caps / (barrel + caps));
+                let across = barrel * (0.25 * r * r + h * h / 3.0) + caps * (0.4 * r * r + h * h + 0.75 * h * r);
+                round(across, barrel * 0.5 * r * r + caps * 0.4 * r * r)
+            }
+        }
+    }
+}
+
+impl Inertial {
+    /// A solid of `mass` with its centre at `centre` and its axes turned by `rotation`.
+    pub fn of_solid(solid: Solid, mass: f64, centre: Vec3, rotation: Mat3) -> Self {
+        let own = Mat3::from_diagonal(&(mass * solid.gyration()));
+        Self { mass, centre, inertia: rotation * own * rotation.transpose() }
+    }
+
+    /// Both together; `other` in the same axes.
+    pub fn plus(self, other: Self) -> Self {
+        let mass = self.mass + other.mass;
+        if mass == 0.0 {
+            return self;
+        }
+        let centre = (self.mass * self.centre + other.mass * other.centre) / mass;
+        let about = |one: &Self| {
+            let d = one.centre - centre;
+            one.inertia + one.mass * (Mat3::identity() * d.norm_squared() - d * d.transpose())
+        };
+        Self { mass, centre, inertia: about(&self) + about(&other) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volume and second moments of a solid by points of a grid inside it.
+    fn counted(solid: Solid, inside: impl Fn(Vec3) -> bool, reach: [f64; 3]) {
+        const N: i32 = 80;
+        let mut sums = [0.0; 4];
+        let place = |i: i32, reach: f64| reach * (2.0 * (f64::from(i) + 0.5) / f64::from(N) - 1.0);
+        for (i, j, k) in (0..N).flat_map(|i| (0..N).flat_map(move |j| (0..N).map(move |k| (i, j, k)))) {
+            let p = Vec3::new(place(i, reach[0]), place(j, reach[1]), place(k, reach[2]));
+            if inside(p) {
+                let squares = p.component_mul(&p);
+                let total = squares.sum();
+                for (sum, part) in sums.iter_mut().zip([1.0, total - squares.x, total - squares.y, total - squares.z]) {
+                    *sum += part;
+                }
+            }
+        }
+        let cell = 8.0 * reach[0] * reach[1] * reach[2] / f64::from(N).powi(3);
+        assert!((sums[0] * cell / solid.volume() - 1.0).abs() < 1e-2);
+        let gyration = Vec3::new(sums[1], sums[2], sums[3]) / sums[0];
+        let error = (gyration - solid.gyration()).component_div(&solid.gyration());
+        assert!(error.amax() < 1e-2, "{solid:?}: {error}");
+    }
+
+    #[test]
+    fn solids_have_the_moments_of_their_volume() {
+        let [a, b, c] = [0.3, 0.2, 0.5];
+        counted(Solid::Box([a, b, c]), |_| true, [a, b, c]);
+        counted(Solid::Ellipsoid([a, b, c]), |p| p.component_div(&Vec3::new(a, b, c)).norm() < 1.0, [a, b, c]);
+        counted(Solid::Cylinder(a, c), |p| p.x.hypot(p.y) < a, [a, a, c]);
+        let capsule = |p: Vec3| Vec3::new(p.x, p.y, p.z - p.z.clamp(-c, c)).norm() < a;
+        counted(Solid::Capsule(a, c), capsule, [a, a, a + c]);
+    }
+
+    #[test]
+    fn two_halves_make_a_whole() {
+        let half = |side: f64| {
+            let centre = Vec3::new(1.0, 0.25 * side, -2.0);
+            Inertial::of_solid(Solid::Box([0.1, 0.25, 0.3]), 2.0, centre, Mat3::identity())
+        };
+        let whole = half(1.0).plus(half(-1.0));
+        let expected =
+            Inertial::of_solid(Solid::Box([0.1, 0.5, 0.3]), 4.0, Vec3::new(1.0, 0.0, -2.0), Mat3::identity());
+        assert!((whole.inertia - expected.inertia).amax() < 1e-12 && (whole.centre - expected.centre).amax() < 1e-15);
+    }
+}

@@ -1,0 +1,628 @@
+//! MJCF, the XML of MuJoCo, <https://mujoco.readthedocs.io/en/stable/XMLreference.html>: a tree of bodies with joints and geoms.
+
+use std::collections::BTreeMap;
+
+use roxmltree::Node;
+
+use super::description::{Body, Closure, Description, Form, Joint, Kind, Place, Shape, Spring};
+use super::inertia::{Inertial, Solid};
+use super::xml::{Source, child};
+use super::{DEEPEST, too_deep};
+use crate::cli::Failure;
+use crate::machine::{Mat3, Quat, Vec3};
+
+/// Density of a geom without one of its own, kg/m^3.
+const DENSITY: f64 = 1000.0;
+/// Cosine of the angle between two axes from which they count as parallel, and up to which as perpendicular.
+const PARALLEL: f64 = 1.0 - 1e-10;
+const PERPENDICULAR: f64 = 1e-6;
+
+/// Defaults of elements by their tag, of one class.
+type Defaults<'n> = BTreeMap<&'n str, BTreeMap<&'n str, &'n str>>;
+
+/// Settings and names of a file.
+struct Model<'s, 'n, 'i> {
+    source: &'s Source<'s>,
+    /// Radians in the file's unit of angles.
+    angle: f64,
+    /// Axes of Euler angles.
+    sequence: &'n str,
+    mesh_folder: &'n str,
+    inertia_from_geoms: Option<bool>,
+    classes: BTreeMap<&'n str, Defaults<'n>>,
+    /// Meshes by name.
+    meshes: BTreeMap<String, Node<'n, 'i>>,
+    colours: BTreeMap<&'n str, &'n str>,
+    bodies: BTreeMap<&'n str, usize>,
+    found: Description,
+}
+
+/// Attributes that are read, or noted elsewhere, or act on limits and contacts alone.
+const GEOM: [&str; 18] = [
+    "type",
+    "size",
+    "fromto",
+    "mass",
+    "density",
+    "rgba",
+    "material",
+    "mesh",
+    "contype",
+    "conaffinity",
+    "condim",
+    "priority",
+    "friction",
+    "solmix",
+    "solref",
+    "solimp",
+    "margin",
+    "gap",
+];
+const JOINT: [&str; 13] = [
+    "type",
+    "axis",
+    "range",
+    "limited",
+    "margin",
+    "solreflimit",
+    "solimplimit",
+    "stiffness",
+    "damping",
+    "springref",
+    "armature",
+    "frictionloss",
+    "ref",
+];
+/// Class of the defaults of a whole file.
+const MAIN: &str = "main";
+
+/// Reads `<mujoco>`.
+///
+/// # Errors
+/// A missing or invalid part, joints of a body that a scene has no joint for, or mass that only a mesh has.
+pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Description, Failure> {
+    let mut model = Model {
+        source,
+        angle: 1.0_f64.to_radians(),
+        sequence: "xyz",
+        mesh_folder: "",
+        inertia_from_geoms: None,
+        classes: BTreeMap::new(),
+        meshes: BTreeMap::new(),
+        colours: BTreeMap::new(),
+        bodies: BTreeMap::new(),
+        found: Description::new(root.attribute("model").unwrap_or("model")),
+    };
+    let sections = || root.children().filter(Node::is_element);
+    // The order of the sections is free: settings first.
+    for node in sections() {
+        match node.tag_name().name() {
+            "compiler" => model.compiler(node)?,
+            "option" => model.option(node)?,
+            "default" => model.defaults(node, None, 0)?,
+            "asset" => model.assets(node)?,
+            _ => {}
+        }
+    }
+    for node in sections().filter(|node| node.has_tag_name("worldbody")) {
+        model.body(node, None, &Place::identity(), MAIN, 0)?;
+    }
+    for node in sections() {
+        match node.tag_name().name() {
+            "compiler" | "option" | "default" | "asset" | "worldbody" => {}
+            "equality" => model.equality(node)?,
+            "include" => return Err(source.error(node, "put the contents of the file here: it is not read")),
+            other => model.found.leave_out(source.line(node), format!("<{other}>")),
+        }
+    }
+    if model.found.bodies.is_empty() {
+        return Err(source.error(root, "no body has a joint"));
+    }
+    Ok(model.found)
+}
+
+impl<'n, 'i> Model<'_, 'n, 'i> {
+    fn compiler(&mut self, node: Node<'n, 'i>) -> Result<(), Failure> {
+        for attribute in node.attributes() {
+            let value = attribute.value();
+            match (attribute.name(), value) {
+                ("angle", "degree") => self.angle = 1.0_f64.to_radians(),
+                ("angle", "radian") => self.angle = 1.0,
+                ("eulerseq", sequence) if sequence.len() == 3 && sequence.chars().all(|c| "xyzXYZ".contains(c)) => {
+                    self.sequence = sequence;
+                }
+                ("meshdir" | "assetdir", folder) => self.mesh_folder = folder,
+                ("inertiafromgeom", "auto") => self.inertia_from_geoms = None,
+                ("inertiafromgeom", "true") => self.inertia_from_geoms = Some(true),
+                ("inertiafromgeom", "false") => self.inertia_from_geoms = Some(false),
+                ("coordinate", "local")
+                | ("autolimits" | "texturedir" | "strippath" | "discardvisual" | "usethread", _) => {}
+                (key @ ("angle" | "eulerseq" | "inertiafromgeom" | "coordinate"), _) => {
+                    return Err(self.source.error_in(node, key, "is not one of the choices"));
+                }
+                (key, _) => self.found.leave_out(self.source.line(node), format!("setting {key} of <compiler>")),
+            }
+        }
+        Ok(())
+    }
+
+    fn option(&mut self, node: Node) -> Result<(), Failure> {
+        if let Some(gravity) = self.source.numbers(node, "gravity")? {
+            self.found.gravity = Vec3::from(gravity);
+        }
+        let others = node.attributes().filter(|attribute| attribute.name() != "gravity");
+        for attribute in others {
+            self.found.leave_out(self.source.line(node), format!("setting {} of <option>", attribute.name()));
+        }
+        Ok(())
+    }
+
+    /// Reads a class of defaults, which begins with those of `parent`.
+    fn defaults(&mut self, node: Node<'n, 'i>, parent: Option<&'n str>, depth: usize) -> Result<(), Failure> {
+        if depth > DEEPEST {
+            return Err(too_deep(self.source, node));
+        }
+        let class = match (node.attribute("class"), parent) {
+            (Some(class), _) => class,
+            (None, None) => MAIN,
+            (None, Some(_)) => return Err(self.source.error(node, "the attribute `class` is missing")),
+        };
+        let inherited = parent.and_then(|parent| self.classes.get(parent));
+        let mut own: Defaults = inherited.or_else(|| self.classes.get(class)).cloned().unwrap_or_default();
+        for element in node.children().filter(|child| child.is_element() && !child.has_tag_name("default")) {
+            let values = own.entry(element.tag_name().name()).or_default();
+            values.extend(element.attributes().map(|attribute| (attribute.name(), attribute.value())));
+        }
+        self.classes.insert(class, own);
+        node.children()
+            .filter(|child| child.has_tag_name("default"))
+            .try_for_each(|child| self.defaults(child, Some(class), depth + 1))
+    }
+
+    fn assets(&mut self, node: Node<'n, 'i>) -> Result<(), Failure> {
+        for asset in node.children().filter(Node::is_element) {
+            match asset.tag_name().name() {
+                "mesh" => {
+                    let file = asset.attribute("file").map(|file| {
+                        let last = file.rsplit('/').next().unwrap_or(file);
+                        last.rsplit_once('.').map_or(last, |(stem, _)| stem)
+                    });
+                    if let Some(name) = asset.attribute("name").or(file) {
+                        self.meshes.insert(name.to_owned(), asset);
+                    }
+                }
+                "material" => {
+                    if let Some((name, colour)) = asset.attribute("name").zip(asset.attribute("rgba")) {
+                        self.colours.insert(name, colour);
+                    }
+                }
+                other => self.found.leave_out(self.source.line(asset), format!("<{other}> of <asset>")),
+            }
+        }
+        Ok(())
+    }
+
+    /// The attribute `key` of an element: its own, or that of its class.
+    fn attribute(&self, node: Node<'n, 'i>, class: &str, key: &str) -> Option<&'n str> {
+        let class = node.attribute("class").unwrap_or(class);
+        let default = || self.classes.get(class)?.get(node.tag_name().name())?.get(key).copied();
+        node.attribute(key).or_else(default)
+    }
+
+    fn numbers<const N: usize>(&self, node: Node<'n, 'i>, class: &str, key: &str) -> Result<Option<[f64; N]>, Failure> {
+        let Some(text) = self.attribute(node, class, key) else {
+            return Ok(None);
+        };
+        Ok(self.source.parse(node, key, text, [N, N])?.try_into().ok())
+    }
+
+    fn number(&self, node: Node<'n, 'i>, class: &str, key: &str) -> Result<f64, Failure> {
+        Ok(self.numbers::<1>(node, class, key)?.map_or(0.0, |[number]| number))
+    }
+
+    /// Notes attributes of an element that are not `known`; places, names and groups always are.
+    fn leave_out_attributes(&mut self, node: Node<'n, 'i>, known: &[&str]) {
+        const ALWAYS: [&str; 11] =
+            ["name", "class", "childclass", "group", "user", "pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"];
+        let tag = node.tag_name().name();
+        for key in node.attributes().map(|attribute| attribute.name()) {
+            if !ALWAYS.contains(&key) && !known.contains(&key) {
+                self.found.leave_out(self.source.line(node), format!("{key} of <{tag}>"));
+            }
+        }
+    }
+
+    /// Where an element is in its parent.
+    fn place(&self, node: Node<'n, 'i>, class: &str) -> Result<Place, Failure> {
+        let position = self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from);
+        Ok(Place { position, rotation: self.rotation(node, class)? })
+    }
+
+    fn rotation(&self, node: Node<'n, 'i>, class: &str) -> Result<Quat, Failure> {
+        let direction = |v: Vec3, key: &str| {
+            v.try_normalize(1e-12).ok_or_else(|| self.source.error(node, &format!("{key} has no direction")))
+        };
+        if let Some([w, x, y, z]) = self.numbers(node, class, "quat")? {
+            let size = [w, x, y, z].iter().map(|part| part * part).sum::<f64>().sqrt();
+            if !(size > 0.0) {
+                return Err(self.source.error(node, "quat is 0"));
+            }
+            // The double cover does not matter.
+            let axis = Vec3::new(x, y, z);
+            let angle = 2.0 * libm::atan2(axis.norm(), w);
+            return Ok(axis.try_normalize(0.0).map_or_else(Quat::identity, |axis| turn(axis, angle)));
+        }
+        if let Some([x, y, z, angle]) = self.numbers(node, class, "axisangle")? {
+            return Ok(turn(direction(Vec3::new(x, y, z), "axisangle")?, self.angle * angle));
+        }
+        if let Some(angles) = self.numbers::<3>(node, class, "euler")? {
+            let mut found = Quat::identity();
+            for (axis, angle) in self.sequence.chars().zip(angles) {
+                let about = match axis.to_ascii_lowercase() {
+                    'x' => Vec3::x(),
+                    'y' => Vec3::y(),
+                    _ => Vec3::z(),
+                };
+                let next = turn(about, self.angle * angle);
+                // Small letters turn about the axes that turn along, capitals about the fixed ones.
+                found = if axis.is_ascii_lowercase() { found * next } else { next * found };
+            }
+            return Ok(found);
+        }
+        if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "xyaxes")? {
+            let x = direction(Vec3::new(a, b, c), "xyaxes")?;
+            let y = Vec3::new(d, e, f);
+            let y = direction(y - x * x.dot(&y), "xyaxes")?;
+            return Ok(Quat::from_matrix(&Mat3::from_columns(&[x, y, x.cross(&y)])));
+        }
+        if let Some(z) = self.numbers(node, class, "zaxis")? {
+            return Ok(to_z(direction(Vec3::from(z), "zaxis")?));
+        }
+        Ok(Quat::identity())
+    }
+
+    /// Reads a body, which lies at `place` in the body `carrier`, and those in it. Without joints it is a part of its parent.
+    fn body(
+        &mut self,
+        node: Node<'n, 'i>,
+        carrier: Option<usize>,
+        place: &Place,
+        class: &'n str,
+        depth: usize,
+    ) -> Result<(), Failure> {
+        if depth > DEEPEST {
+            return Err(too_deep(self.source, node));
+        }
+        let class = node.attribute("childclass").unwrap_or(class);
+        self.leave_out_attributes(node, &[]);
+        let is_joint = |child: &Node| matches!(child.tag_name().name(), "joint" | "freejoint");
+        let joints: Vec<_> = node.children().filter(is_joint).collect();
+        let (mut owner, mut at) = (carrier, *place);
+        if !joints.is_empty() {
+            let index = self.found.bodies.len();
+            let name = node.attribute("name").map_or_else(|| format!("body{}", index + 1), str::to_owned);
+            let joint = self.joint(node, &joints, class, [carrier, Some(index)], place, &name)?;
+            self.found.joints.push(joint);
+            let inertial = Inertial { mass: 0.0, centre: Vec3::zeros(), inertia: Mat3::zeros() };
+            self.found.bodies.push(Body { name, inertial, shapes: Vec::new() });
+            (owner, at) = (Some(index), Place::identity());
+            if let Some(name) = node.attribute("name") {
+                self.bodies.insert(name, index);
+            }
+        }
+        self.contents(node, owner, &at, class)?;
+        for inner in node.children().filter(|child| child.has_tag_name("body")) {
+            let class = inner.attribute("childclass").unwrap_or(class);
+            let inner_place = at.then(&self.place(inner, class)?);
+            self.body(inner, owner, &inner_place, class, depth + 1)?;
+        }
+        // Parts without joints have their mass here, too.
+        if let Some(index) = owner.filter(|_| !joints.is_empty())
+            && !(self.found.bodies[index].inertial.mass > 0.0)
+        {
+            return Err(self
+                .source
+                .error(node, "a moving body needs a mass above 0 kg, in <inertial> or in its geoms"));
+        }
+        Ok(())
+    }
+
+    /// Adds mass and shapes of a body to the body `owner`, in which it lies at `place`.
+    fn contents(
+        &mut self,
+        node: Node<'n, 'i>,
+        owner: Option<usize>,
+        place: &Place,
+        class: &'n str,
+    ) -> Result<(), Failure> {
+        let own = child(node, "inertial").filter(|_| self.inertia_from_geoms != Some(true));
+        let mut total = own.map(|inertial| self.inertial(inertial, class)).transpose()?;
+        let from_geoms = total.is_none() && self.inertia_from_geoms != Some(false) && owner.is_some();
+        for part in node.children().filter(Node::is_element) {
+            let line = self.source.line(part);
+            match part.tag_name().name() {
+                "body" | "joint" | "freejoint" | "inertial" => {}
+                "geom" => {
+                    let (shape, mass) = self.geom(part, class, from_geoms)?;
+                    if let Some(mass) = mass {
+                        total = Some(total.map_or(mass, |total| total.plus(mass)));
+                    }
+                    if let Some(shape) = shape {
+                        let shape = Shape { place: place.then(&shape.place), ..shape };
+                        match owner {
+                            Some(body) => self.found.bodies[body].shapes.push(shape),
+                            None => self.found.fixed.push(shape),
+                        }
+                    }
+                }
+                "frame" | "replicate" | "composite" | "flexcomp" | "attach" | "include" => {
+                    return Err(self.source.error(part, "is not read: write the bodies that it stands for"));
+                }
+                other => self.found.leave_out(line, format!("<{other}> of a body")),
+            }
+        }
+        if let (Some(total), Some(body)) = (total, owner) {
+            let own = &mut self.found.bodies[body].inertial;
+            *own = own.plus(place.inertial(total));
+        }
+        Ok(())
+    }
+
+    fn inertial(&self, node: Node<'n, 'i>, class: &str) -> Result<Inertial, Failure> {
+        let place = self.place(node, class)?;
+        self.source.require(node, "mass")?;
+        let mass = self.source.number(node, "mass")?.unwrap_or_default();
+        let inertia = match self.source.numbers(node, "fullinertia")? {
+            Some([xx, yy, zz, xy, xz, yz]) => Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+            None => {
+                self.source.require(node, "diaginertia")?;
+                Mat3::from_diagonal(&self.source.numbers(node, "diaginertia")?.map_or_else(Vec3::zeros, Vec3::from))
+            }
+        };
+        Ok(place.inertial(Inertial { mass, centre: Vec3::zeros(), inertia }))
+    }
+
+    /// Shape and, if `weighs`, mass of a geom, in the axes of its body.
+    fn geom(
+        &mut self,
+        node: Node<'n, 'i>,
+        class: &str,
+        weighs: bool,
+    ) -> Result<(Option<Shape>, Option<Inertial>), Failure> {
+        let line = self.source.line(node);
+        self.leave_out_attributes(node, &GEOM);
+        if ["contype", "conaffinity"].iter().any(|key| self.attribute(node, class, key) != Some("0")) {
+            self.found.leave_out(line, "contact between geoms: bodies do not touch each other");
+        }
+        let mut place = self.place(node, class)?;
+        let kind = self.attribute(node, class, "type").unwrap_or("sphere");
+        let sizes = self.attribute(node, class, "size").map(|text| self.source.parse(node, "size", text, [1, 3]));
+        let sizes = sizes.transpose()?.unwrap_or_default();
+        let size = |at: usize| {
+            let size = sizes.get(at).copied().filter(|size| *size > 0.0);
+            size.ok_or_else(|| self.source.error(node, &format!("size: a {kind} needs number {} above 0", at + 1)))
+        };
+        let mut half = None;
+        if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? {
+            let (from, to) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
+            let along = (to - from).try_normalize(1e-12);
+            let along = along.ok_or_else(|| self.source.error(node, "fromto: both points are the same"))?;
+            place = Place { position: 0.5 * (from + to), rotation: to_z(along) };
+            half = Some(0.5 * (to - from).norm());
+        }
+        let length = |at: usize| half.map_or_else(|| size(at), Ok);
+        let colour = self.attribute(node, class, "rgba");
+        let material = || self.attribute(node, class, "material").and_then(|name| self.colours.get(name).copied());
+        let colour = colour.or_else(material).map(|text| self.source.parse(node, "rgba", text, [4, 4])).transpose()?;
+        let colour = colour.map(|rgba| [rgba[0], rgba[1], rgba[2]]);
+        let (form, solid) = match kind {
+            "sphere" => (Some(Form::Sphere(size(0)?)), Some(Solid::Ellipsoid([size(0)?; 3]))),
+            "capsule" => {
+                let (r, h) = (size(0)?, length(1)?);
+                (Some(Form::Capsule(r, h)), Some(Solid::Capsule(r, h)))
+            }
+            "cylinder" => {
+                let (r, h) = (size(0)?, length(1)?);
+                (Some(Form::Cylinder(r, h)), Some(Solid::Cylinder(r, h)))
+            }
+            "box" | "ellipsoid" => {
+                let axes = match half {
+                    Some(half) => [size(0)?, size(0)?, half],
+                    None => [size(0)?, size(1)?, size(2)?],
+                };
+                if kind == "box" {
+                    (Some(Form::Box(axes)), Some(Solid::Box(axes)))
+                } else {
+                    self.found.leave_out(line, "picture of an ellipsoid");
+                    (None, Some(Solid::Ellipsoid(axes)))
+                }
+            }
+            "mesh" => (self.mesh(node, class, line)?, None),
+            "plane" | "hfield" => {
+                self.found.leave_out(line, format!("geom of type {kind}"));
+                return Ok((None, None));
+            }
+            _ => {
+                let allowed = "allowed: sphere, capsule, cylinder, box, ellipsoid, mesh, plane, hfield";
+                return Err(self.source.error(node, &format!("type = \"{kind}\": {allowed}")));
+            }
+        };
+        let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
+        let density = self.numbers::<1>(node, class, "density")?.map_or(DENSITY, |[density]| density);
+        let mass = match (weighs, solid) {
+            (false, _) => None,
+            _ if mass == Some(0.0) || (mass.is_none() && density == 0.0) => None,
+            (true, Some(solid)) => {
+                let mass = mass.unwrap_or_else(|| density * solid.volume());
+                let turn = *place.rotation.to_rotation_matrix().matrix();
+                Some(Inertial::of_solid(solid, mass, place.position, turn))
+            }
+            (true, None) => {
+                let message =
+                    "the mass of a mesh is not computed: give its body an <inertial>, or the geom mass = \"0\"";
+                return Err(self.source.error(node, message));
+            }
+        };
+        Ok((form.map(|form| Shape { form, place, colour, line }), mass))
+    }
+
+    fn mesh(&mut self, node: Node<'n, 'i>, class: &str, line: u32) -> Result<Option<Form>, Failure> {
+        let name = self.attribute(node, class, "mesh");
+        let name = name.ok_or_else(|| self.source.error(node, "the attribute `mesh` is missing"))?;
+        let asset =
+            *self.meshes.get(name).ok_or_else(|| self.source.error(node, &format!("there is no mesh {name}")))?;
+        let scale = self.numbers::<3>(asset, MAIN, "scale")?.unwrap_or([1.0; 3]);
+        let moved = ["refpos", "refquat"].into_iter().find(|key| asset.attribute(*key).is_some());
+        let fault = match (asset.attribute("file"), moved) {
+            (None, _) => Some("has no file".to_owned()),
+            (_, Some(key)) => Some(format!("has {key}")),
+            _ if scale != [scale[0]; 3] || scale[0] <= 0.0 => Some("whose scale differs between axes".to_owned()),
+            _ => None,
+        };
+        if let Some(fault) = fault {
+            self.found.leave_out(line, format!("mesh {name}, which {fault}").replace("which whose", "whose"));
+            return Ok(None);
+        }
+        let folder = self.mesh_folder.trim_end_matches('/').trim_start_matches("./");
+        let file = asset.attribute("file").unwrap_or_default();
+        let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
+        Ok(Some(Form::Mesh(file, scale[0])))
+    }
+
+    /// The joint of a body with these joint elements.
+    fn joint(
+        &mut self,
+        body: Node<'n, 'i>,
+        nodes: &[Node<'n, 'i>],
+        class: &str,
+        [parent, child]: [Option<usize>; 2],
+        place: &Place,
+        body_name: &str,
+    ) -> Result<Joint, Failure> {
+        let mut parts = Vec::new();
+        for &node in nodes {
+            let kind = match node.tag_name().name() {
+                "freejoint" => "free",
+                _ => self.attribute(node, class, "type").unwrap_or("hinge"),
+            };
+            let axis = self.numbers(node, class, "axis")?.map_or_else(Vec3::z, Vec3::from);
+            let axis = axis.try_normalize(1e-12);
+            let axis = axis.ok_or_else(|| self.source.error(node, "axis has no direction"))?;
+            let anchor = self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from);
+            if !["hinge", "slide", "ball", "free"].contains(&kind) {
+                let message = format!("type = \"{kind}\": allowed: hinge, slide, ball, free");
+                return Err(self.source.error(node, &message));
+            }
+            self.leave_out_attributes(node, &JOINT);
+            for key in ["armature", "frictionloss", "ref"] {
+                if self.attribute(node, class, key).is_some_and(|value| value.trim() != "0") {
+                    self.found.leave_out(self.source.line(node), format!("{key} of <joint>"));
+                }
+            }
+            if self.attribute(node, class, "range").is_some() {
+                let what = "range of a joint: a [[stop]] needs its stiffness, too";
+                self.found.leave_out(self.source.line(node), what);
+            }
+            parts.push((node, kind, axis, anchor));
+        }
+        let parallel = |a: &Vec3, b: &Vec3| a.dot(b).abs() > PARALLEL;
+        let kind = match parts[..] {
+            [(_, "hinge", axis, _)] => Kind::Hinge(axis),
+            [(_, "slide", axis, _)] => Kind::Slide(axis),
+            [(_, "ball", ..)] => Kind::Ball,
+            [(_, "free", ..)] => Kind::Free,
+            [(_, a, axis, _), (_, b, other, _)]
+                if a != b && [a, b].iter().all(|k| ["hinge", "slide"].contains(k)) && parallel(&axis, &other) =>
+            {
+                Kind::Cylindrical(axis)
+            }
+            [(_, "hinge", axis, at), (_, "hinge", other, too)]
+                if axis.dot(&other).abs() < PERPENDICULAR && (at - too).norm() < 1e-9 =>
+            {
+                Kind::Universal(axis, other)
+            }
+            _ => {
+                let message = "its joints are together none that a scene has: one joint; a hinge and a slide along one axis; or two \
+                               perpendicular hinges in one point. Put a body between them";
+                return Err(self.source.error(body, message));
+            }
+        };
+        if let (Kind::Free, Some(_)) = (kind, parent) {
+            return Err(self.source.error(body, "only a body of the world moves freely"));
+        }
+        let springs = self.springs(&parts.iter().map(|part| (part.0, part.1)).collect::<Vec<_>>(), class, kind)?;
+        // Of a cylindrical joint, the point on the axis of its hinge.
+        let anchor = parts.iter().find(|part| part.1 == "hinge").unwrap_or(&parts[0]).3;
+        let name = nodes[0].attribute("name").unwrap_or(body_name).to_owned();
+        let anchor = if kind == Kind::Free { Vec3::zeros() } else { anchor };
+        Ok(Joint { name, kind, parent, child: child.unwrap_or_default(), place: *place, anchor, springs })
+    }
+
+    /// Springs and dampers of joint elements.
+    fn springs(&mut self, parts: &[(Node<'n, 'i>, &str)], class: &str, kind: Kind) -> Result<Vec<Spring>, Failure> {
+        let mut found = Vec::new();
+        for (at, &(node, of)) in parts.iter().enumerate() {
+            let (stiffness, damping) = (self.number(node, class, "stiffness")?, self.number(node, class, "damping")?);
+            if stiffness == 0.0 && damping == 0.0 {
+                continue;
+            }
+            let turns = of == "hinge";
+            if !turns && of != "slide" {
+                self.found.leave_out(self.source.line(node), format!("stiffness and damping of a {of} joint"));
+                continue;
+            }
+            let coordinate = match (kind, turns, at) {
+                (Kind::Cylindrical(_), true, _) | (Kind::Universal(..), _, 0) => Some("angle"),
+                (Kind::Cylindrical(_), false, _) => Some("position"),
+                (Kind::Universal(..), ..) => Some("child_angle"),
+                _ => None,
+            };
+            let rest = self.number(node, class, "springref")? * if turns { self.angle } else { 1.0 };
+            found.push(Spring { coordinate, turns, stiffness, damping, rest });
+        }
+        Ok(found)
+    }
+
+    /// Reads `<connect>`: a ball joint that closes a loop.
+    fn equality(&mut self, section: Node<'n, 'i>) -> Result<(), Failure> {
+        let poses = self.found.poses();
+        for node in section.children().filter(Node::is_element) {
+            let connects = node.has_tag_name("connect") && node.attribute("body1").is_some();
+            if !connects || node.attribute("active") == Some("false") {
+                self.found.leave_out(self.source.line(node), format!("<{}> of <equality>", node.tag_name().name()));
+                continue;
+            }
+            let find = |key: &str| match node.attribute(key) {
+                None | Some("world") => Ok(None),
+                Some(name) => match self.bodies.get(name) {
+                    Some(&body) => Ok(Some(body)),
+                    None => Err(self.source.error_in(node, key, "is no body with a joint")),
+                },
+            };
+            let bodies = [find("body1")?, find("body2")?];
+            self.source.require(node, "anchor")?;
+            let anchor = self.source.numbers(node, "anchor")?.map_or_else(Vec3::zeros, Vec3::from);
+            let pose = |body: Option<usize>| body.map_or_else(Place::identity, |body| poses[body]);
+            let there = pose(bodies[0]).point(anchor);
+            let second = pose(bodies[1]);
+            let points = [anchor, second.rotation.inverse() * (there - second.position)];
+            let name = node
+                .attribute("name")
+                .map_or_else(|| format!("connect{}", self.found.closures.len() + 1), str::to_owned);
+            self.found.closures.push(Closure { name, bodies, points });
+        }
+        Ok(())
+    }
+}
+
+/// A turn about a unit axis, rad.
+fn turn(axis: Vec3, angle: f64) -> Quat {
+    Quat::from_scaled_axis(angle * axis)
+}
+
+/// The shortest turn that takes z to the unit vector `direction`.
+fn to_z(direction: Vec3) -> Quat {
+    let axis = Vec3::z().cross(&direction);
+    let angle = libm::atan2(axis.norm(), direction.z);
+    turn(axis.try_normalize(1e-12).unwrap_or_else(Vec3::x), angle)
+}

@@ -1,0 +1,66 @@
+//! `import`: a robot description, URDF or MJCF, as the text of a scene file.
+
+mod description;
+mod inertia;
+mod mjcf;
+mod urdf;
+mod write;
+mod xml;
+
+use std::path::Path;
+
+use roxmltree::{Document, Node, ParsingOptions};
+
+use super::args::ImportArguments;
+use super::{Failure, print, warn};
+use crate::scene::Scene;
+use description::Description;
+use xml::Source;
+
+/// Size limit for a description, bytes: that of a scene file.
+const LARGEST: u64 = 4 << 20;
+/// Largest number of bodies that carry each other in a row.
+const DEEPEST: usize = 1000;
+/// Limit for its elements, attributes and texts.
+const MOST_NODES: u32 = 500_000;
+
+/// Runs `import`.
+///
+/// # Errors
+/// An unreadable file, one that is neither URDF nor MJCF, or a part of it without which the machine is another one.
+pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
+    let path = &arguments.file;
+    let name = path.display().to_string();
+    let failed = |error: std::io::Error| Failure::io(format!("{name}: cannot read this file: {error}"));
+    if path.metadata().map_err(failed)?.len() > LARGEST {
+        return Err(Failure::usage(format!("{name}: too large; allowed at most {} MiB", LARGEST >> 20)));
+    }
+    let text = std::fs::read_to_string(path).map_err(failed)?;
+    let mut description = read(&name, &text)?;
+    description.keep_existing_meshes(path.parent().unwrap_or(Path::new("")));
+    let text = write::scene(&description, &name)?;
+    // The scene is read before anybody else reads it.
+    Scene::parse_given(&text, None, &Default::default(), path.parent(), &[])
+        .map_err(|error| Failure::usage(format!("{name}: what was read makes no scene: {error}")))?;
+    for left in description.left_out() {
+        warn(&format!("{name}: {left}"));
+    }
+    print(&text)
+}
+
+fn too_deep(source: &Source, node: Node) -> Failure {
+    source.error(node, &format!("more than {DEEPEST} parts in a row"))
+}
+
+fn read(name: &str, text: &str) -> Result<Description, Failure> {
+    let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options)
+        .map_err(|error| Failure::usage(format!("{name}: is not an XML file: {error}")))?;
+    let root = document.root_element();
+    let source = Source { file: name, document: &document };
+    match root.tag_name().name() {
+        "robot" => urdf::read(&source, root),
+        "mujoco" => mjcf::read(&source, root),
+        other => Err(source.error(root, &format!("<{other}> is neither <robot> (URDF) nor <mujoco> (MJCF)"))),
+    }
+}

@@ -1,0 +1,294 @@
+//! URDF, <http://wiki.ros.org/urdf/XML>: a tree of links, the first of which stands on the world. Links on fixed joints become one body.
+
+use std::collections::BTreeMap;
+
+use roxmltree::Node;
+
+use super::description::{Body, Description, Form, Joint, Kind, Place, Shape, Spring};
+use super::inertia::Inertial;
+use super::xml::{Source, child};
+use super::{DEEPEST, too_deep};
+use crate::cli::Failure;
+use crate::machine::{Mat3, Quat, Vec3};
+
+/// What is known of the parts while the tree is walked.
+struct Tree<'s, 'n, 'i> {
+    source: &'s Source<'s>,
+    links: BTreeMap<&'n str, Node<'n, 'i>>,
+    /// Joints by parent link, in the order of the file.
+    joints: BTreeMap<&'n str, Vec<Node<'n, 'i>>>,
+    colours: BTreeMap<&'n str, [f64; 3]>,
+    found: Description,
+}
+
+/// Reads `<robot>`.
+///
+/// # Errors
+/// A missing or invalid part, a link with several parents or none that leads to the first, a joint of another kind.
+pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
+    let mut tree = Tree {
+        source,
+        links: BTreeMap::new(),
+        joints: BTreeMap::new(),
+        colours: BTreeMap::new(),
+        found: Description::new(robot.attribute("name").unwrap_or("robot")),
+    };
+    let mut carried: BTreeMap<&str, Node> = BTreeMap::new();
+    for node in robot.children().filter(Node::is_element) {
+        match node.tag_name().name() {
+            "link" => {
+                if tree.links.insert(source.require(node, "name")?, node).is_some() {
+                    return Err(source.error(node, "a second link of this name"));
+                }
+            }
+            "joint" => {
+                let [parent, child] = ends(source, node)?;
+                tree.joints.entry(parent).or_default().push(node);
+                if let Some(first) = carried.insert(child, node) {
+                    let line = source.line(first);
+                    return Err(
+                        source.error(node, &format!("{child} already has a parent, by the joint on line {line}"))
+                    );
+                }
+            }
+            "material" => {
+                let colour = child(node, "color").map(|c| source.numbers::<4>(c, "rgba")).transpose()?.flatten();
+                if let Some(([r, g, b, _], name)) = colour.zip(node.attribute("name")) {
+                    tree.colours.insert(name, [r, g, b]);
+                }
+            }
+            other => tree.found.leave_out(source.line(node), format!("<{other}>")),
+        }
+    }
+    for (child, joint) in &carried {
+        if !tree.links.contains_key(child) {
+            return Err(source.error(*joint, &format!("there is no link {child}")));
+        }
+    }
+    for (parent, joints) in &tree.joints {
+        if !tree.links.contains_key(parent) {
+            return Err(source.error(joints[0], &format!("there is no link {parent}")));
+        }
+    }
+    let roots: Vec<&str> = tree.links.keys().copied().filter(|link| !carried.contains_key(link)).collect();
+    let [root] = roots[..] else {
+        let what = if roots.is_empty() { "the joints form a ring".to_owned() } else { roots.join(", ") };
+        return Err(source
+            .error(robot, &format!("one link must have no parent, and stands on the world; without parent: {what}")));
+    };
+    tree.walk(root, None, &Place::identity(), 0)?;
+    if tree.found.bodies.is_empty() {
+        return Err(source.error(robot, "no joint moves"));
+    }
+    let moving = tree.joints.values().flatten().filter(|joint| joint.attribute("type") != Some("fixed")).count();
+    if tree.found.bodies.len() < moving {
+        return Err(source.error(robot, "some links are carried by each other in a ring, and not by the world"));
+    }
+    Ok(tree.found)
+}
+
+/// Names of the links that a joint connects.
+fn ends<'n>(source: &Source, joint: Node<'n, '_>) -> Result<[&'n str; 2], Failure> {
+    let end = |tag: &str| -> Result<&'n str, Failure> {
+        let node = joint.children().find(|node| node.has_tag_name(tag));
+        let node = node.ok_or_else(|| source.error(joint, &format!("<{tag}> is missing")))?;
+        node.attribute("link").ok_or_else(|| source.error(node, "the attribute `link` is missing"))
+    };
+    Ok([end("parent")?, end("child")?])
+}
+
+impl<'n> Tree<'_, 'n, '_> {
+    /// Adds `link` to the body `carrier`, where it lies at `place`, and what hangs on it.
+    fn walk(&mut self, link: &'n str, carrier: Option<usize>, place: &Place, depth: usize) -> Result<(), Failure> {
+        if depth > DEEPEST {
+            return Err(too_deep(self.source, self.links[link]));
+        }
+        self.take(self.links[link], carrier, place)?;
+        for joint in self.joints.get(link).cloned().unwrap_or_default() {
+            let [_, child_link] = ends(self.source, joint)?;
+            let at = place.then(&self.origin(joint)?);
+            let Some(kind) = self.kind(joint)? else {
+                self.walk(child_link, carrier, &at, depth + 1)?;
+                continue;
+            };
+            let index = self.found.bodies.len();
+            let empty = Inertial { mass: 0.0, centre: Vec3::zeros(), inertia: Mat3::zeros() };
+            self.found.bodies.push(Body { name: child_link.to_owned(), inertial: empty, shapes: Vec::new() });
+            let springs = self.damper(joint, kind)?;
+            self.found.joints.push(Joint {
+                name: self.source.require(joint, "name")?.to_owned(),
+                kind,
+                parent: carrier,
+                child: index,
+                place: at,
+                anchor: Vec3::zeros(),
+                springs,
+            });
+            self.walk(child_link, Some(index), &Place::identity(), depth + 1)?;
+            if !(self.found.bodies[index].inertial.mass > 0.0) {
+                let message = "a moving link needs an <inertial> with a mass above 0 kg";
+                return Err(self.source.error(self.links[child_link], message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds mass and shapes of a link.
+    fn take(&mut self, link: Node, carrier: Option<usize>, place: &Place) -> Result<(), Failure> {
+        for node in link.children().filter(Node::is_element) {
+            let line = self.source.line(node);
+            match node.tag_name().name() {
+                "inertial" => {
+                    let inertial = place.inertial(self.inertial(node)?);
+                    match carrier {
+                        Some(body) => {
+                            let own = &mut self.found.bodies[body].inertial;
+                            *own = own.plus(inertial);
+                        }
+                        None => self.found.leave_out(line, "mass of a link that does not move"),
+                    }
+                }
+                "visual" => {
+                    if let Some(shape) = self.shape(node, place)? {
+                        match carrier {
+                            Some(body) => self.found.bodies[body].shapes.push(shape),
+                            None => self.found.fixed.push(shape),
+                        }
+                    }
+                }
+                "collision" => self.found.leave_out(line, "<collision>: bodies do not touch each other"),
+                other => self.found.leave_out(line, format!("<{other}> of a link")),
+            }
+        }
+        Ok(())
+    }
+
+    /// Place of a part in its link, or of a joint's child in its parent.
+    fn origin(&self, node: Node) -> Result<Place, Failure> {
+        let Some(origin) = child(node, "origin") else {
+            return Ok(Place::identity());
+        };
+        let position = self.source.numbers(origin, "xyz")?.map_or_else(Vec3::zeros, Vec3::from);
+        let [roll, pitch, yaw] = self.source.numbers(origin, "rpy")?.unwrap_or_default();
+        Ok(Place { position, rotation: Quat::from_euler_angles(roll, pitch, yaw) })
+    }
+
+    fn inertial(&self, node: Node) -> Result<Inertial, Failure> {
+        let place = self.origin(node)?;
+        let part = |tag: &str| child(node, tag).ok_or_else(|| self.source.error(node, &format!("<{tag}> is missing")));
+        let mass_node = part("mass")?;
+        self.source.require(mass_node, "value")?;
+        let mass = self.source.number(mass_node, "value")?.unwrap_or_default();
+        if mass < 0.0 {
+            return Err(self.source.error_in(mass_node, "value", "a mass is not below 0 kg"));
+        }
+        let tensor = part("inertia")?;
+        let mut found = [0.0; 6];
+        for (value, key) in found.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
+            self.source.require(tensor, key)?;
+            *value = self.source.number(tensor, key)?.unwrap_or_default();
+        }
+        let [xx, yy, zz, xy, xz, yz] = found;
+        let inertia = Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        Ok(place.inertial(Inertial { mass, centre: Vec3::zeros(), inertia }))
+    }
+
+    fn shape(&mut self, visual: Node, place: &Place) -> Result<Option<Shape>, Failure> {
+        let geometry = child(visual, "geometry").ok_or_else(|| self.source.error(visual, "<geometry> is missing"))?;
+        let line = self.source.line(visual);
+        let Some(node) = geometry.children().find(Node::is_element) else {
+            return Err(self.source.error(geometry, "is empty"));
+        };
+        let size = |key: &str| -> Result<f64, Failure> {
+            self.source.require(node, key)?;
+            Ok(self.source.number(node, key)?.unwrap_or_default())
+        };
+        let form = match node.tag_name().name() {
+            "sphere" => Form::Sphere(size("radius")?),
+            "cylinder" => Form::Cylinder(size("radius")?, 0.5 * size("length")?),
+            "capsule" => Form::Capsule(size("radius")?, 0.5 * size("length")?),
+            "box" => {
+                self.source.require(node, "size")?;
+                Form::Box(self.source.numbers::<3>(node, "size")?.unwrap_or_default().map(|edge| 0.5 * edge))
+            }
+            "mesh" => {
+                let file = self.source.require(node, "filename")?;
+                let scale = self.source.numbers::<3>(node, "scale")?.unwrap_or([1.0; 3]);
+                if scale != [scale[0]; 3] || scale[0] <= 0.0 {
+                    self.found.leave_out(line, format!("mesh {file}, whose scale differs between axes"));
+                    return Ok(None);
+                }
+                // The package is the folder in which the scene lies.
+                let inside =
+                    file.strip_prefix("package://").and_then(|rest| rest.split_once('/')).map(|(_, inside)| inside);
+                let file = inside.or(file.strip_prefix("file://")).unwrap_or(file).trim_start_matches("./");
+                Form::Mesh(file.to_owned(), scale[0])
+            }
+            other => {
+                self.found.leave_out(line, format!("shape <{other}>"));
+                return Ok(None);
+            }
+        };
+        let material = child(visual, "material");
+        let own = material.and_then(|m| child(m, "color")).map(|c| self.source.numbers::<4>(c, "rgba")).transpose()?;
+        let known = material.and_then(|m| m.attribute("name")).and_then(|name| self.colours.get(name).copied());
+        let colour = own.flatten().map(|[r, g, b, _]| [r, g, b]).or(known);
+        Ok(Some(Shape { form, place: place.then(&self.origin(visual)?), colour, line }))
+    }
+
+    /// How a joint moves; `None` for a fixed one.
+    fn kind(&mut self, joint: Node) -> Result<Option<Kind>, Failure> {
+        let axis = || -> Result<Vec3, Failure> {
+            let Some(node) = child(joint, "axis") else {
+                return Ok(Vec3::x());
+            };
+            let axis = self.source.numbers(node, "xyz")?.map_or_else(Vec3::x, Vec3::from);
+            let direction = axis.try_normalize(1e-12);
+            direction.ok_or_else(|| self.source.error_in(node, "xyz", "an axis has a direction"))
+        };
+        let kind = match self.source.require(joint, "type")? {
+            "fixed" => return Ok(None),
+            "revolute" | "continuous" => Kind::Hinge(axis()?),
+            "prismatic" => Kind::Slide(axis()?),
+            "spherical" | "ball" => Kind::Ball,
+            "floating" => Kind::Free,
+            _ => {
+                let allowed = "allowed: fixed, revolute, continuous, prismatic, spherical, floating";
+                return Err(self.source.error_in(joint, "type", allowed));
+            }
+        };
+        for node in joint.children().filter(Node::is_element) {
+            let line = self.source.line(node);
+            match node.tag_name().name() {
+                "origin" | "parent" | "child" | "axis" | "dynamics" => {}
+                "limit" if joint.attribute("type") == Some("continuous") => {}
+                "limit" => self.found.leave_out(line, "limits of a joint: a [[stop]] needs their stiffness, too"),
+                "mimic" => self.found.leave_out(line, "<mimic>: the joint moves by itself"),
+                other => self.found.leave_out(line, format!("<{other}> of a joint")),
+            }
+        }
+        Ok(Some(kind))
+    }
+
+    fn damper(&mut self, joint: Node, kind: Kind) -> Result<Vec<Spring>, Failure> {
+        let Some(node) = child(joint, "dynamics") else {
+            return Ok(Vec::new());
+        };
+        let line = self.source.line(node);
+        if self.source.number(node, "friction")?.unwrap_or_default() != 0.0 {
+            self.found.leave_out(line, "friction in a joint");
+        }
+        let damping = self.source.number(node, "damping")?.unwrap_or_default();
+        let turns = match kind {
+            Kind::Hinge(_) => true,
+            Kind::Slide(_) => false,
+            _ if damping != 0.0 => {
+                self.found.leave_out(line, "damping of a joint that is neither a hinge nor a slide");
+                return Ok(Vec::new());
+            }
+            _ => return Ok(Vec::new()),
+        };
+        let spring = Spring { coordinate: None, turns, stiffness: 0.0, damping, rest: 0.0 };
+        Ok((damping != 0.0).then_some(spring).into_iter().collect())
+    }
+}

@@ -1,0 +1,252 @@
+//! A robot description as the text of a scene file.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use super::description::{Description, Form, Joint, Kind, Place, Shape, Spring};
+use crate::cli::Failure;
+use crate::machine::{Quat, Vec3};
+
+/// What turns leave of a component that is 0, m or of a direction; of products, over the inertia.
+const ROUNDING: f64 = 1e-14;
+/// Longest name in a scene file.
+const LONGEST_NAME: usize = 40;
+
+/// Names of a scene file by those of the description, each once.
+#[derive(Default)]
+struct Names {
+    taken: BTreeSet<String>,
+    renamed: BTreeMap<String, String>,
+}
+
+impl Names {
+    /// A name that is not taken yet, as near as possible to `wanted`.
+    fn next(&mut self, wanted: &str) -> String {
+        let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+        let mut name: String = wanted.chars().map(|c| if fine(c) { c } else { '_' }).take(LONGEST_NAME).collect();
+        if name.is_empty() {
+            name.push_str("part");
+        }
+        let mut number = 2;
+        let begin = name.clone();
+        while name == "world" || self.taken.contains(&name) {
+            let suffix = format!("_{number}");
+            name = begin.chars().take(LONGEST_NAME - suffix.len()).collect::<String>() + &suffix;
+            number += 1;
+        }
+        if name != wanted {
+            self.renamed.insert(wanted.to_owned(), name.clone());
+        }
+        self.taken.insert(name.clone());
+        name
+    }
+}
+
+/// The scene file of a description that was read from the file `file`.
+///
+/// # Errors
+/// More parts than a scene has.
+pub fn scene(description: &Description, file: &str) -> Result<String, Failure> {
+    let mut bodies = Names::default();
+    let names: Vec<String> = description.bodies.iter().map(|body| bodies.next(&body.name)).collect();
+    let mut joints = Names::default();
+    let poses = description.poses();
+    let body = |index: Option<usize>| index.map_or("world", |index| &names[index]);
+    let mut out = String::new();
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    for (body, name) in description.bodies.iter().zip(&names) {
+        let inertial = &body.inertial;
+        let i = inertial.inertia;
+        let _ = writeln!(text, "\n[[body]]\nname = \"{name}\"\nmass = \"{} kg\"", inertial.mass);
+        let _ = writeln!(text, "centre = {}", vector(inertial.centre, "m"));
+        let _ = writeln!(text, "inertia = {}", vector(i.diagonal(), "kg m^2"));
+        let products =
+            -Vec3::new(i.m12, i.m13, i.m23).map(|part| if part.abs() < ROUNDING * i.amax() { 0.0 } else { part });
+        if products != Vec3::zeros() {
+            let _ = writeln!(text, "products = {}", vector(products, "kg m^2"));
+        }
+        if !body.shapes.is_empty() {
+            let shapes: Vec<String> =
+                body.shapes.iter().map(|one| format!("    {{ {} }},\n", shape(one).join(", "))).collect();
+            let _ = writeln!(text, "shapes = [\n{}]", shapes.concat());
+        }
+    }
+    for joint in &description.joints {
+        let parent = joint.parent.map(|parent| &names[parent][..]);
+        write_joint(&mut text, joint, parent, &names[joint.child], &poses[joint.child], &mut joints);
+    }
+    for closure in &description.closures {
+        let name = joints.next(&closure.name);
+        let ends = [0, 1].map(|end| (body(closure.bodies[end]), closure.points[end]));
+        write_ball_joint(&mut text, &name, ends);
+    }
+    for one in &description.fixed {
+        let _ = writeln!(text, "\n[[fixed_shape]]\n{}", shape(one).join("\n"));
+    }
+    let _ = writeln!(
+        out,
+        "# From {}, by jointplay {}. Links without a joint of their own are parts of those that carry them.",
+        line(file),
+        crate::VERSION
+    );
+    for left in description.left_out() {
+        let _ = writeln!(out, "# {}", line(&left));
+    }
+    for (from, to) in bodies.renamed.iter().chain(&joints.renamed) {
+        let _ = writeln!(out, "# {} is called {to} here.", line(from));
+    }
+    let _ = writeln!(out, "\nname = \"{}\"\nstart = \"ideal\"", Names::default().next(&description.name));
+    let _ = writeln!(out, "\n[gravity]");
+    for (axis, value) in ["x", "y", "z"].iter().zip(description.gravity.iter()) {
+        let _ = writeln!(out, "{axis} = \"{value} m/s^2\"");
+    }
+    let balls = description.joints.iter().any(|joint| joint.kind == Kind::Ball) || !description.closures.is_empty();
+    if balls {
+        let _ = writeln!(
+            out,
+            "\n[contact]\n# A description has no play. A clearance above 0 gives it to all ball joints.\nclearance = \"0 mm\""
+        );
+    }
+    Ok(out + &text)
+}
+
+fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &str, pose: &Place, names: &mut Names) {
+    let at = joint.place.point(joint.anchor);
+    let (kind, axes) = match joint.kind {
+        Kind::Hinge(axis) => ("revolute", vec![axis]),
+        Kind::Slide(axis) => ("prismatic", vec![axis]),
+        Kind::Cylindrical(axis) => ("cylindrical", vec![axis]),
+        Kind::Universal(axis, other) => ("universal", vec![axis, other]),
+        Kind::Ball | Kind::Free => ("free", vec![]),
+    };
+    let is_ball = joint.kind == Kind::Ball;
+    let own = names.next(&joint.name);
+    let name = if is_ball { names.next(&format!("{own}_free")) } else { own.clone() };
+    let _ = writeln!(text, "\n[[joint]]\nname = \"{name}\"\nkind = \"{kind}\"");
+    if kind == "free" {
+        let _ = writeln!(text, "child = \"{child}\"");
+        let position = vector(pose.position, "m");
+        let _ = writeln!(text, "start = {{ position = {position}{} }}", turned(", rotation", &pose.rotation));
+        if is_ball {
+            write_ball_joint(text, &own, [(parent.unwrap_or("world"), at), (child, joint.anchor)]);
+        }
+        return;
+    }
+    if let Some(parent) = parent {
+        let _ = writeln!(text, "parent = \"{parent}\"");
+    }
+    let _ = writeln!(text, "child = \"{child}\"");
+    let _ = writeln!(text, "parent_point = {}", vector(at, "m"));
+    if joint.anchor != Vec3::zeros() {
+        let _ = writeln!(text, "child_point = {}", vector(joint.anchor, "m"));
+    }
+    if let Some(axis) = axes.first() {
+        let _ = writeln!(text, "axis = {}", direction(joint.place.rotation * axis));
+    }
+    if let Some(axis) = axes.get(1) {
+        let _ = writeln!(text, "child_axis = {}", direction(*axis));
+    }
+    let rotation = turned("rotation", &joint.place.rotation);
+    if !rotation.is_empty() {
+        let _ = writeln!(text, "{rotation}");
+    }
+    for spring in &joint.springs {
+        write_spring(text, spring, &own, &names.next(&format!("{own}_spring")));
+    }
+}
+
+fn write_ball_joint(text: &mut String, name: &str, [socket, ball]: [(&str, Vec3); 2]) {
+    let end = |(body, at): (&str, Vec3)| format!("{{ body = \"{body}\", at = {} }}", vector(at, "m"));
+    let _ = writeln!(text, "\n[[ball_joint]]\nname = \"{name}\"\nsocket = {}\nball = {}", end(socket), end(ball));
+}
+
+fn write_spring(text: &mut String, spring: &Spring, joint: &str, name: &str) {
+    let _ = writeln!(text, "\n[[joint_spring]]\nname = \"{name}\"\njoint = \"{joint}\"");
+    if let Some(coordinate) = spring.coordinate {
+        let _ = writeln!(text, "coordinate = \"{coordinate}\"");
+    }
+    let [rest, stiffness, damping] = if spring.turns { ["rad", "N m/rad", "N m s/rad"] } else { ["m", "N/m", "N s/m"] };
+    for (key, value, unit) in [
+        ("position", spring.rest, rest),
+        ("stiffness", spring.stiffness, stiffness),
+        ("damping", spring.damping, damping),
+    ] {
+        if value != 0.0 {
+            let _ = writeln!(text, "{key} = \"{value} {unit}\"");
+        }
+    }
+}
+
+/// Keys of a shape.
+fn shape(shape: &Shape) -> Vec<String> {
+    let Place { position, rotation } = shape.place;
+    let axis = |half: f64| rotation * Vec3::new(0.0, 0.0, half);
+    let ends = |half: f64| {
+        let (from, to) = (position - axis(half), position + axis(half));
+        [format!("from = {}", vector(from, "m")), format!("to = {}", vector(to, "m"))]
+    };
+    let radius = |r: f64| format!("radius = \"{r} m\"");
+    let form = |word: &str| format!("form = \"{word}\"");
+    let centre = || format!("centre = {}", vector(position, "m"));
+    let mut keys = match &shape.form {
+        Form::Sphere(r) => vec![form("sphere"), centre(), radius(*r)],
+        Form::Cylinder(r, h) => [&[form("cylinder")][..], &ends(*h), &[radius(*r)]].concat(),
+        Form::Capsule(r, h) => [&[form("capsule")][..], &ends(*h), &[radius(*r)]].concat(),
+        Form::Box([a, b, c]) if rotation == Quat::identity() => {
+            vec![form("box"), centre(), format!("size = {}", vector(2.0 * Vec3::new(*a, *b, *c), "m"))]
+        }
+        // A box that is turned is a thick plate.
+        Form::Box([a, b, c]) => {
+            let corner = |(x, y): (f64, f64)| vector(shape.place.point(Vec3::new(x * a, y * b, 0.0)), "m");
+            let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner).join(", ");
+            vec![form("plate"), format!("corners = [{corners}]"), format!("thickness = \"{} m\"", 2.0 * c)]
+        }
+        Form::Mesh(file, unit) => {
+            let file = toml::Value::from(file.as_str());
+            let mut keys = vec![form("mesh"), format!("file = {file}"), format!("unit = \"{unit} m\"")];
+            keys.push(format!("position = {}", vector(position, "m")));
+            keys.extend(Some(turned("rotation", &rotation)).filter(|keys| !keys.is_empty()));
+            keys
+        }
+    };
+    if let Some(colour) = shape.colour {
+        let [r, g, b] = colour.map(|part| (255.0 * part.clamp(0.0, 1.0)).round() as u8);
+        keys.push(format!("colour = \"#{r:02x}{g:02x}{b:02x}\""));
+    }
+    keys
+}
+
+/// `key` with a rotation; empty for none.
+fn turned(key: &str, rotation: &Quat) -> String {
+    if *rotation == Quat::identity() {
+        return String::new();
+    }
+    let q = rotation.quaternion();
+    format!("{key} = {{ quaternion = [{}, {}, {}, {}] }}", number(q.w), number(q.i), number(q.j), number(q.k))
+}
+
+/// A number as TOML wants it: one with a point.
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn vector(v: Vec3, unit: &str) -> String {
+    let [x, y, z] = rounded(v);
+    format!("\"{x} {y} {z} {unit}\"")
+}
+
+fn direction(v: Vec3) -> String {
+    let [x, y, z] = rounded(v).map(number);
+    format!("[{x}, {y}, {z}]")
+}
+
+/// Components, of which those that are rounding are 0 and not -0.
+fn rounded(v: Vec3) -> [f64; 3] {
+    [v.x, v.y, v.z].map(|part| if part.abs() < ROUNDING { 0.0 } else { part })
+}
+
+/// One line of a comment.
+fn line(text: &str) -> String {
+    crate::scene::visible_line(text).into_owned()
+}

@@ -1,0 +1,258 @@
+//! Robot descriptions as scenes: their mass, their motion, their names, and what is not taken.
+
+use std::fs;
+use std::path::Path;
+
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
+
+use crate::program::{folder, jointplay};
+
+/// Folder of the descriptions of this test.
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/commands/import");
+
+/// The scene of the description `text`, and what was said.
+fn imported(text: &str) -> (Scene, String) {
+    let folder = folder();
+    fs::write(folder.path().join("robot"), text).unwrap();
+    let outcome = jointplay(folder.path(), "import robot").expect(0);
+    (Scene::parse(&outcome.stdout, None, &[]).unwrap(), outcome.stderr)
+}
+
+/// The message for a description that is refused.
+fn refused(text: &str) -> String {
+    let folder = folder();
+    fs::write(folder.path().join("robot"), text).unwrap();
+    jointplay(folder.path(), "import robot").expect(2).stderr
+}
+
+fn mujoco(inside: &str) -> String {
+    format!("<mujoco>\n<worldbody>\n{inside}\n</worldbody>\n</mujoco>")
+}
+
+fn start(scene: &Scene) -> Frame {
+    let mut simulation = Simulation::new(&scene.machine).unwrap();
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    frame
+}
+
+/// Both descriptions of the arm as scenes beside their meshes, and what was said of them.
+fn arms() -> [(Scene, String); 2] {
+    ["arm.urdf", "arm.xml"].map(|name| {
+        let outcome = jointplay(Path::new(FOLDER), &format!("import {name}")).expect(0);
+        let scene =
+            Scene::parse_given(&outcome.stdout, None, &Default::default(), Some(Path::new(FOLDER)), &[]).unwrap();
+        (scene, outcome.stderr)
+    })
+}
+
+#[test]
+fn one_arm_in_two_formats_is_one_machine() {
+    let [(urdf, _), (mjcf, _)] = arms();
+    for (a, b) in urdf.machine.bodies.iter().zip(&mjcf.machine.bodies) {
+        assert_eq!(a.name, b.name);
+        assert!((a.mass - b.mass).abs() < 1e-12, "{}: {} {}", a.name, a.mass, b.mass);
+        assert!((a.centre - b.centre).norm() < 1e-12, "{}: {} {}", a.name, a.centre, b.centre);
+        assert!((a.inertia - b.inertia).norm() < 1e-12, "{}: {} {}", a.name, a.inertia, b.inertia);
+    }
+    let names = |scene: &Scene| scene.machine.bodies.iter().map(|body| body.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&urdf), ["upper_arm", "forearm", "plunger"]);
+    // The flange is a part of the forearm: 0.8 kg and 0.1 kg.
+    assert!((urdf.machine.bodies[1].mass - 0.9).abs() < 1e-12);
+    let [one, other] = [&urdf, &mjcf].map(start);
+    for (a, b) in one.bodies.iter().zip(&other.bodies) {
+        assert!((a.position - b.position).norm() < 1e-12);
+        assert!(a.angular_acceleration.norm() > 0.1);
+        assert!((a.angular_acceleration - b.angular_acceleration).norm() < 1e-9 * a.angular_acceleration.norm());
+        assert!((a.acceleration - b.acceleration).norm() < 1e-9 * (1.0 + a.acceleration.norm()));
+    }
+    for scene in [&urdf, &mjcf] {
+        assert_eq!(scene.machine.ball_joints.len(), 1);
+        assert_eq!(scene.machine.ball_joints[0].name, "elbow");
+        let loose = Scene::parse_given(
+            &scene.source.text,
+            None,
+            &Default::default(),
+            Some(Path::new(FOLDER)),
+            &[("contact.clearance".to_owned(), "0.2mm".to_owned())],
+        );
+        assert_eq!(loose.unwrap().machine.loose_joints(), 1);
+    }
+}
+
+/// Angular acceleration of a hinged link from rest: m g l sin(theta) / I about the hinge.
+#[test]
+fn a_link_whose_inertia_is_turned_falls_as_its_closed_form() {
+    let text = r#"<robot name="one"><link name="base"/><link name="rod">
+        <inertial><origin xyz="0.3 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
+            <inertia ixx="0.05" ixy="0" ixz="0" iyy="0.012" iyz="0" izz="0.06"/></inertial></link>
+        <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/><origin rpy="0 0.4 0"/><axis xyz="0 1 0"/></joint>
+        </robot>"#;
+    let (scene, said) = imported(text);
+    assert_eq!(said, "");
+    // About y the turned tensor has ixx.
+    let expected = 2.0 * 9.81 * 0.3 * 0.4_f64.cos() / (0.05 + 2.0 * 0.09);
+    let found = start(&scene).bodies[0].angular_acceleration;
+    assert!((found.y / expected - 1.0).abs() < 1e-9 && found.x.abs() + found.z.abs() < 1e-9, "{found}");
+}
+
+#[test]
+fn geoms_give_a_body_its_mass() {
+    let (scene, _) = imported(&mujoco(
+        r#"<body name="b"><joint type="hinge"/>
+            <geom type="sphere" size="0.1" pos="0.3 0 0" density="2000"/>
+            <geom type="box" size="0.1 0.2 0.3" mass="3" euler="0 0 90"/>
+            <body pos="0 0 1"><geom type="cylinder" size="0.05 0.2" mass="1"/></body></body>"#,
+    ));
+    let body = &scene.machine.bodies[0];
+    let ball = 2000.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+    let mass = ball + 4.0;
+    assert!((body.mass - mass).abs() < 1e-12 * mass);
+    let centre = [0.3 * ball / mass, 0.0, 1.0 / mass];
+    assert!((body.centre - jointplay::machine::Vec3::from(centre)).norm() < 1e-12);
+    // About y through the centroid: sphere, turned box, cylinder.
+    let about = |own: f64, m: f64, x: f64, z: f64| own + m * ((x - centre[0]).powi(2) + (z - centre[2]).powi(2));
+    let yy = about(0.4 * ball * 0.01, ball, 0.3, 0.0)
+        + about(3.0 / 3.0 * (0.2_f64.powi(2) + 0.3_f64.powi(2)), 3.0, 0.0, 0.0)
+        + about(0.0025 / 4.0 + 0.04 / 3.0, 1.0, 0.0, 1.0);
+    assert!((body.inertia.m22 / yy - 1.0).abs() < 1e-12, "{} {yy}", body.inertia.m22);
+}
+
+#[test]
+fn every_way_to_say_an_orientation_says_the_same() {
+    let turned = |how: &str| {
+        let text =
+            mujoco(&format!("<body {how}><joint type=\"free\"/><geom type=\"box\" size=\"0.1 0.2 0.3\"/></body>"));
+        let text = text.replace("<worldbody>", "<compiler eulerseq=\"ZYX\"/><worldbody>");
+        start(&imported(&text).0).bodies[0].rotation
+    };
+    // A quarter turn about x, then one about the fixed z axis.
+    let expected = turned("quat=\"0.5 0.5 0.5 0.5\"");
+    for how in ["axisangle=\"1 1 1 120\"", "xyaxes=\"0 1 0 0 0 1\"", "quat=\"-1 -1 -1 -1\""] {
+        assert!((turned(how) - expected).norm() < 1e-12, "{how}: {}", turned(how));
+    }
+    // Capitals turn about fixed axes, one after the other.
+    let about_z_then_x = turned("euler=\"90 0 90\"");
+    let product = turned("axisangle=\"1 0 0 90\"") * turned("axisangle=\"0 0 1 90\"");
+    assert!((about_z_then_x - product).norm() < 1e-12);
+    let up = turned("zaxis=\"1 0 0\"");
+    assert!((up.column(2) - jointplay::machine::Vec3::x()).norm() < 1e-12);
+}
+
+#[test]
+fn a_connection_closes_a_loop() {
+    let bar = |name: &str, to: &str, inside: &str| {
+        format!(
+            "<body name=\"{name}\" pos=\"{to}\"><joint axis=\"0 1 0\"/><geom type=\"capsule\" fromto=\"0 0 0 0 0 0.4\" size=\"0.01\"/>{inside}</body>"
+        )
+    };
+    let coupler = "<body name=\"coupler\" pos=\"0 0 0.4\"><joint axis=\"0 1 0\"/><geom type=\"capsule\" fromto=\"0 0 0 0.5 0 0\" size=\"0.01\"/></body>";
+    let inside = bar("left", "0 0 0", coupler) + &bar("right", "0.5 0 0", "");
+    let text = mujoco(&inside).replace(
+        "</mujoco>",
+        "<equality><connect name=\"tip\" body1=\"coupler\" body2=\"right\" anchor=\"0.5 0 0\"/></equality></mujoco>",
+    );
+    let (scene, _) = imported(&text);
+    let ball = &scene.machine.ball_joints[0];
+    assert_eq!(ball.name, "tip");
+    let simulation = Simulation::new(&scene.machine).unwrap();
+    assert_eq!(simulation.mechanism().summary().degrees_of_freedom, 1);
+}
+
+#[test]
+fn what_is_not_taken_is_named_and_nothing_else() {
+    let [(urdf, said), (mjcf, too)] = arms();
+    for expected in [
+        "mass of a link that does not move (line 9)",
+        "<collision>: bodies do not touch each other (line 24)",
+        "mesh meshes/motor.dae, which is not STL, OBJ or glTF (line 38)",
+        "friction in a joint",
+        "limits of a joint: a [[stop]] needs their stiffness, too (line 61, and 1 more)",
+        "<transmission>",
+    ] {
+        assert!(said.contains(&format!("not taken: {expected}")), "{expected}: {said}");
+        assert!(urdf.source.text.contains(expected), "{expected}");
+    }
+    assert_eq!(said.lines().count(), 6, "{said}");
+    let expected = [
+        "setting timestep of <option>",
+        "<texture> of <asset>",
+        "<light> of a body",
+        "geom of type plane",
+        "contact between geoms: bodies do not touch each other (line 14, and 4 more)",
+        "frictionloss of <joint>",
+        "gravcomp of <body>",
+        "range of a joint: a [[stop]] needs its stiffness, too (line 18, and 1 more)",
+        "<actuator>",
+    ];
+    for expected in expected {
+        assert!(too.contains(&format!("not taken: {expected}")), "{expected}: {too}");
+    }
+    assert_eq!(too.lines().count(), expected.len(), "{too}");
+    for scene in [&urdf, &mjcf] {
+        let meshes = scene.source.text.matches("cover.stl").count();
+        assert_eq!(meshes, 1);
+        assert!(scene.source.text.contains("upper arm is called upper_arm here"));
+    }
+}
+
+#[test]
+fn classes_of_defaults_reach_the_elements_that_they_are_for() {
+    let text = r#"<mujoco><compiler angle="radian"/>
+        <default><joint damping="1"/><default class="stiff"><joint stiffness="20" axis="0 1 0"/></default></default>
+        <worldbody><body name="a" childclass="stiff"><joint name="one"/><geom size="0.1"/>
+            <body name="b" pos="1 0 0"><joint name="two" class="main"/><geom size="0.1"/>
+                <body name="c" pos="1 0 0"><joint name="three" damping="0" springref="0.5"/><geom size="0.1"/></body></body></body></worldbody></mujoco>"#;
+    let (scene, _) = imported(text);
+    let text = &scene.source.text;
+    let of = |joint: &str| {
+        let from = text.find(&format!("name = \"{joint}_spring\"")).unwrap();
+        let section = &text[from..];
+        section[..section.find("\n\n").unwrap_or(section.len())].to_owned()
+    };
+    assert!(of("one").contains("stiffness = \"20 N m/rad\"") && of("one").contains("damping = \"1 N m s/rad\""));
+    assert!(of("two").contains("damping = \"1 N m s/rad\"") && !of("two").contains("stiffness"));
+    assert!(of("three").contains("position = \"0.5 rad\"") && !of("three").contains("damping"));
+}
+
+#[test]
+fn a_description_that_would_be_another_machine_is_refused_with_its_line() {
+    let robot = |inside: &str| format!("<robot name=\"r\">\n<link name=\"base\"/>\n{inside}\n</robot>");
+    let joint = |kind: &str, more: &str| {
+        robot(&format!(
+            "<link name=\"a\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>\n<joint name=\"j\" type=\"{kind}\"><parent link=\"base\"/><child link=\"a\"/>{more}</joint>"
+        ))
+    };
+    let body = |inside: &str| mujoco(&format!("<body name=\"b\">{inside}</body>"));
+    let ball = "<geom size=\"0.1\"/>";
+    for (text, expected) in [
+        ("no markup".to_owned(), "robot: is not an XML file: "),
+        ("<scene/>".to_owned(), "robot:1: scene: <scene> is neither <robot> (URDF) nor <mujoco> (MJCF)"),
+        (robot(""), "no joint moves"),
+        (joint("planar", ""), "robot:4: joint j: type = \"planar\": allowed: fixed, revolute"),
+        (joint("revolute", "<axis xyz=\"0 0 0\"/>"), "axis: xyz = \"0 0 0\": an axis has a direction"),
+        (joint("revolute", "<axis xyz=\"0 1\"/>"), "axis: xyz = \"0 1\": expected 3 numbers"),
+        (joint("revolute", "<origin xyz=\"0 0 nan\"/>"), "expected 3 numbers"),
+        (joint("revolute", "").replace("child link=\"a\"", "child link=\"x\""), "joint j: there is no link x"),
+        (joint("revolute", "").replace("<mass value=\"1\"/>", ""), "robot:3: inertial: <mass> is missing"),
+        (joint("revolute", "").replace("value=\"1\"", "value=\"0\""), "link a: a moving link needs an <inertial>"),
+        (robot("<link name=\"a\"/>"), "without parent: a, base"),
+        (mujoco(""), "no body has a joint"),
+        (body("<joint/>"), "robot:3: body b: a moving body needs a mass above 0 kg"),
+        (body(&format!("<joint type=\"screw\"/>{ball}")), "type = \"screw\": allowed: hinge, slide, ball, free"),
+        (body(&format!("<joint/><joint axis=\"1 0 0\"/><joint axis=\"0 1 0\"/>{ball}")), "none that a scene has"),
+        (body("<joint/><geom type=\"box\" size=\"1 1\"/>"), "a box needs number 3 above 0"),
+        (body("<joint/><geom type=\"mesh\" mesh=\"m\"/>"), "there is no mesh m"),
+        (body(&format!("<joint/>{ball}<frame/>")), "frame: is not read: write the bodies that it stands for"),
+        (
+            "<mujoco>\n<include file=\"x.xml\"/></mujoco>".to_owned(),
+            "robot:2: include: put the contents of the file here",
+        ),
+    ] {
+        let said = refused(&text);
+        assert!(said.contains(expected), "{text}\n  should say `{expected}`, says: {said}");
+    }
+    let missing = jointplay(folder().path(), "import nothing.urdf").expect(1).stderr;
+    assert!(missing.contains("nothing.urdf: cannot read this file"), "{missing}");
+}
