@@ -453,6 +453,12 @@ fn the_bench_shows_what_is_stored() {
 fn every_control_beside_the_bench_has_a_name_of_its_own() {
     let mut harness = window("spcmm", &[FAST]);
     harness.run();
+    let controls = named_controls(&harness);
+    assert!(controls > 60, "{controls}");
+}
+
+/// Number of controls, each of which has a name of its own.
+pub fn named_controls(harness: &Harness<'_, App>) -> usize {
     let mut controls = 0;
     let mut names = HashSet::new();
     for node in harness.root().children_recursive() {
@@ -474,7 +480,7 @@ fn every_control_beside_the_bench_has_a_name_of_its_own() {
         let new = names.insert((node.role(), node.label()));
         assert!(!is_control || new, "two of role {:?} are called {:?}", node.role(), node.label());
     }
-    assert!(controls > 60, "{controls}");
+    controls
 }
 
 /// Says which sweep was asked for, and computes nothing.

@@ -11,7 +11,7 @@ use jointplay::analysis::study::{Alone, NAMED, RunSpan, StudyRuns, Uncertainty, 
 use jointplay::app::{App, Event};
 use jointplay::scene::Value;
 
-use crate::bench_window::{FAST, click, hold, hold_shared, set_number, sized, wait};
+use crate::bench_window::{FAST, click, hold, hold_shared, named_controls, set_number, sized, wait};
 use crate::golden::PLAIN;
 use crate::hands::compare_window;
 
@@ -241,6 +241,7 @@ fn what_varies_and_by_how_much_is_chosen() {
         click(&mut harness, Role::CheckBox, name);
     }
     click(&mut harness, Role::Button, "Range");
+    let before = named_controls(&harness);
     set_number(&mut harness, "Restitution from", 0.2);
     set_number(&mut harness, "Restitution to", 0.7);
     compute(&mut harness);
@@ -248,6 +249,8 @@ fn what_varies_and_by_how_much_is_chosen() {
     assert_eq!(study.task.keys, ["joint.S1.restitution", "joint.S2.restitution", "joint.S3.restitution"]);
     assert_eq!(study.task.ends, [[0.2, 0.7]; 3]);
     end(&harness, "Restitution of S1 0.7:");
+    // The choice of the output, and two ends of each joint.
+    assert_eq!(named_controls(&harness), before + 7);
     // A part ends where the parameter does.
     click(&mut harness, Role::Button, "Percent");
     compute(&mut harness);

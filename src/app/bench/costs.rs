@@ -178,8 +178,8 @@ impl Costs {
         if self.reveal && self.has_begun() {
             self.reveal = false;
             let (all, room) = (ui.min_rect(), ui.clip_rect().height());
-            let fits = [progress, choice].into_iter().find(|top| all.bottom() - top <= room);
-            let rect = all.with_min_y(fits.unwrap_or(tornado));
+            let fits = [progress, choice, tornado].into_iter().find(|top| all.bottom() - top <= room);
+            let rect = all.with_min_y(fits.unwrap_or(progress));
             ui.scroll_to_rect(rect, (rect.height() > room).then_some(Align::TOP));
         }
         let (input, end) = clicked?;

@@ -190,7 +190,8 @@ impl Place {
             let colour = theme::series(end, visuals.dark_mode);
             painter.rect_filled(bar, 0.0, if self.earlier { colour.gamma_multiply(PALE) } else { colour });
         }
-        response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(&own.words).clicked()
+        let help = format!("{}. A click moves the slider there", own.words);
+        response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(help).clicked()
     }
 }
 

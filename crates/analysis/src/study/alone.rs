@@ -26,7 +26,7 @@ impl Alone {
         Self { nominal: inputs.iter().map(|input| input.nominal).collect(), ends: ends.collect() }
     }
 
-    /// The `ends` of the parameters `keys` of `scene`, SI. The page needs no other distribution.
+    /// The `ends` of the parameters `keys` of `scene`, SI. It reads no distributions, so that the page does not contain their code.
     ///
     /// # Errors
     /// With its key: no such real parameter, an end that it does not accept, or a lower end that is not below the upper one.
