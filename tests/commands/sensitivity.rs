@@ -135,11 +135,10 @@ fn the_job_of_the_window_has_the_bits_of_the_command() {
     jointplay(folder.path(), &line).expect(0);
     let found = results(&folder.path().join("out"));
     let scene = Scene::load("spcmm", &[("spcmm.frequency".to_owned(), "5Hz".to_owned())]).unwrap();
-    let clearance = scene.machine.contact.clearance;
+    let ends = [0.5, 1.5].map(|part| part * scene.machine.contact.clearance);
     let task = AloneTask {
         scene: SceneSource::of(&scene),
-        keys: ["S1", "S2", "S3"].map(|joint| format!("joint.{joint}.clearance")).to_vec(),
-        ends: vec![[0.5, 1.5].map(|part| part * clearance); 3],
+        over: ["S1", "S2", "S3"].map(|joint| (format!("joint.{joint}.clearance"), ends)).to_vec(),
         outputs: outputs.map(str::to_owned).to_vec(),
         span: RunSpan { duration: 0.06, from: 0.02 },
     };

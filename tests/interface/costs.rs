@@ -246,8 +246,8 @@ fn what_varies_and_by_how_much_is_chosen() {
     set_number(&mut harness, "Restitution to", 0.7);
     compute(&mut harness);
     let study = harness.state().bench().cost_study().expect("a study");
-    assert_eq!(study.task.keys, ["joint.S1.restitution", "joint.S2.restitution", "joint.S3.restitution"]);
-    assert_eq!(study.task.ends, [[0.2, 0.7]; 3]);
+    let all = |ends| ["S1", "S2", "S3"].map(|joint| (format!("joint.{joint}.restitution"), ends));
+    assert_eq!(study.task.over, all([0.2, 0.7]));
     end(&harness, "Restitution of S1 0.7:");
     // The choice of the output, and two ends of each joint.
     assert_eq!(named_controls(&harness), before + 7);
@@ -255,7 +255,7 @@ fn what_varies_and_by_how_much_is_chosen() {
     click(&mut harness, Role::Button, "Percent");
     compute(&mut harness);
     let study = harness.state().bench().cost_study().expect("a study");
-    assert_eq!(study.task.ends, [[0.45, 1.0]; 3]);
+    assert_eq!(study.task.over, all([0.45, 1.0]));
     // A reversed range, and nothing at all.
     click(&mut harness, Role::Button, "Range");
     set_number(&mut harness, "Restitution to", 0.1);

@@ -15,10 +15,8 @@ use jointplay_physics::simulate::{LONGEST_RUN, Simulation};
 pub struct AloneTask {
     /// The scene.
     pub scene: SceneSource,
-    /// Keys of the parameters that vary.
-    pub keys: Vec<String>,
-    /// Lower and upper end of each, SI.
-    pub ends: Vec<[f64; 2]>,
+    /// Keys of the parameters that vary, each with its lower and its upper end, SI.
+    pub over: Vec<(String, [f64; 2])>,
     /// Names of outputs, as on the command line.
     pub outputs: Vec<String>,
     /// Observed part of each run.
@@ -70,12 +68,13 @@ pub(super) async fn run(
     }
     let scene = task.scene.scene()?;
     Simulation::new(&scene.machine).map_err(|error| scene.locate(&error))?;
-    let alone = Alone::between(&scene, &task.keys, &task.ends)?;
+    let alone = Alone::between(&scene, &task.over)?;
+    let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
     // Another scene may have a probe, or an energy ledger.
     let known = task.outputs.iter().map(|name| outputs(&scene, name).ok().and_then(|mut found| found.pop()));
     let known: Vec<Option<Output>> = known.collect();
     let own: Vec<Output> = known.iter().flatten().cloned().collect();
-    let runs = StudyRuns::new(&scene, &task.keys, &own, task.span, &alone.rows())?;
+    let runs = StudyRuns::new(&scene, &keys, &own, task.span, &alone.rows())?;
     say(AloneMessage::Plan(AlonePlan {
         nominal: alone.nominal().to_vec(),
         units: known.iter().map(|output| output.as_ref().map(|output| output.unit.to_owned())).collect(),
@@ -114,8 +113,7 @@ mod tests {
         let varied = inputs(&scene, &[Uncertainty::parse("--over", pattern)]).expect("parameters");
         AloneTask {
             scene: SceneSource::of(&scene),
-            keys: varied.iter().map(|input| input.key.clone()).collect(),
-            ends: Alone::new(&varied).ends().to_vec(),
+            over: varied.iter().map(|input| input.key.clone()).zip(Alone::new(&varied).ends().to_vec()).collect(),
             outputs: OUTPUTS.map(str::to_owned).to_vec(),
             span: RunSpan { duration: 0.06, from: 0.02 },
         }
@@ -155,8 +153,9 @@ mod tests {
         assert!(matches!(first, Some(Message::Run(AloneRun { index: 0, .. }))));
         let scene = task.scene.scene().expect("built in");
         let kept: Vec<Output> = OUTPUTS.iter().flat_map(|name| outputs(&scene, name).expect("an output")).collect();
-        let alone = Alone::between(&scene, &task.keys, &task.ends).expect("ends");
-        let study = StudyRuns::new(&scene, &task.keys, &kept, task.span, &alone.rows()).expect("runs");
+        let alone = Alone::between(&scene, &task.over).expect("ends");
+        let keys: Vec<String> = task.over.iter().map(|(key, _)| key.clone()).collect();
+        let study = StudyRuns::new(&scene, &keys, &kept, task.span, &alone.rows()).expect("runs");
         let expected: Vec<AloneRun> = (0..study.sweep().design().blocks())
             .map(|index| {
                 let mut block = study.sweep().begin(index);
@@ -188,8 +187,8 @@ mod tests {
             _ => None,
         });
         let plan = plan.expect("a plan");
-        assert_eq!(task.keys[1], "joint.S2.clearance");
-        assert_eq!(task.ends[1], [0.5, 1.5].map(|part| part * plan.nominal[1]));
+        let (key, ends) = &task.over[1];
+        assert_eq!((&**key, *ends), ("joint.S2.clearance", [0.5, 1.5].map(|part| part * plan.nominal[1])));
         assert_eq!(plan.units, ["m", "N", ""].map(|unit| Some(unit.to_owned())));
     }
 
@@ -208,7 +207,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told() {
         let good = || task("spcmm", "joint.*.clearance");
-        let of = |key: &str, ends| AloneTask { keys: vec![key.to_owned()], ends: vec![ends], ..good() };
+        let of = |key: &str, ends| AloneTask { over: vec![(key.to_owned(), ends)], ..good() };
         let spans = |duration, from| AloneTask { span: RunSpan { duration, from }, ..good() };
         for (task, words) in [
             (of("joint.S9.clearance", [1e-4, 2e-4]), "joint.S9.clearance: "),

@@ -59,7 +59,7 @@ impl CostSettings {
     /// # Errors
     /// As a message: a reversed range, or nothing that varies.
     pub fn task(&self, scene: &Scene) -> Result<AloneTask, String> {
-        let (mut keys, mut all) = (Vec::new(), Vec::new());
+        let mut over = Vec::new();
         let reversed = |varied: &&Varied| self.ranges && varied.on && varied.range[0] >= varied.range[1];
         if let Some(Varied { parameter, .. }) = self.varied.iter().find(reversed) {
             return Err(format!("{}: the first value must be below the second", parameter.label));
@@ -81,16 +81,15 @@ impl CostSettings {
                 };
                 // Of nothing, a part is nothing.
                 if ends[0] < ends[1] {
-                    keys.push(key);
-                    all.push(ends);
+                    over.push((key, ends));
                 }
             }
         }
-        if keys.is_empty() {
+        if over.is_empty() {
             return Err("Nothing varies: choose a parameter, and a range where its value is 0".to_owned());
         }
         let outputs = NAMED.iter().map(|named| named.name.to_owned()).collect();
-        Ok(AloneTask { scene: SceneSource::of(scene), keys, ends: all, outputs, span: self.span })
+        Ok(AloneTask { scene: SceneSource::of(scene), over, outputs, span: self.span })
     }
 }
 
@@ -109,7 +108,7 @@ pub struct CostStudy {
 impl CostStudy {
     /// A study without results.
     pub fn new(task: AloneTask, plan: AlonePlan) -> Self {
-        let runs = vec![None; 1 + 2 * task.keys.len()];
+        let runs = vec![None; 1 + 2 * task.over.len()];
         Self { scene: task.scene.scene().ok(), runs, task, plan }
     }
 
@@ -146,14 +145,14 @@ impl CostStudy {
                     - all.iter().copied().fold(f64::INFINITY, f64::min)
             })
         };
-        let mut order: Vec<usize> = (0..self.task.keys.len()).collect();
+        let mut order: Vec<usize> = (0..self.task.over.len()).collect();
         order.sort_by(|&a, &b| spread(b).total_cmp(&spread(a)));
         order
     }
 
     /// Row of the table of an input.
     pub fn parameter(&self, input: usize) -> Option<&'static Parameter> {
-        self.scene.as_ref()?.parameter(&self.task.keys[input]).ok()
+        self.scene.as_ref()?.parameter(&self.task.over[input].0).ok()
     }
 
     /// Differences from the displayed scene, one phrase each.

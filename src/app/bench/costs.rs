@@ -107,7 +107,7 @@ impl Costs {
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some(task) = self.asked.take() {
             self.problem = None;
-            let most = 1 + 2 * task.keys.len();
+            let most = 1 + 2 * task.over.len();
             let shares = Shares::start(host, most, |share| Job::Alone(task.clone(), share));
             self.running = shares.map(|shares| Running { task, shares, begun: false });
             if self.running.is_none() {
@@ -183,8 +183,9 @@ impl Costs {
             ui.scroll_to_rect(rect, (rect.height() > room).then_some(Align::TOP));
         }
         let (input, end) = clicked?;
-        let text = study.parameter(input)?.write(&Value::Number(study.task.ends[input][end]));
-        Some(Asked::Value { key: study.task.keys[input].clone(), text })
+        let (key, ends) = &study.task.over[input];
+        let text = study.parameter(input)?.write(&Value::Number(ends[end]));
+        Some(Asked::Value { key: key.clone(), text })
     }
 
     fn settings_ui(&mut self, ui: &mut Ui, scene: &Scene) {

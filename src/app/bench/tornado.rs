@@ -56,7 +56,7 @@ impl Tornado {
 
     /// Sorts the complete rows, unless they would move under the pointer.
     fn arrange(&mut self, ui: &Ui, study: &CostStudy, output: usize) {
-        let inputs = study.task.keys.len();
+        let inputs = study.task.over.len();
         if self.order.len() != inputs {
             self.order = (0..inputs).collect();
         }
@@ -94,7 +94,7 @@ impl Tornado {
         let height = self.order.len() as f32 * (2.0 * bar + GAP);
         let (area, _) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::hover());
         self.area = Some(area);
-        let names: Vec<[&str; 2]> = self.order.iter().map(|&input| name(&study.task.keys[input])).collect();
+        let names: Vec<[&str; 2]> = self.order.iter().map(|&input| name(&study.task.over[input].0)).collect();
         let column = |at: usize| widest(ui, ends.iter().flatten().map(|end| &*end.texts[at]));
         let first = widest(ui, names.iter().flatten().copied()).min(NAMES * area.width());
         let place = Place {
@@ -111,7 +111,7 @@ impl Tornado {
             for (line, own) in ends.iter().enumerate() {
                 let strip = place.strip(row, line);
                 place.name_ui(ui, strip, names[row][line], line == 0);
-                let id = ui.scope_id().with((&study.task.keys[input], line));
+                let id = ui.scope_id().with((&study.task.over[input].0, line));
                 if place.end_ui(ui, strip, id, own, line) {
                     clicked = Some((input, line));
                 }
@@ -204,7 +204,8 @@ impl End {
         what: &str,
         shown: &dyn Fn(f64) -> String,
     ) -> Self {
-        let (key, there) = (&study.task.keys[input], study.task.ends[input][end]);
+        let (key, ends) = &study.task.over[input];
+        let there = ends[end];
         let parameter = study.parameter(input);
         let unit = parameter.map_or("", |parameter| parameter.display_unit());
         let of_input = |si: f64| value::quantity(si, unit, DIGITS);

@@ -26,14 +26,15 @@ impl Alone {
         Self { nominal: inputs.iter().map(|input| input.nominal).collect(), ends: ends.collect() }
     }
 
-    /// The `ends` of the parameters `keys` of `scene`, SI. It reads no distributions, so that the page does not contain their code.
+    /// The parameters of `scene` with these keys, between these ends, SI. It reads no distributions, so that the page does not
+    /// contain their code.
     ///
     /// # Errors
     /// With its key: no such real parameter, an end that it does not accept, or a lower end that is not below the upper one.
     /// More than 64 parameters.
-    pub fn between(scene: &Scene, keys: &[String], ends: &[[f64; 2]]) -> Result<Self, StudyError> {
-        check_count(keys.len())?;
-        let nominal = keys.iter().zip(ends).map(|(key, [low, high])| {
+    pub fn between(scene: &Scene, ranges: &[(String, [f64; 2])]) -> Result<Self, StudyError> {
+        check_count(ranges.len())?;
+        let nominal = ranges.iter().map(|(key, [low, high])| {
             let checked = || {
                 let (parameter, nominal) = real_parameter(scene, key)?;
                 Distribution::uniform(*low, *high)?;
@@ -43,7 +44,7 @@ impl Alone {
             };
             checked().map_err(|error| StudyError::At { place: key.clone(), error: Box::new(error) })
         });
-        Ok(Self { nominal: nominal.collect::<Result<_, _>>()?, ends: ends.to_vec() })
+        Ok(Self { nominal: nominal.collect::<Result<_, _>>()?, ends: ranges.iter().map(|(_, ends)| *ends).collect() })
     }
 
     /// Value of each input in the scene, SI.
