@@ -151,7 +151,7 @@ fn a_slider_errs_by_the_play_along_its_rod() {
     const PLAYS: [f64; 2] = [0.2e-3, 0.3e-3];
     let scene = slider_crank(PLAYS);
     let (crank, rod, play) = (0.05, 0.16, PLAYS[0] + PLAYS[1]);
-    for angle in [0.0_f64, 0.4, 1.2, 1.5707, 2.8, 4.1, -1.0, 12.0] {
+    for angle in [0.0_f64, 0.4, 1.2, 1.57, 2.8, 4.1, -1.0, 12.0] {
         let mut held = held(&scene, &[Some(angle)]);
         let (sine, cosine) = libm::sincos(angle);
         let slider = |length: f64| crank * cosine + (length * length - crank * crank * sine * sine).sqrt();

@@ -37,10 +37,10 @@ pub fn text(results: &Results, out: &[PathBuf]) -> String {
     if let Some((point, Err(fault))) = first(&|p| results.points[p].is_err()).map(|p| (p, &results.points[p])) {
         text += &format!("First without     {}: {fault}\n", results.describe(point));
     }
-    if let Some(point) = first(&|p| results.points[p].as_ref().is_ok_and(|own| own.settled.is_err())) {
-        if let Ok(Err(fault)) = results.points[point].as_ref().map(|own| &own.settled) {
-            text += &format!("First restless    {}: {fault}\n", results.describe(point));
-        }
+    if let Some(point) = first(&|p| results.points[p].as_ref().is_ok_and(|own| own.settled.is_err()))
+        && let Ok(Err(fault)) = results.points[point].as_ref().map(|own| &own.settled)
+    {
+        text += &format!("First restless    {}: {fault}\n", results.describe(point));
     }
     if let Some(point) = first(&|p| !results.unbounded(p).is_empty()) {
         let ways: Vec<String> = results.unbounded(point).iter().map(direction).collect();
