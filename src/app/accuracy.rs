@@ -96,7 +96,8 @@ impl Accuracy {
                     });
                 }
                 Some(Message::Done) => self.running = None,
-                Some(Message::Ranges(_) | Message::Point(_) | Message::Plan(_) | Message::Run(_)) => {}
+                Some(Message::Ranges(_) | Message::Point(_) | Message::Plan(_) | Message::Run(_) | Message::Map(_)) => {
+                }
                 Some(Message::Failed(why)) => {
                     self.problem = Some(why);
                     self.running = None;

@@ -14,6 +14,7 @@ mod sweep;
 mod swept;
 mod throttle;
 mod tornado;
+mod workspace;
 
 use eframe::egui::{Button, CollapsingHeader, Response, RichText, Ui};
 
@@ -22,6 +23,7 @@ use super::player::Player;
 use super::spoken;
 use crate::analysis::ready::ReadySweep;
 use crate::scene::Scene;
+use crate::view::Cloud;
 pub use asked::Asked;
 use coordinate::Coordinate;
 pub use cost_study::CostStudy;
@@ -29,6 +31,7 @@ use costs::Costs;
 use portrait::Portrait;
 use sweep::SweepPanel;
 pub use swept::Swept;
+use workspace::MapPanel;
 
 /// The panel.
 #[derive(Default)]
@@ -38,6 +41,7 @@ pub struct Bench {
     sweep: SweepPanel,
     /// What play costs, while that is open in place of the chaos bench.
     costs: Option<Box<Costs>>,
+    map: MapPanel,
 }
 
 impl Bench {
@@ -45,7 +49,13 @@ impl Bench {
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         self.costs.take_if(|costs| !costs.stays_open());
         let computes = self.costs.as_mut().is_some_and(|costs| costs.update(host));
-        self.sweep.update(host) || computes
+        let maps = self.map.update(host);
+        self.sweep.update(host) || computes || maps
+    }
+
+    /// The arrows of the map, if it was shown in the latest frame.
+    pub(super) fn take_cloud(&mut self, player: &Player) -> Option<Cloud> {
+        self.map.take_cloud(player)
     }
 
     /// Reports a frame at time `now`, s; `moves`: whether the picture is animated.
@@ -123,7 +133,7 @@ impl Bench {
         if let Some((tab, title)) = ui.horizontal_wrapped(|ui| self.tabs(ui)).inner {
             spoken::titled(ui, &tab, title);
         }
-        let Self { coordinate, portrait, sweep, costs } = self;
+        let Self { coordinate, portrait, sweep, costs, map } = self;
         if let Some(costs) = costs {
             return costs.ui(ui, player);
         }
@@ -132,15 +142,18 @@ impl Bench {
             coordinate.ui(ui);
         });
         let help = "How fast neighbouring motions of the running scene diverge";
-        part(ui, "Divergence of neighbouring motions", help, |ui| {
+        part(ui, "Divergence of neighbouring motions", help, true, |ui| {
             divergence::ui(ui, player);
         });
         let help = "The running scene in its phase space";
-        part(ui, "Phase portrait and Poincaré section", help, |ui| {
+        part(ui, "Phase portrait and Poincaré section", help, true, |ui| {
             portrait.ui(ui, player, *coordinate);
         });
         let help = "The scene at many values of a parameter: the bifurcation diagram";
-        part(ui, "Sweep", help, |ui| sweep.ui(ui, player, *coordinate)).flatten()
+        let asked = part(ui, "Sweep", help, true, |ui| sweep.ui(ui, player, *coordinate)).flatten();
+        let help = "How far the tip is from where it would be without play, with the drives held at many positions";
+        part(ui, "Tip error over the workspace", help, false, |ui| map.ui(ui, player));
+        asked
     }
 
     /// Choice between the chaos bench and what play costs; returns the chosen one, which is the heading.
@@ -161,10 +174,19 @@ impl Bench {
     }
 }
 
-/// A collapsible part of the bench; returns the result of `content` if it is open.
-fn part<R>(ui: &mut Ui, name: &str, help: &str, content: impl FnOnce(&mut Ui) -> R) -> Option<R> {
-    let header = CollapsingHeader::new(RichText::new(name).strong()).default_open(true);
+/// A collapsible part of the bench, `open` at first; returns the result of `content` if it is open.
+fn part<R>(ui: &mut Ui, name: &str, help: &str, open: bool, content: impl FnOnce(&mut Ui) -> R) -> Option<R> {
+    let header = CollapsingHeader::new(RichText::new(name).strong()).default_open(open);
     let shown = header.show_unindented(ui, content);
     shown.header_response.on_hover_text(help);
     shown.body_returned
+}
+
+/// The error message without its command-line prefix, `option` with one of its `values`.
+fn in_words(why: &str, option: &str, values: &[String]) -> String {
+    let given = values.iter().find_map(|text| why.strip_prefix(&format!("{option} {text}: ")));
+    let words = given.or_else(|| why.strip_prefix(&format!("{option} "))).unwrap_or(why);
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
+    first.unwrap_or_default() + letters.as_str()
 }

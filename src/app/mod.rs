@@ -1067,6 +1067,7 @@ impl eframe::App for App {
         if self.bench.update(self.host.as_mut()) || measuring {
             ctx.request_repaint_after(POLL);
         }
+        self.viewport.cloud = self.bench.take_cloud(&self.player);
         let (now, dt) = ctx.input(|input| (input.time, input.stable_dt));
         let moves = self.advance(f64::from(dt));
         if moves {

@@ -20,8 +20,8 @@ use crate::render;
 use crate::session::link::CameraPose;
 use crate::simulate::{ContactMode, Pull};
 use crate::view::{
-    Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions, WearMap,
-    to_f32,
+    Camera, Cloud, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme, ViewOptions,
+    WearMap, to_f32,
 };
 
 /// Length of the probe's trail, points.
@@ -96,6 +96,8 @@ pub struct Viewport {
     pace: Option<Pace>,
     /// Title, if another picture is beside it; common reference force of the arrows in both, N.
     pub title: Option<String>,
+    /// Errors of the tip over the workspace.
+    pub(super) cloud: Option<Cloud>,
     pub(super) common: Option<f32>,
     /// Whether only machine and time are shown for lack of room.
     pub(super) bare: bool,
@@ -136,6 +138,7 @@ impl Viewport {
             clicked: None,
             pace: None,
             title: None,
+            cloud: None,
             common: None,
             bare: false,
             place: render::Place::Window,
@@ -547,6 +550,9 @@ impl Viewport {
         let said = ghosts::add(&self.view, &shot, player, &mut list);
         if let Some(wear) = player.wear() {
             self.view.add_wear(&shot, wear, &mut list);
+        }
+        if let Some(cloud) = &self.cloud {
+            self.view.add_cloud(&shot, cloud, &mut list);
         }
         self.options.arrows.reference = own;
         self.next = list;

@@ -231,6 +231,12 @@ pub(super) fn push_error(
     words: &std::sync::Arc<str>,
     out: &mut DrawList,
 ) {
+    push_error_arrow(shot, tail, along, colour, out);
+    push_label(out, words, LabelKind::Error, tail + along, colour);
+}
+
+/// The same without a label.
+pub(super) fn push_error_arrow(shot: &Shot<'_>, tail: Vec3, along: Vec3, colour: Colour, out: &mut DrawList) {
     let ruler = Ruler::new(shot.camera, shot.size);
     let height = shot.size[1] as f32;
     let unit = along.normalize_or(shot.camera.axes().0);
@@ -239,7 +245,6 @@ pub(super) fn push_error(
         let arrow = Arrow::new(tail, along, thickest * height * pixel);
         arrow.push(&mut out.arrows, colour);
     }
-    push_label(out, words, LabelKind::Error, tail + along, colour);
 }
 
 /// Force of the peak, and how long ago in simulated time.

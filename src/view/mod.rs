@@ -14,6 +14,7 @@ mod attachments;
 mod build;
 mod camera;
 mod cast;
+mod cloud;
 mod coil;
 mod cover;
 mod draw_list;
@@ -41,6 +42,7 @@ mod zones;
 pub use arrows::ARROW_LENGTH;
 pub use build::SceneView;
 pub use camera::{Camera, Preset};
+pub use cloud::Cloud;
 pub use cover::Cover;
 pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh, MeshData, Tick,

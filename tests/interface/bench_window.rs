@@ -573,3 +573,70 @@ fn from_the_start_of_the_window_chaos_is_two_gestures_away() {
     // Its progress has come into sight.
     assert!(within(&harness, "Cancel sweep"));
 }
+
+/// Pixels of the 3D view.
+fn view(harness: &mut Harness<'_, App>) -> Vec<[u8; 4]> {
+    let view = harness.get_by_label("3D view").rect();
+    let picture = harness.render().expect("drawn");
+    let rows = view.top() as u32..view.bottom() as u32;
+    let pixels = rows.flat_map(|y| (view.left() as u32..view.right() as u32).map(move |x| (x, y)));
+    pixels.map(|(x, y)| picture.get_pixel(x, y).0).collect()
+}
+
+fn differing(a: &[[u8; 4]], b: &[[u8; 4]]) -> usize {
+    a.iter().zip(b).filter(|(a, b)| a != b).count()
+}
+
+#[test]
+fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
+    let mut harness = window("four-bar", &[]);
+    hold(&mut harness);
+    let without = view(&mut harness);
+    let toggle = |harness: &mut Harness<'_, App>| {
+        harness.get_by_label("Tip error over the workspace").click();
+        harness.run();
+    };
+    let rect = |harness: &Harness<'_, App>| harness.get_by_label("3D view").rect();
+    let before = rect(&harness);
+    toggle(&mut harness);
+    assert_eq!(rect(&harness), before, "it fits into the bench");
+    harness.get_by_label("No map yet");
+    click(&mut harness, Role::Button, "Map tip error");
+    harness.run();
+    harness.get_by_label("5 points");
+    let with = view(&mut harness);
+    let arrows = differing(&without, &with);
+    assert!(arrows > 200, "{arrows}");
+    harness.get_by_role_and_label(Role::Slider, "Scale of the arrows").set_value_accesskit(1.0);
+    harness.run();
+    let small = view(&mut harness);
+    assert!(differing(&without, &small) < arrows);
+    toggle(&mut harness);
+    let closed = view(&mut harness);
+    assert_eq!(differing(&without, &closed), 0);
+}
+
+#[test]
+fn a_bad_axis_of_a_map_is_explained() {
+    let mut harness = window("four-bar", &[]);
+    hold(&mut harness);
+    harness.get_by_label("Tip error over the workspace").click();
+    harness.run();
+    for (over, words) in [
+        ("rocker.angle=0deg..1deg:2", "driven coordinates: crank.angle"),
+        ("crank.angle=2deg..1deg:2", "The range is reversed"),
+        ("crank.angle=0deg..1deg:9999", "take fewer values"),
+    ] {
+        let field = harness.get_by_role_and_label(Role::MultilineTextInput, "Axes of the map");
+        field.focus();
+        harness.run();
+        harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::A);
+        harness.run();
+        harness.get_by_role_and_label(Role::MultilineTextInput, "Axes of the map").type_text(over);
+        harness.run();
+        click(&mut harness, Role::Button, "Map tip error");
+        harness.run();
+        harness.get_by_label_contains(words);
+        assert!(harness.query_by_label_contains("--over crank").is_none());
+    }
+}

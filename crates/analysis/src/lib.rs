@@ -56,6 +56,7 @@ pub mod iso286;
 pub mod layout;
 mod many_joints;
 pub mod map;
+pub mod map_task;
 pub mod morris;
 mod normal;
 pub mod orbit;

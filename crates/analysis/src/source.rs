@@ -74,6 +74,8 @@ pub(super) enum TaskFault {
          periods, or run `jointplay sweep`"
     )]
     TooManySections { points: usize, kept: usize, most: usize },
+    #[error("{points} points are more than the window shows ({most}): take fewer values, or run `jointplay map`")]
+    TooManyPoints { points: usize, most: usize },
     #[error("no preset is called {0}")]
     NoPreset(String),
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::RunContext;
 use super::alone_task::{self, AloneMessage, AlonePlan, AloneRun, AloneTask};
+use super::map_task::{self, MapMessage, MapTask};
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
@@ -27,6 +28,8 @@ pub enum Job {
     Sweep(SweepTask, Share),
     /// The effect of each uncertain parameter alone, or a share of its runs.
     Alone(AloneTask, Share),
+    /// The tip's error over the workspace.
+    Map(MapTask),
 }
 
 /// Messages of a running computation.
@@ -44,6 +47,8 @@ pub enum Message {
     Plan(AlonePlan),
     /// One of these runs.
     Run(AloneRun),
+    /// About a map.
+    Map(MapMessage),
     /// End of the results.
     Done,
     /// Reason for the lack of a result.
@@ -88,6 +93,7 @@ pub async fn perform_with_rests(
 ) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
+        Job::Map(task) => map_task::run(task, &mut |message| tell(Message::Map(message)), rest).await,
         Job::Sweep(task, share) => sweep_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
         Job::Alone(task, share) => alone_task::run(task, *share, &mut |message| tell(message.into()), rest).await,
     };

@@ -5,6 +5,7 @@ use eframe::egui::{Align, Button, ComboBox, DragValue, RichText, TextEdit, Ui, v
 use super::asked::Asked;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
+use super::in_words;
 use super::shares::Shares;
 use super::swept::{Swept, start_word};
 use crate::analysis::design::Start;
@@ -99,7 +100,7 @@ impl SweepPanel {
         match polled {
             Ok(true) => return true,
             Ok(false) => {}
-            Err(why) => self.problem = Some(in_words(&why, task)),
+            Err(why) => self.problem = Some(in_words(&why, "--vary", &task.vary)),
         }
         self.running = None;
         false
@@ -426,14 +427,4 @@ fn varies(player: &Player, parameter: &Parameter) -> bool {
 fn number(ui: &mut Ui, name: &str, value: &mut usize, range: std::ops::RangeInclusive<usize>, help: &str) {
     ui.label(name);
     ui.add(DragValue::new(value).range(range)).on_hover_text(help).accessible_name(name);
-}
-
-/// The error message without its command-line prefix.
-fn in_words(why: &str, task: &SweepTask) -> String {
-    let option = task.vary.first().map(|text| format!("--vary {text}: "));
-    let words = option.and_then(|option| why.strip_prefix(option.as_str()));
-    let words = words.unwrap_or(why);
-    let mut letters = words.chars();
-    let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
-    first.unwrap_or_default() + letters.as_str()
 }

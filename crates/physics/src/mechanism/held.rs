@@ -184,6 +184,12 @@ impl HeldMachine {
     }
 }
 
+/// Driven coordinates of `machine` at t = 0, in the order of [`Machine::driven`], m or rad.
+pub fn drive_positions(machine: &Machine) -> Vec<f64> {
+    let position = |drive: &mut Drive| if let Drive::Constant { position, .. } = drive { *position } else { 0.0 };
+    drives(&mut at_start(machine)).map(position).collect()
+}
+
 /// Drives of the tree joints, in the order of [`Machine::driven`].
 fn drives(machine: &mut Machine) -> impl Iterator<Item = &mut Drive> {
     machine.joints.iter_mut().flat_map(|joint| joint.drive.iter_mut().chain(&mut joint.second_drive))

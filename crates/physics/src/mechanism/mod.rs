@@ -51,7 +51,7 @@ pub use drives::periods_of;
 pub use elements::{ActiveSet, Counts, ElementReport, Gap, Powers, Pull, Touch};
 use flight::ActiveRanges;
 pub use flight::{Flight, FreeFlightBody};
-pub use held::{HeldError, HeldMachine};
+pub use held::{HeldError, HeldMachine, drive_positions};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};

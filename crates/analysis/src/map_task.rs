@@ -1,0 +1,122 @@
+//! A map of the tip's error as plain data, for a thread or a worker.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::map::{DIRECTIONS, MapPoint, WorkspaceMap};
+use super::source::{SceneSource, TaskFault};
+use jointplay_physics::machine::Vec3;
+
+/// Largest number of points that the window shows.
+pub const MOST_POINTS: usize = 5000;
+
+/// A map to be computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapTask {
+    /// The scene.
+    pub scene: SceneSource,
+    /// What varies, as in `map --over`.
+    pub over: Vec<String>,
+    /// Directions at each point.
+    pub directions: usize,
+}
+
+/// A message about a map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum MapMessage {
+    /// The accepted axes: name and values in their order, SI. The points follow, the last axis varying fastest.
+    Axes(Vec<(String, Vec<f64>)>),
+    /// The next point; `None` if the machine without play has no pose there.
+    Point(Option<TipErrors>),
+}
+
+/// Errors of the tip at a point, world axes, m.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TipErrors {
+    /// Tip without play.
+    pub tip: [f64; 3],
+    /// Error at rest, if there is a position of rest.
+    pub settled: Option<[f64; 3]>,
+    /// Largest error that is reachable with every ball anywhere in its play.
+    pub largest: Option<[f64; 3]>,
+}
+
+impl TipErrors {
+    fn of(point: &MapPoint) -> Self {
+        let plain = |v: &Vec3| [v.x, v.y, v.z];
+        let largest = point.largest.as_ref().and_then(|largest| largest.error.as_ref());
+        Self {
+            tip: plain(&point.ideal_tip),
+            settled: point.settled.as_ref().ok().map(plain),
+            largest: largest.map(plain),
+        }
+    }
+}
+
+/// Computes `task`, point after point, and awaits `rest` after each.
+pub(super) async fn run(
+    task: &MapTask,
+    tell: &mut dyn FnMut(MapMessage) -> ControlFlow<()>,
+    rest: &mut impl AsyncFnMut(),
+) -> Result<(), TaskFault> {
+    let directions = task.directions.clamp(*DIRECTIONS.start(), *DIRECTIONS.end());
+    let map = WorkspaceMap::new(task.scene.scene()?, &task.over, directions)?;
+    let points = map.design().points();
+    if points > MOST_POINTS {
+        return Err(TaskFault::TooManyPoints { points, most: MOST_POINTS });
+    }
+    let axes = map.design().axes().iter();
+    let axes = axes.map(|axis| (axis.key().to_owned(), axis.numbers().collect()));
+    let mut told = tell(MapMessage::Axes(axes.collect()));
+    for point in 0..points {
+        if told.is_break() {
+            return Err(TaskFault::Cancelled);
+        }
+        told = tell(MapMessage::Point(map.point(point).ok().as_ref().map(TipErrors::of)));
+        rest().await;
+    }
+    if told.is_break() { Err(TaskFault::Cancelled) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::{Job, Message, perform};
+    use jointplay_scene::Scene;
+
+    fn said(over: &[&str], most: usize) -> Vec<Message> {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        let over = over.iter().map(|&text| text.to_owned()).collect();
+        let job = Job::Map(MapTask { scene: SceneSource::of(&scene), over, directions: 4 });
+        // Jobs are sent as text.
+        let job: Job = serde_json::from_str(&serde_json::to_string(&job).expect("plain data")).expect("its own text");
+        let mut said = Vec::new();
+        perform(&job, &mut || 0.0, &mut |message| {
+            said.push(message);
+            if said.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        said
+    }
+
+    #[test]
+    fn a_map_tells_its_axes_then_its_points_and_ends_when_told() {
+        let over = ["crank.angle=0deg,90deg,180deg", "contact.clearance=0.1mm,0.2mm"];
+        let all = said(&over, usize::MAX);
+        assert_eq!((all.len(), all.last()), (8, Some(&Message::Done)));
+        let Message::Map(MapMessage::Axes(axes)) = &all[0] else { panic!("{all:?}") };
+        assert_eq!((&axes[0].0[..], axes[1].1.len()), ("crank.angle", 2));
+        let errors = |message: &Message| match message {
+            Message::Map(MapMessage::Point(Some(errors))) => errors.clone(),
+            other => panic!("{other:?}"),
+        };
+        // Twice the play, twice the error, and the same tip.
+        let (one, two) = (errors(&all[1]), errors(&all[2]));
+        assert_eq!(one.tip, two.tip);
+        let size = |errors: &TipErrors| Vec3::from(errors.largest.expect("an error")).norm();
+        assert!((size(&two) / size(&one) - 2.0).abs() < 0.01);
+        assert_eq!(said(&over, 3), all[..3]);
+        let refused = said(&["crank.angle=0deg..1deg:9999"], usize::MAX);
+        assert!(matches!(&refused[..], [Message::Failed(why)] if why.contains("9999 points")), "{refused:?}");
+    }
+}

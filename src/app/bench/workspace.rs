@@ -1,0 +1,378 @@
+//! Map of the tip's error over the workspace: its axes, its computation, and the arrows in the picture.
+
+use eframe::egui::{Button, ComboBox, ProgressBar, RichText, Slider, TextEdit, Ui, vec2};
+
+use super::in_words;
+use crate::analysis::map_task::{MapMessage, MapTask, TipErrors};
+use crate::analysis::source::SceneSource;
+use crate::analysis::task::{Job, Message};
+use crate::app::host::{Host, Running};
+use crate::app::layout::reserved;
+use crate::app::player::Player;
+use crate::app::{theme, value};
+use crate::machine::{Machine, Vec3};
+use crate::mechanism::drive_positions;
+use crate::units::format_quantity_digits;
+use crate::view::{Cloud, to_f32};
+
+/// Directions at each point: enough for the largest error, which is improved from the largest of them.
+const DIRECTIONS: usize = 16;
+/// Width of the start button, points; fixed, so that it does not move.
+const GO: f32 = 120.0;
+/// Range of the scale, and that at first.
+const SCALE: std::ops::RangeInclusive<f32> = 1.0..=1000.0;
+const FIRST_SCALE: f32 = 100.0;
+/// Largest number of drives that vary at first.
+const MOST_DRIVES: usize = 3;
+
+/// Which error is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Which {
+    #[default]
+    Largest,
+    Settled,
+}
+
+impl Which {
+    const ALL: [Self; 2] = [Self::Largest, Self::Settled];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Largest => "largest error",
+            Self::Settled => "settled error",
+        }
+    }
+
+    fn help(self) -> &'static str {
+        match self {
+            Self::Largest => {
+                "Largest error of the tip with every ball anywhere in its play and the drives held. Contact between bodies, \
+                 springs, loads and inertia are ignored."
+            }
+            Self::Settled => "Error of the tip at rest, under gravity, springs and loads, without friction.",
+        }
+    }
+
+    fn of(self, errors: &TipErrors) -> Option<[f64; 3]> {
+        match self {
+            Self::Largest => errors.largest,
+            Self::Settled => errors.settled,
+        }
+    }
+}
+
+/// Axes around the positions of the first drives at t = 0, one per line.
+fn around_start(machine: &Machine) -> String {
+    let drives = machine.driven().zip(drive_positions(machine));
+    let axes = drives.take(MOST_DRIVES).map(|((joint, freedom), at)| {
+        let (unit, reach) = if freedom.turns() { ("deg", 10_f64.to_radians()) } else { ("mm", 0.01) };
+        let [from, to] = [at - reach, at + reach].map(|end| format_quantity_digits(end, unit, 4));
+        format!("{}.{}={from}..{to}:5", joint.name, freedom.word())
+    });
+    axes.collect::<Vec<_>>().join("\n")
+}
+
+/// A map so far.
+struct Mapped {
+    task: MapTask,
+    axes: Vec<(String, Vec<f64>)>,
+    points: Vec<Option<TipErrors>>,
+}
+
+impl Mapped {
+    fn count(&self) -> usize {
+        self.axes.iter().map(|(_, values)| values.len()).product()
+    }
+
+    /// Index of `point` along `axis`.
+    fn index(&self, axis: usize, point: usize) -> usize {
+        let below: usize = self.axes[axis + 1..].iter().map(|(_, values)| values.len()).product();
+        point / below % self.axes[axis].1.len()
+    }
+}
+
+/// The panel.
+pub struct MapPanel {
+    /// Name of the scene that `over` belongs to, and what varies, one axis per line.
+    scene: String,
+    over: String,
+    asked: Option<MapTask>,
+    running: Option<Box<dyn Running>>,
+    mapped: Option<Mapped>,
+    problem: Option<String>,
+    which: Which,
+    scale: f32,
+    /// The axis that is fixed, and at which of its values.
+    slice: Option<(usize, usize)>,
+    /// Whether the panel was open when it was last drawn.
+    shown: bool,
+}
+
+impl Default for MapPanel {
+    fn default() -> Self {
+        Self {
+            scene: String::new(),
+            over: String::new(),
+            asked: None,
+            running: None,
+            mapped: None,
+            problem: None,
+            which: Which::default(),
+            scale: FIRST_SCALE,
+            slice: None,
+            shown: false,
+        }
+    }
+}
+
+impl MapPanel {
+    /// Starts a requested map and takes messages from a running one; returns whether one is running.
+    pub fn update(&mut self, host: &mut dyn Host) -> bool {
+        if let Some(task) = self.asked.take() {
+            (self.problem, self.slice) = (None, None);
+            self.running = host.start(Job::Map(task.clone()));
+            match self.running {
+                Some(_) => self.mapped = Some(Mapped { task, axes: Vec::new(), points: Vec::new() }),
+                None => self.problem = Some("Maps cannot be computed here".to_owned()),
+            }
+        }
+        while let Some(message) = self.running.as_mut().and_then(|running| running.poll()) {
+            match (message, &mut self.mapped) {
+                (Message::Map(MapMessage::Axes(axes)), Some(mapped)) => mapped.axes = axes,
+                (Message::Map(MapMessage::Point(point)), Some(mapped)) => mapped.points.push(point),
+                (Message::Done, _) => self.running = None,
+                (Message::Failed(why), mapped) => {
+                    let over = mapped.as_ref().map_or(&[][..], |mapped| &mapped.task.over);
+                    self.problem = Some(in_words(&why, "--over", over));
+                    (self.running, self.mapped) = (None, None);
+                }
+                _ => {}
+            }
+        }
+        self.running.is_some()
+    }
+
+    /// The arrows of the map of the scene on show; `None` if the panel was closed in the latest frame.
+    pub fn take_cloud(&mut self, player: &Player) -> Option<Cloud> {
+        let shown = std::mem::take(&mut self.shown);
+        let mapped = self.mapped.as_ref().filter(|_| shown)?;
+        if mapped.task.scene != SceneSource::of(player.pending()) {
+            return None;
+        }
+        let vector = |v: [f64; 3]| to_f32(&Vec3::from(v));
+        let points = mapped.points.iter().enumerate();
+        let points = points.filter(|(point, _)| self.slice.is_none_or(|(axis, at)| mapped.index(axis, *point) == at));
+        let arrows = points.filter_map(|(_, errors)| {
+            let errors = errors.as_ref()?;
+            Some([vector(errors.tip), vector(self.which.of(errors)?)])
+        });
+        Some(Cloud { arrows: arrows.collect(), times: self.scale, name: self.which.name() })
+    }
+
+    /// Axes, progress, and what is shown.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+        self.shown = true;
+        let scene = player.pending();
+        if self.scene != scene.name {
+            (self.scene, self.over) = (scene.name.clone(), around_start(&scene.machine));
+        }
+        ui.label("Over").on_hover_text(
+            "One axis per line, all combined: a driven coordinate at which the drive is held, such as \
+             crank.angle=0deg..345deg:24, or a parameter, such as contact.clearance=0.1mm,0.2mm",
+        );
+        ui.add(TextEdit::multiline(&mut self.over).desired_rows(3).desired_width(f32::INFINITY))
+            .on_hover_text("What varies, as in `jointplay map --over`")
+            .accessible_name("Axes of the map");
+        self.go_ui(ui, player);
+        reserved(ui, "map says", 2, |ui| self.state_ui(ui, player));
+        ui.horizontal_wrapped(|ui| {
+            for which in Which::ALL {
+                let mut name = which.name().to_owned();
+                name[..1].make_ascii_uppercase();
+                ui.selectable_value(&mut self.which, which, name).on_hover_text(which.help());
+            }
+        });
+        ui.horizontal(|ui| {
+            ui.label("Scale");
+            ui.add(Slider::new(&mut self.scale, SCALE).logarithmic(true).custom_formatter(|x, _| format!("×{x:.0}")))
+                .on_hover_text("Length of an arrow over that of the error")
+                .accessible_name("Scale of the arrows");
+        });
+        self.slice_ui(ui);
+    }
+
+    fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
+        let running = self.running.is_some() || self.asked.is_some();
+        ui.horizontal(|ui| {
+            let (name, help) = if running {
+                ("Cancel", "End the computation; the points so far stay")
+            } else {
+                (
+                    "Map tip error",
+                    "Computes the error of the tip at every point in the background; the run is not affected",
+                )
+            };
+            if ui.add(Button::new(name).min_size(vec2(GO, 0.0))).on_hover_text(help).clicked() {
+                if running {
+                    (self.running, self.asked) = (None, None);
+                } else {
+                    let over = self.over.lines().map(str::trim).filter(|line| !line.is_empty());
+                    self.asked = Some(MapTask {
+                        scene: SceneSource::of(player.pending()),
+                        over: over.map(str::to_owned).collect(),
+                        directions: DIRECTIONS,
+                    });
+                }
+            }
+            if let Some(mapped) = self.mapped.as_ref().filter(|_| running) {
+                let done = mapped.points.len() as f32 / mapped.count().max(1) as f32;
+                ui.add(ProgressBar::new(done).show_percentage()).accessible_name("Computed so far");
+            }
+        });
+    }
+
+    fn state_ui(&self, ui: &mut Ui, player: &Player) {
+        if let Some(problem) = &self.problem {
+            theme::error(ui, problem);
+            return;
+        }
+        let Some(mapped) = &self.mapped else {
+            ui.label(RichText::new("No map yet").small().weak());
+            return;
+        };
+        if mapped.task.scene != SceneSource::of(player.pending()) {
+            theme::warning(ui, "This map belongs to other values of the parameters, and is not drawn");
+            return;
+        }
+        let posed = mapped.points.iter().flatten().count();
+        let words = match mapped.points.len() - posed {
+            0 => format!("{posed} points"),
+            none => format!("{posed} points; {none} without a pose of the machine without play"),
+        };
+        ui.label(RichText::new(words).small()).on_hover_text("Arrows begin at the tip of the machine without play");
+    }
+
+    /// Selection of the axis that is fixed, and of its value.
+    fn slice_ui(&mut self, ui: &mut Ui) {
+        let Some(mapped) = self.mapped.as_ref().filter(|mapped| mapped.axes.len() > 1) else {
+            return;
+        };
+        ui.horizontal_wrapped(|ui| {
+            let name = |slice: Option<(usize, usize)>| slice.map_or("whole map", |(axis, _)| &*mapped.axes[axis].0);
+            let mut axis = self.slice.map(|(axis, _)| axis);
+            ComboBox::from_id_salt("slice")
+                .selected_text(name(self.slice))
+                .show_ui(ui, |ui| {
+                    ui.selectable_value(&mut axis, None, "whole map");
+                    for (n, (key, _)) in mapped.axes.iter().enumerate() {
+                        ui.selectable_value(&mut axis, Some(n), key);
+                    }
+                })
+                .response
+                .on_hover_text("Axis that is fixed, so that only a slice of the map is drawn")
+                .accessible_name("Slice");
+            let at = self.slice.filter(|(own, _)| Some(*own) == axis).map_or(0, |(_, at)| at);
+            self.slice = axis.map(|axis| (axis, at));
+            if let Some((axis, at)) = &mut self.slice {
+                let values = &mapped.axes[*axis].1;
+                let shown = |n: f64| values.get(n as usize).map_or_else(String::new, |si| value::number(*si, 4));
+                ui.add(Slider::new(at, 0..=values.len() - 1).custom_formatter(|n, _| shown(n)))
+                    .on_hover_text("Value at which the axis is fixed, in SI units")
+                    .accessible_name("Value of the slice");
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::analysis::map::WorkspaceMap;
+    use crate::analysis::task::perform;
+    use crate::app::{Dropped, OpenedFile};
+    use crate::scene::Scene;
+
+    /// Messages of a job that has already been computed.
+    struct Done(std::vec::IntoIter<Message>);
+
+    impl Running for Done {
+        fn poll(&mut self) -> Option<Message> {
+            self.0.next()
+        }
+
+        fn rest(&mut self, _rest: f64) {}
+
+        fn cancel(&mut self) {}
+    }
+
+    /// Computes jobs at once.
+    struct AtOnce;
+
+    impl Host for AtOnce {
+        fn read_dropped(&mut self, _files: Vec<Dropped>) {}
+
+        fn opened(&mut self) -> Option<Vec<OpenedFile>> {
+            None
+        }
+
+        fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+            let mut messages = Vec::new();
+            perform(&job, &mut || 0.0, &mut |message| {
+                messages.push(message);
+                ControlFlow::Continue(())
+            });
+            Some(Box::new(Done(messages.into_iter())))
+        }
+    }
+
+    #[test]
+    fn arrows_are_the_errors_of_the_map_and_a_slice_is_a_part_of_them() {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        let player = Player::new(&scene).expect("starts");
+        let over = ["crank.angle=0deg..90deg:3".to_owned(), "contact.clearance=0.1mm,0.2mm".to_owned()];
+        let task = MapTask { scene: SceneSource::of(&scene), over: over.to_vec(), directions: DIRECTIONS };
+        let mut panel = MapPanel { asked: Some(task), ..MapPanel::default() };
+        assert!(!panel.update(&mut AtOnce), "it is done");
+        assert_eq!(panel.take_cloud(&player), None, "the panel is closed");
+        let map = WorkspaceMap::new(scene.clone(), &over, DIRECTIONS).expect("six points");
+        let shown = |panel: &mut MapPanel| {
+            panel.shown = true;
+            panel.take_cloud(&player).expect("the map is of this scene")
+        };
+        for which in Which::ALL {
+            panel.which = which;
+            let cloud = shown(&mut panel);
+            assert_eq!((cloud.arrows.len(), cloud.times), (6, FIRST_SCALE));
+            for (point, [tip, error]) in cloud.arrows.iter().enumerate() {
+                let own = map.point(point).expect("a pose");
+                let expected = match which {
+                    Which::Largest => own.largest.and_then(|largest| largest.error).expect("an error"),
+                    Which::Settled => own.settled.expect("a position of rest"),
+                };
+                assert_eq!((*tip, *error), (to_f32(&own.ideal_tip), to_f32(&expected)));
+            }
+        }
+        let all = shown(&mut panel).arrows;
+        panel.slice = Some((1, 1));
+        assert_eq!(shown(&mut panel).arrows, [all[1], all[3], all[5]]);
+        panel.slice = Some((0, 2));
+        assert_eq!(shown(&mut panel).arrows, all[4..]);
+        // Of other values, nothing is drawn.
+        let other =
+            Scene::load("four-bar", &[("contact.clearance".to_owned(), "0.3 mm".to_owned())]).expect("built in");
+        let other = Player::new(&other).expect("starts");
+        panel.shown = true;
+        assert_eq!(panel.take_cloud(&other), None);
+    }
+
+    #[test]
+    fn axes_at_first_are_around_the_start() {
+        let scene = Scene::load("hexapod", &[]).expect("built in");
+        let over: Vec<String> = around_start(&scene.machine).lines().map(str::to_owned).collect();
+        assert_eq!(over.len(), MOST_DRIVES);
+        let map = WorkspaceMap::new(scene, &over, 2).expect("it reads them");
+        assert!(map.point(0).is_ok() && map.point(62).is_ok());
+    }
+}

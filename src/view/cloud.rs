@@ -1,0 +1,98 @@
+//! Errors of the tip at many positions of the machine, as a cloud of arrows to one scale.
+
+use glam::Vec3;
+
+use super::arrows::push_error_arrow;
+use super::instances::push_label;
+use super::near::Near;
+use super::theme::Ghost;
+use super::{DrawList, LabelKind, Palette, SceneView, Shot, build};
+use crate::units::format_quantity_digits;
+
+/// A cloud of arrows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cloud {
+    /// Tip without play, and the error there, world axes, m.
+    pub arrows: Vec<[Vec3; 2]>,
+    /// Length of an arrow, over that of the error.
+    pub times: f32,
+    /// What the errors are.
+    pub name: &'static str,
+}
+
+impl Cloud {
+    /// The longest error.
+    fn longest(&self) -> Option<&[Vec3; 2]> {
+        let arrows = self.arrows.iter();
+        arrows.max_by(|a, b| a[1].length_squared().total_cmp(&b[1].length_squared()))
+    }
+}
+
+impl SceneView {
+    /// Adds `cloud` to the list built from `shot`, with a label at the longest arrow.
+    pub fn add_cloud(&self, shot: &Shot<'_>, cloud: &Cloud, out: &mut DrawList) {
+        let near = Near::of(shot);
+        let origin = near.as_ref().map_or(Vec3::ZERO, |_| shot.camera.target);
+        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
+        let colour = Palette::of(shot.options.theme).ghost(Ghost::Twin).edge;
+        for [tip, error] in &cloud.arrows {
+            push_error_arrow(shot, *tip - origin, *error * cloud.times, colour, out);
+        }
+        if let Some([tip, error]) = cloud.longest() {
+            let length = format_quantity_digits(f64::from(error.length()) * 1e6, "", 4);
+            let words = format!("{} {length} µm, drawn ×{}", cloud.name, build::times(cloud.times));
+            push_label(out, &words.into(), LabelKind::Error, *tip - origin + *error * cloud.times, colour);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::simulate::{Frame, Simulation};
+    use crate::view::{Mesh, PeakMarks, ViewOptions};
+
+    #[test]
+    fn arrows_end_where_the_numbers_say() {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        let mut frame = Frame::default();
+        Simulation::new(&scene.machine).expect("starts").sample(0.0, &mut frame);
+        let view = SceneView::new(&scene, &frame);
+        let (marks, camera) = (PeakMarks::new(), view.camera());
+        let options = ViewOptions::default();
+        let shot = Shot {
+            scene: &scene,
+            frame: &frame,
+            marks: &marks,
+            options: &options,
+            camera: &camera,
+            trail: &[],
+            size: [1280, 720],
+            pixels_per_point: 1.0,
+        };
+        let cloud = Cloud {
+            arrows: vec![
+                [Vec3::new(0.01, 0.02, 0.0), Vec3::new(2e-4, 0.0, -1e-4)],
+                [Vec3::new(-0.03, 0.0, 0.04), Vec3::Y * 1e-4],
+            ],
+            times: 200.0,
+            name: "largest error",
+        };
+        let cones = |list: &DrawList| list.arrows.by_mesh[Mesh::Cone.index()].len();
+        let mut list = DrawList::default();
+        view.build(&shot, &mut list);
+        let before = cones(&list);
+        view.add_cloud(&shot, &cloud, &mut list);
+        let added = &list.arrows.by_mesh[Mesh::Cone.index()][before..];
+        assert_eq!(added.len(), 2);
+        for (cone, [tip, error]) in added.iter().zip(&cloud.arrows) {
+            // The apex of the mesh is at z = 1.
+            let apex = Vec3::from(cone.world_from_mesh.map(|row| row[2] + row[3]));
+            assert!(apex.distance(*tip + *error * 200.0) < 1e-6, "{apex}");
+        }
+        let label = list.labels.iter().find(|label| label.kind == LabelKind::Error).expect("in the picture");
+        assert_eq!(*label.text, *"largest error 223.6 µm, drawn ×200");
+        assert!(label.anchor.distance(Vec3::new(0.05, 0.02, -0.02)) < 1e-6, "{}", label.anchor);
+    }
+}
