@@ -18,6 +18,8 @@ pub struct Cloud {
     pub times: f32,
     /// What the errors are.
     pub name: &'static str,
+    /// Remark on them, for the label.
+    pub note: &'static str,
 }
 
 impl Cloud {
@@ -40,7 +42,7 @@ impl SceneView {
         }
         if let Some([tip, error]) = cloud.longest() {
             let length = format_quantity_digits(f64::from(error.length()) * 1e6, "", 4);
-            let words = format!("{} {length} µm, drawn ×{}", cloud.name, build::times(cloud.times));
+            let words = format!("{} {length} µm{}, drawn ×{}", cloud.name, cloud.note, build::times(cloud.times));
             push_label(out, &words.into(), LabelKind::Error, *tip - origin + *error * cloud.times, colour);
         }
     }
@@ -78,6 +80,7 @@ mod tests {
             ],
             times: 200.0,
             name: "largest error",
+            note: ", contact ignored",
         };
         let cones = |list: &DrawList| list.arrows.by_mesh[Mesh::Cone.index()].len();
         let mut list = DrawList::default();
@@ -92,7 +95,7 @@ mod tests {
             assert!(apex.distance(*tip + *error * 200.0) < 1e-6, "{apex}");
         }
         let label = list.labels.iter().find(|label| label.kind == LabelKind::Error).expect("in the picture");
-        assert_eq!(*label.text, *"largest error 223.6 µm, drawn ×200");
+        assert_eq!(*label.text, *"largest error 223.6 µm, contact ignored, drawn ×200");
         assert!(label.anchor.distance(Vec3::new(0.05, 0.02, -0.02)) < 1e-6, "{}", label.anchor);
     }
 }

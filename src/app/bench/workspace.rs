@@ -43,6 +43,14 @@ impl Which {
         }
     }
 
+    /// Remark in the picture.
+    fn note(self) -> &'static str {
+        match self {
+            Self::Largest => ", contact ignored",
+            Self::Settled => "",
+        }
+    }
+
     fn help(self) -> &'static str {
         match self {
             Self::Largest => {
@@ -166,7 +174,7 @@ impl MapPanel {
             let errors = errors.as_ref()?;
             Some([vector(errors.tip), vector(self.which.of(errors)?)])
         });
-        Some(Cloud { arrows: arrows.collect(), times: self.scale, name: self.which.name() })
+        Some(Cloud { arrows: arrows.collect(), times: self.scale, name: self.which.name(), note: self.which.note() })
     }
 
     /// Axes, progress, and what is shown.

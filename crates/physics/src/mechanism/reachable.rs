@@ -128,22 +128,31 @@ impl HeldMachine {
     }
 }
 
-/// Orthonormal basis of the directions in which the symmetric matrix `m` exceeds `least`: along world axes as far as possible.
+/// Orthonormal basis of the range of the symmetric, positive semidefinite matrix `m`, but for what is at most `least`: world axes in
+/// space, and as far as possible in a plane.
 fn range(m: &Mat3, least: f64) -> Vec<Vec3> {
-    let eigen = (0.5 * (m + m.transpose())).symmetric_eigen();
-    let along = |is: fn(f64, f64) -> bool| -> Vec<Vec3> {
-        let chosen = (0..3).filter(|&i| is(eigen.eigenvalues[i], least));
-        chosen.map(|i| upward(eigen.eigenvectors.column(i).into())).collect()
-    };
-    let inside = along(|value, least| value > least);
-    match (&inside[..], &along(|value, least| value <= least)[..]) {
-        ([_, _, _], _) => vec![Vec3::x(), Vec3::y(), Vec3::z()],
-        ([_, _], [normal]) => {
+    let mut left = *m;
+    let mut basis: Vec<Vec3> = Vec::new();
+    while basis.len() < 3 {
+        let most = (0..3).max_by(|&a, &b| left[(a, a)].total_cmp(&left[(b, b)])).unwrap_or(0);
+        if !(left[(most, most)] > least) {
+            break;
+        }
+        let axis: Vec3 = left.column(most).normalize();
+        let across = Mat3::identity() - axis * axis.transpose();
+        left = across * left * across;
+        basis.push(axis);
+    }
+    match basis[..] {
+        [_, _, _] => vec![Vec3::x(), Vec3::y(), Vec3::z()],
+        [a, b] => {
+            let normal = upward(a.cross(&b));
             let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
             let first = (axis - normal * normal.dot(&axis)).normalize();
             vec![first, normal.cross(&first)]
         }
-        _ => inside,
+        [along] => vec![upward(along)],
+        _ => Vec::new(),
     }
 }
 
