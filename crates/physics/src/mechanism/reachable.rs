@@ -1,8 +1,8 @@
 //! The set of tip errors that are reachable with every ball anywhere in its play and the drives held: its farthest point in a
 //! direction. Contact between bodies, springs and inertia play no part.
 //!
-//! A unit force u at the tip, balanced by forces l_k on the balls of the mechanism without play, does the virtual work u . e =
-//! sum(l_k . d_k) while the balls are displaced by d_k in their sockets. Every ball with play c_k therefore lies at
+//! A unit force u at the tip of the mechanism without play presses its balls on their sockets with forces l_k, and does the virtual
+//! work u . e = sum(l_k . d_k) while the balls are displaced by d_k in the sockets. Every ball with play c_k therefore lies at
 //! c_k l_k / |l_k| where the tip is farthest along u (Venanzi & Parenti-Castelli, ASME J. Mech. Des. 127, 2005, pp. 446-455; the set
 //! itself: Voglewede & Ebert-Uphoff, ASME J. Mech. Des. 126, 2004, pp. 283-290), and to first order the largest u . e, the support of
 //! the set, is sum(c_k |l_k|). If joints share the load, the support is the least such sum over all l_k in balance, by duality: the
