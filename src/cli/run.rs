@@ -16,6 +16,7 @@ use super::state::{self, Checkpoint, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::presets::too_slow;
+use crate::analysis::row_times::RowTimes;
 use crate::files::{FileError, publish};
 use crate::scene::LiveScene;
 use crate::scene::Scene;
@@ -23,53 +24,6 @@ use crate::simulate::Frame;
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 256;
-
-/// Row times k x `every`, k = 0..=`last`, of a run of length `duration`, in s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Times {
-    every: f64,
-    last: u64,
-    duration: f64,
-}
-
-impl Times {
-    /// # Errors
-    /// An interval that is not positive.
-    fn new(duration: f64, every: f64) -> Result<Self, Failure> {
-        if every <= 0.0 {
-            return Err(Failure::usage("--every 0: the interval between rows must be greater than 0"));
-        }
-        // 20 ms / 0.1 ms must give 200 intervals despite rounding.
-        let intervals = duration / every;
-        let whole = intervals.round();
-        let last = if (intervals - whole).abs() <= 1e-9 * whole { whole } else { intervals.floor() };
-        Ok(Self { every, last: last as u64, duration })
-    }
-
-    /// Time of row `k`, s.
-    fn at(&self, k: u64) -> f64 {
-        (k as f64 * self.every).min(self.duration)
-    }
-
-    /// Index of the first row at or after both `from` and `time`, s.
-    fn first(&self, from: f64, time: f64) -> u64 {
-        let from = time.max(from * (1.0 - 1e-9));
-        let mut k = (from / self.every) as u64;
-        // Corrects for rounding in the division.
-        while k > 0 && self.at(k - 1) >= from {
-            k -= 1;
-        }
-        while k <= self.last && self.at(k) < from {
-            k += 1;
-        }
-        k
-    }
-
-    /// Whether the last row lies at the end of the run.
-    fn reach_the_end(&self) -> bool {
-        self.duration - self.at(self.last) <= 1e-9 * self.duration
-    }
-}
 
 /// How stepping ended, with a message for the user if it ended early.
 struct End {
@@ -88,7 +42,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         return Err(Failure::usage("--link: the link names no instant; give the length of the run with --duration"));
     };
     let times = match &arguments.every {
-        Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),
+        Some(every) => {
+            let every = quantity::duration("--every", every)?;
+            let zero = || Failure::usage("--every 0: the interval between rows must be greater than 0");
+            Some(RowTimes::new(duration, every).ok_or_else(zero)?)
+        }
         None => None,
     };
     let mut names = vec![("the scene".to_owned(), arguments.scene.name())];
@@ -147,7 +105,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     table.ask(&mut frame);
     if let (Some(times), Some(file)) = (&times, &file) {
-        check_size(times.last.saturating_add(1), table.names().len())?;
+        check_size(times.last().saturating_add(1), table.names().len())?;
         table.spool_beside(file.target())?;
     }
     if !arguments.quiet {
@@ -320,7 +278,7 @@ impl StepObservers<'_> {
 fn simulate(
     simulation: &mut LiveScene,
     (from, duration): (f64, f64),
-    times: Option<Times>,
+    times: Option<RowTimes>,
     table: &mut Table,
     keepers: &mut StepObservers<'_>,
     frame: &mut Frame,
@@ -331,7 +289,7 @@ fn simulate(
     loop {
         // Rows that lie in the latest step (initially: the row at 0).
         if let Some(times) = times {
-            while next <= times.last && times.at(next) <= simulation.time() {
+            while next <= times.last() && times.at(next) <= simulation.time() {
                 simulation.sample(times.at(next), frame);
                 match table.push(frame) {
                     Ok(()) => {}
@@ -363,7 +321,7 @@ fn simulate(
             });
         }
         let last = if keepers.way.is_some() { f64::INFINITY } else { duration };
-        let row = times.filter(|times| next <= times.last).map_or(last, |times| times.at(next));
+        let row = times.filter(|times| next <= times.last()).map_or(last, |times| times.at(next));
         let started = Instant::now();
         let outcome = step_some(simulation, row, duration, keepers);
         *stopwatch += started.elapsed();
@@ -402,33 +360,4 @@ fn step_some(
 /// Simulated time in ns, because the progress bar counts in integers.
 fn position(time: f64) -> u64 {
     (time * 1e9) as u64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_lie_at_whole_multiples_and_both_ends_count() {
-        for (duration, every, rows) in [
-            (0.02, 0.1e-3, 201),
-            (0.0, 1e-3, 1),
-            (0.3, 0.1, 4),
-            (1.0, 0.3, 4),
-            (0.7, 0.1, 8),
-            (3.0, 1e-5, 300_001),
-            (1e-3, 1.0, 1),
-        ] {
-            let times = Times::new(duration, every).unwrap();
-            assert_eq!(times.last + 1, rows, "{duration} by {every}");
-            assert!(times.at(times.last) <= duration, "{duration} by {every}");
-        }
-        let times = Times::new(0.7, 0.1).unwrap();
-        assert_eq!([0.0, 0.05, 0.1, 0.3, 0.7].map(|from| times.first(from, 0.0)), [0, 1, 1, 3, 7]);
-        assert_eq!([0.3, 0.35, 0.71].map(|time| times.first(0.3, time)), [3, 4, 8]);
-        assert!(Times::new(0.7, 0.1).unwrap().reach_the_end());
-        assert!(Times::new(0.0, 0.1).unwrap().reach_the_end());
-        assert!(!Times::new(1.0, 0.3).unwrap().reach_the_end());
-        assert!(Times::new(1.0, 0.0).is_err());
-    }
 }

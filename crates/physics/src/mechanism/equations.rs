@@ -11,7 +11,7 @@ pub(super) const LEAST_PIVOT: f64 = 1e-12;
 pub(super) const NEARLY_DEPENDENT: f64 = 1e-6;
 
 /// Equations of motion in some set of coordinates. The `model` passed in is always the one they were built from.
-pub(super) trait Equations: Send {
+pub(super) trait Equations: Send + Sync {
     /// Position coordinates.
     fn positions(&self, model: &Model) -> usize;
 

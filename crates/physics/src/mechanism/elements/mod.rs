@@ -204,7 +204,7 @@ impl Powers {
 }
 
 /// A load on bodies that depends on their motion and on time. Allocates nothing.
-pub(super) trait ForceElement: Send {
+pub(super) trait ForceElement: Send + Sync {
     /// Adds its loads.
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
 

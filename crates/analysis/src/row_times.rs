@@ -1,0 +1,87 @@
+//! Instants of the rows of a run.
+
+/// Row times k x `every`, k = 0..=`last`, of a run of length `duration`, in s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowTimes {
+    every: f64,
+    last: u64,
+    duration: f64,
+}
+
+impl RowTimes {
+    /// Rows of a run of length `duration`, s, at intervals `every`, s; `None` if that is not positive.
+    pub fn new(duration: f64, every: f64) -> Option<Self> {
+        // NaN is not positive.
+        if !(every > 0.0) {
+            return None;
+        }
+        // 20 ms / 0.1 ms must give 200 intervals despite rounding.
+        let intervals = duration / every;
+        let whole = intervals.round();
+        let last = if (intervals - whole).abs() <= 1e-9 * whole { whole } else { intervals.floor() };
+        Some(Self { every, last: last as u64, duration })
+    }
+
+    /// Index of the last row; the first is 0.
+    pub fn last(&self) -> u64 {
+        self.last
+    }
+
+    /// Time of row `k`, s.
+    pub fn at(&self, k: u64) -> f64 {
+        (k as f64 * self.every).min(self.duration)
+    }
+
+    /// Index of the first row at or after both `from` and `time`, s.
+    pub fn first(&self, from: f64, time: f64) -> u64 {
+        let from = time.max(from * (1.0 - 1e-9));
+        let mut k = (from / self.every) as u64;
+        // Corrects for rounding in the division.
+        while k > 0 && self.at(k - 1) >= from {
+            k -= 1;
+        }
+        while k <= self.last && self.at(k) < from {
+            k += 1;
+        }
+        k
+    }
+
+    /// Whether the last row lies at the end of the run.
+    pub fn reach_the_end(&self) -> bool {
+        self.duration - self.at(self.last) <= 1e-9 * self.duration
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(duration: f64, every: f64) -> RowTimes {
+        RowTimes::new(duration, every).expect("positive")
+    }
+
+    #[test]
+    fn rows_lie_at_whole_multiples_and_both_ends_count() {
+        for (duration, every, count) in [
+            (0.02, 0.1e-3, 201),
+            (0.0, 1e-3, 1),
+            (0.3, 0.1, 4),
+            (1.0, 0.3, 4),
+            (0.7, 0.1, 8),
+            (3.0, 1e-5, 300_001),
+            (1e-3, 1.0, 1),
+        ] {
+            let times = rows(duration, every);
+            assert_eq!(times.last() + 1, count, "{duration} by {every}");
+            assert!(times.at(times.last()) <= duration, "{duration} by {every}");
+        }
+        let times = rows(0.7, 0.1);
+        assert_eq!([0.0, 0.05, 0.1, 0.3, 0.7].map(|from| times.first(from, 0.0)), [0, 1, 1, 3, 7]);
+        assert_eq!([0.3, 0.35, 0.71].map(|time| times.first(0.3, time)), [3, 4, 8]);
+        assert!(rows(0.7, 0.1).reach_the_end());
+        assert!(rows(0.0, 0.1).reach_the_end());
+        assert!(!rows(1.0, 0.3).reach_the_end());
+        assert_eq!(RowTimes::new(1.0, 0.0), None);
+        assert_eq!(RowTimes::new(1.0, f64::NAN), None);
+    }
+}

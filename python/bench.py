@@ -1,0 +1,73 @@
+"""Times of the package: a step called from Python, and two simulations in two threads.
+
+    target/python/bin/python python/bench.py
+
+Build the package with `maturin build --release` first: a wheel of `./test` is not optimised throughout.
+"""
+
+import statistics
+import threading
+import time
+
+import jointplay as jp
+
+STEPS = 100_000
+REPETITIONS = 7
+
+
+def seconds(work):
+    """Shortest of several times, s: what else runs on the machine only adds."""
+    times = []
+    for _ in range(REPETITIONS):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def cost_of_a_call():
+    """Time that a call adds to a step: steps one by one less the same steps in one call, s."""
+    scene = jp.Scene.load("pendulum").set({"solver.method": "rk4", "solver.step": "1 us"})
+    simulation = jp.Simulation(scene)
+    state = simulation.state
+
+    def one_by_one():
+        simulation.restore(state)
+        step = simulation.step
+        for _ in range(STEPS):
+            step()
+
+    def at_once():
+        simulation.restore(state)
+        simulation.step(STEPS)
+
+    differences = [(seconds(one_by_one) - seconds(at_once)) / STEPS for _ in range(3)]
+    return statistics.median(differences)
+
+
+def speed_of_two_threads():
+    """Time of two simulations one after the other over their time in two threads."""
+    simulations = [jp.Simulation(jp.Scene.load("four-bar")) for _ in range(2)]
+    states = [simulation.state for simulation in simulations]
+
+    def work(simulation, state):
+        simulation.restore(state)
+        simulation.run_until(0.5)
+
+    def in_turn():
+        for simulation, state in zip(simulations, states):
+            work(simulation, state)
+
+    def in_threads():
+        threads = [threading.Thread(target=work, args=pair) for pair in zip(simulations, states)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    return seconds(in_turn) / seconds(in_threads)
+
+
+if __name__ == "__main__":
+    print(f"a call adds {cost_of_a_call() * 1e6:.2f} us to a step")
+    print(f"two threads are {speed_of_two_threads():.2f} times as fast as one")

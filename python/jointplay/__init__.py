@@ -1,0 +1,35 @@
+"""Multibody dynamics of mechanisms with play in their ball joints.
+
+    >>> import jointplay as jp
+    >>> scene = jp.Scene.load("four-bar").set(clearance="0.2 mm")
+    >>> run = scene.run("50 ms", every="0.1 ms")
+    >>> run["A.normal"].max()
+
+Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scene and the same calls give the same bits as the
+program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
+"""
+
+from ._run import Run
+from ._scene import Check, Parameter, Scene
+from ._simulation import Frame, Simulation
+from ._sweep import Sweep, SweepResult, sweep
+from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OptionError, SceneError, Stopped
+
+__all__ = [
+    "ChannelError",
+    "Check",
+    "DoubtWarning",
+    "Frame",
+    "InternalError",
+    "JointplayError",
+    "OptionError",
+    "Parameter",
+    "Run",
+    "Scene",
+    "SceneError",
+    "Simulation",
+    "Stopped",
+    "Sweep",
+    "SweepResult",
+    "sweep",
+]

@@ -1,0 +1,55 @@
+"""Links to the page (`docs/links.md`), and frames that show it within a notebook (`docs/embedding.md`)."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+import zlib
+from typing import TYPE_CHECKING
+from urllib.parse import urlencode
+
+from . import _native
+
+if TYPE_CHECKING:
+    from ._scene import Scene
+
+LONGEST = 32_000
+"""Longest link that the page accepts, in characters."""
+
+
+def link_of(scene: Scene) -> str | None:
+    """Pairs of a link that opens `scene`; None for one that no link can hold: it needs further files, or is too long."""
+    text, _, beside, changes = scene._native.origin()
+    pairs: dict[str, str] = {}
+    known = [name for names in _native.scenes() for name in names]
+    if scene.name in known and text_of_built_in(scene.name) == text:
+        pairs["scene"] = scene.name
+    elif beside:
+        return None
+    else:
+        packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+        packed = packer.compress(text.encode()) + packer.flush()
+        pairs["text"] = base64.urlsafe_b64encode(packed).decode().rstrip("=")
+    pairs.update(changes)
+    link = urlencode(pairs)
+    return link if len(link) <= LONGEST else None
+
+
+def text_of_built_in(name: str) -> str:
+    """Text of the built-in scene `name`."""
+    return _native.Scene.load(name).origin()[0]
+
+
+def frame_of(scene: Scene) -> str | None:
+    """HTML of a frame with the page that shows `scene`, if the environment variable JOINTPLAY_PAGE names the page."""
+    page = os.environ.get("JOINTPLAY_PAGE")
+    link = link_of(scene) if page else None
+    if not page or link is None:
+        return None
+    address = html.escape(f"{page}#{link}&embed=controls", quote=True)
+    title = html.escape(scene.title, quote=True)
+    return (
+        f'<iframe src="{address}" width="800" height="500" style="border: 0" loading="lazy"'
+        f' allow="fullscreen; clipboard-write" title="{title}"></iframe>'
+    )

@@ -1,0 +1,235 @@
+"""Scenes: machines with their parameters."""
+
+from __future__ import annotations
+
+import html
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from ._link import frame_of
+from ._run import Run, run_scene
+from .errors import OptionError
+
+Quantity = float | int | str
+"""A number in SI units, or text with a unit."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a scene, as `docs/parameters.md` lists it."""
+
+    key: str
+    """Key, such as `contact.clearance` or `joint.A.friction`."""
+    label: str
+    """Name for people."""
+    group: str
+    """Heading under which it is listed."""
+    value: float | int | str | None
+    """Value, SI; a word for a choice."""
+    text: str
+    """Value with its unit."""
+    default: float | int | str | None
+    """Value if the scene gives none, SI."""
+    allowed: str
+    """Range and units in words."""
+    range: tuple[float, float] | None
+    """Range, SI; None for a choice."""
+    words: list[str]
+    """Choices; empty for a number."""
+    at_reset: bool
+    """Whether a change takes effect at the next reset only."""
+    help: str
+    """What the quantity is."""
+    equation: str
+    """Which equation it enters."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a scene consists of once it is assembled."""
+
+    bodies: int
+    """Moving bodies."""
+    degrees_of_freedom: int
+    """Degrees of freedom at the start."""
+    velocity_coordinates: int
+    """Velocity coordinates of the formulation."""
+    constraint_rows: int
+    """Constraint rows of the formulation."""
+    dependent_rows: int
+    """Those of them that the others imply."""
+    contacts: int
+    """Ball joints with clearance."""
+    ideal_joints: int
+    """Ball joints without clearance."""
+    warnings: list[str]
+    """What is probably not intended."""
+    doubts: list[str]
+    """Reasons to doubt the results of its runs."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel that runs of a scene can record."""
+
+    name: str
+    """Name, such as `A.normal`."""
+    column: str
+    """Name of its column in files and data frames, with the unit: `A_normal_N`."""
+    unit: str
+    """SI unit."""
+    help: str
+    """What it measures."""
+    unasked: bool
+    """Whether a run records it if no channels are named."""
+
+
+class Scene:
+    """A machine with its parameters. A scene never changes: `set` returns another one."""
+
+    def __init__(self, native: _native.Scene) -> None:
+        self._native = native
+
+    @staticmethod
+    def names() -> list[str]:
+        """Names of the built-in scenes, then of the benchmarks."""
+        scenes, benchmarks = _native.scenes()
+        return scenes + benchmarks
+
+    @classmethod
+    def load(cls, name: str | os.PathLike[str]) -> Scene:
+        """A built-in scene or benchmark by name, or a file: its name contains `/` or ends in `.toml`."""
+        return cls(_native.Scene.load(os.fspath(name)))
+
+    @classmethod
+    def from_toml(cls, text: str, *, file: str | None = None, folder: str | os.PathLike[str] | None = None) -> Scene:
+        """A scene from the text of a scene file. `file` is its name in errors; files that it names are read in `folder`."""
+        return cls(_native.Scene.parse(text, file, None if folder is None else Path(folder)))
+
+    @classmethod
+    def from_dict(cls, machine: Mapping[str, Any], *, folder: str | os.PathLike[str] | None = None) -> Scene:
+        """A machine built in code: the sections and keys of a scene file (`docs/scene-format.md`) as dictionaries and lists.
+
+        Numbers in place of quantities are SI. `toml` of the scene is the file that describes the same machine.
+        """
+        return cls.from_toml(_native.Scene.text_of(dict(machine)), folder=folder)
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return self._native.name
+
+    @property
+    def title(self) -> str:
+        """Title of one line."""
+        return self._native.title
+
+    @property
+    def description(self) -> str:
+        """What the machine is."""
+        return self._native.description
+
+    @property
+    def toml(self) -> str:
+        """Text of its file, without the changes."""
+        return self._native.origin()[0]
+
+    @property
+    def changes(self) -> dict[str, str]:
+        """Parameters changed by `set`, as text with units."""
+        return dict(self._native.origin()[3])
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the moving bodies."""
+        return self._native.bodies
+
+    @property
+    def ball_joints(self) -> list[str]:
+        """Names of the ball joints."""
+        return self._native.ball_joints
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """All parameters by key: those of the scene, then those of each ball joint."""
+        return {key: self.parameter(key) for key in self._native.keys()}
+
+    def parameter(self, key: str) -> Parameter:
+        """The parameter `key`, also a number of the file such as `body.rod.mass`."""
+        return Parameter(**self._native.parameter(key))
+
+    def __getitem__(self, key: str) -> float | int | str | None:
+        """Value of the parameter `key`, SI."""
+        return self.parameter(key).value
+
+    def channels(self) -> list[Channel]:
+        """Channels that a run can record."""
+        return [Channel(*row) for row in self._native.channels()]
+
+    def set(self, changes: Mapping[str, Quantity | None] | None = None, /, **by_name: Quantity | None) -> Scene:
+        """Another scene with changed parameters.
+
+        A keyword is the last part of a key of the scene: `set(clearance="0.5 mm")` changes `contact.clearance`. A mapping has
+        whole keys: `set({"joint.A.clearance": 1e-4})`. Numbers are SI; None returns to the value of the file.
+        """
+        own = [(self._key_of(name), value) for name, value in by_name.items()]
+        return Scene(self._native.set([*(changes or {}).items(), *own]))
+
+    def _key_of(self, name: str) -> str:
+        keys = [key for key in self._native.keys() if not key.startswith("joint.")]
+        found = [key for key in keys if key.rsplit(".", 1)[-1] == name]
+        if len(found) > 1:
+            raise OptionError(f"{name}: several parameters have this name: {', '.join(found)}; give a mapping with the whole key")
+        return found[0] if found else name
+
+    def check(self) -> Check:
+        """Assembles the machine, and counts what it consists of."""
+        return Check(**self._native.check())
+
+    def run(
+        self,
+        duration: Quantity,
+        every: Quantity | None = None,
+        *,
+        channels: Sequence[str] = (),
+        progress: Callable[[float], object] | None = None,
+        warn: bool = True,
+    ) -> Run:
+        """Runs the scene for `duration`, s, with a row every `every`, s (a thousandth of the duration by default).
+
+        `channels` are names or patterns (`"A.*"`); without any, the run records those that `jointplay run` writes. `progress`
+        is called with the part that is done, from 0 to 1. Doubts about the results become warnings unless `warn` is False.
+        """
+        return run_scene(self, self._native, duration, every, channels, progress, warn)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self._native == other._native
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _read_again, (self._native.origin(),)
+
+    def __repr__(self) -> str:
+        changed = "".join(f", {key} = {value}" for key, value in self.changes.items())
+        return f"<jointplay.Scene {self.name}{changed}>"
+
+    def _repr_html_(self) -> str:
+        frame = frame_of(self)
+        if frame is not None:
+            return frame
+        rows = "".join(
+            f"<tr><td>{html.escape(key)}</td><td>{html.escape(value.text)}</td><td>{html.escape(value.label)}</td></tr>"
+            for key, value in self.parameters.items()
+            if not key.startswith("joint.")
+        )
+        head = f"<b>{html.escape(self.title)}</b>"
+        return f"{head}<table><tr><th>parameter</th><th>value</th><th></th></tr>{rows}</table>"
+
+
+def _read_again(origin: Any) -> Scene:
+    return Scene(_native.Scene.read_again(origin))

@@ -1,0 +1,72 @@
+"""Simulations that are stepped, changed and read one instant at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from ._run import table_of_impacts
+
+if TYPE_CHECKING:
+    from ._scene import Quantity, Scene
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One instant. SI units, world axes; bodies and ball joints in scene order."""
+
+    time: float
+    """Simulated time, s."""
+    positions: NDArray[np.float64]
+    """Origins of the body frames, m: shape (bodies, 3)."""
+    rotations: NDArray[np.float64]
+    """Rotation matrices, body axes as columns: shape (bodies, 3, 3)."""
+    velocities: NDArray[np.float64]
+    """Velocities of the origins, m/s: shape (bodies, 3)."""
+    angular_velocities: NDArray[np.float64]
+    """Angular velocities, rad/s: shape (bodies, 3)."""
+    eccentricities: NDArray[np.float64]
+    """Centre of each ball from that of its socket, m: shape (ball joints, 3)."""
+    normal_forces: NDArray[np.float64]
+    """Normal force on each ball, N; of an ideal joint the reaction: shape (ball joints, 3)."""
+    friction_forces: NDArray[np.float64]
+    """Friction force on each ball, N: shape (ball joints, 3)."""
+    values: NDArray[np.float64] = field(repr=False)
+    """All channels, in the order of `Simulation.channels`."""
+
+
+class Simulation(_native.Simulation):
+    """A running simulation. Two simulations step in two threads at the same time; one belongs to one thread at a time."""
+
+    scene: Scene
+
+    def __new__(cls, scene: Scene) -> Simulation:
+        self = super().__new__(cls, scene._native)
+        self.scene = scene
+        return self
+
+    def set(self, key: str, value: Quantity) -> str:
+        """Changes a parameter of the running machine: SI, or text with a unit.
+
+        Returns "now" if it takes effect from the next step on, or "at reset".
+        """
+        return self.change(key, value)
+
+    def frame(self) -> Frame:
+        """Everything about this instant."""
+        return Frame(**self.instant())
+
+    def __getitem__(self, channel: str) -> float:
+        """Value of a channel at this instant, SI."""
+        return self.read(channel)
+
+    def take_impacts(self) -> NDArray[Any]:
+        """One row per impact that finished since the last call, as `Run.impacts`; older ones than the latest 64 may be missing."""
+        return table_of_impacts(self.scene, *self.finished_impacts())
+
+    def __repr__(self) -> str:
+        return f"<jointplay.Simulation {self.scene.name} at {self.time:g} s>"

@@ -1,0 +1,183 @@
+"""Sweeps: one scene at many parameter values."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from .errors import OptionError
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ._scene import Quantity, Scene
+
+
+class Sweep:
+    """The points of a sweep, computed here or elsewhere.
+
+    A sweep consists of blocks that can be computed in any order, in any process: `compute(block)` returns the numbers of one,
+    which depend on nothing else, and `assemble` makes the result of all of them. A sweep can be pickled.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        vary: Mapping[str, str | Sequence[Quantity] | NDArray[Any]],
+        *,
+        periods: int | None = None,
+        discard: int | None = None,
+        phase: float | None = None,
+        period: Quantity | None = None,
+        exponent: bool = True,
+        duration: Quantity | None = None,
+        start_after: Quantity | None = None,
+        section: str | None = None,
+        crossings: int | None = None,
+        keep: str | Sequence[str] | None = None,
+        start: str | Sequence[str] = "cold",
+        zip: bool = False,
+    ) -> None:
+        """A sweep of `scene`.
+
+        `vary` has the values of each parameter: text as in `jointplay sweep --vary` (`"0.1mm..1mm:10"`, `"0.1mm..1mm:10:log"`),
+        or a list of numbers (SI) or texts. All combinations are run, the last parameter varying fastest; with `zip`, value i of
+        each together.
+
+        The run of a point is one of
+
+        - `periods` drive periods, the first `discard` of them a transient, with a Poincaré section at the `phase` of each (a
+          fraction of the period, 0 to below 1), a regime, and unless `exponent` is False the largest Lyapunov exponent; `period`,
+          s, replaces the common period of the drives;
+        - a `duration`, s, observed from `start_after`, s, on;
+        - `crossings` of `section` (`"crank.angle=90deg:up"`), the first `discard` of them a transient, within `duration`.
+
+        `keep` names statistics of channels (`"A.normal:max"`) to record in place of the forces and impacts of the ball joints.
+        `start` is `cold`, `follow-up` or `follow-down`, or several of them.
+        """
+        self.scene = scene
+        self._vary = [(key, values) for key, values in vary.items()]
+        self._options: dict[str, Any] = {
+            "periods": periods,
+            "discard": discard,
+            "phase": phase,
+            "period": period,
+            "exponent": exponent,
+            "duration": duration,
+            "start_after": start_after,
+            "section": section,
+            "crossings": crossings,
+            "keep": keep if keep is None or isinstance(keep, str) else ",".join(keep),
+            "start": [start] if isinstance(start, str) else list(start),
+            "zip": zip,
+        }
+        self._is_tried = False
+        # Errors come here, not at the first use.
+        self._native
+
+    @cached_property
+    def _native(self) -> _native.Sweep:
+        return _native.Sweep(self.scene._native, self._vary, self._options, self._is_tried)
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = {name: value for name, value in self.__dict__.items() if name != "_native"}
+        return {**state, "_is_tried": True}
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return self._native.blocks
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return self._native.points
+
+    def describe(self, point: int) -> str:
+        """Parameters of a point in words."""
+        return self._native.describe(point)
+
+    def compute(self, block: int) -> NDArray[np.float64]:
+        """Numbers of the points of one block: shape (points of the block, numbers of a point)."""
+        return self._native.compute(block)
+
+    def assemble(self, blocks: Iterable[NDArray[np.float64]]) -> SweepResult:
+        """The result of all blocks, given in their order."""
+        own = list(blocks)
+        if len(own) != self.blocks:
+            raise OptionError(f"blocks: {len(own)} of them are given, and the sweep has {self.blocks}")
+        for block, rows in enumerate(own):
+            first, end = self._native.block(block)
+            if len(rows) != end - first:
+                raise OptionError(f"blocks: block {block} has {len(rows)} points, and should have {end - first}")
+        return SweepResult(self, np.concatenate(own))
+
+    def run(self, threads: int | None = None, progress: Callable[[float], object] | None = None) -> SweepResult:
+        """Computes all blocks on `threads` threads (one for each core by default), which change no bit of the result.
+
+        `progress` is called with the part that is done, from 0 to 1.
+        """
+        return SweepResult(self, self._native.run(threads or os.cpu_count() or 1, progress))
+
+    def __repr__(self) -> str:
+        return f"<jointplay.Sweep of {self.scene.name}: {self.points} points in {self.blocks} blocks>"
+
+
+class SweepResult(Mapping[str, NDArray[Any]]):
+    """Result of a sweep: arrays by name, as in the archive that `jointplay sweep` writes (`docs/sweeps.md`)."""
+
+    def __init__(self, sweep: Sweep, records: NDArray[np.float64]) -> None:
+        self.axes: dict[str, NDArray[Any]] = {key: np.asarray(values) for key, values in sweep._native.axes()}
+        """Values of each varied parameter, SI."""
+        self._arrays: dict[str, NDArray[Any]] = dict(self.axes)
+        self._single: list[str] = []
+        shape, first = tuple(sweep._native.shape), 0
+        for name, whole, count in sweep._native.columns():
+            values = records[:, first : first + count]
+            first += count
+            if sweep._native.is_per_section(name):
+                values = values.reshape(*shape, count)
+            else:
+                self._single.append(name)
+                values = values.reshape(shape)
+            self._arrays[name] = values.astype(np.int64) if whole else values
+        self.sweep = sweep
+        """The sweep."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """An array: the first axes are those of the sweep; the last, if it has one more, counts the sections."""
+        return self._arrays[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._arrays)
+
+    def __len__(self) -> int:
+        return len(self._arrays)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row per point: its parameters, SI, and its single numbers."""
+        import pandas
+
+        settings = pandas.DataFrame([dict(self.sweep._native.settings(point)) for point in range(self.sweep.points)])
+        return settings.join(pandas.DataFrame({name: self._arrays[name].ravel() for name in self._single}))
+
+    def __repr__(self) -> str:
+        return f"<jointplay.SweepResult: {self.sweep.points} points, {len(self)} arrays>"
+
+
+def sweep(
+    scene: Scene,
+    vary: Mapping[str, str | Sequence[Quantity] | NDArray[Any]],
+    *,
+    threads: int | None = None,
+    progress: Callable[[float], object] | None = None,
+    **options: Any,
+) -> SweepResult:
+    """Runs a sweep: `Sweep(scene, vary, **options).run(threads, progress)`."""
+    return Sweep(scene, vary, **options).run(threads, progress)

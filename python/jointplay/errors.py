@@ -1,0 +1,69 @@
+"""Exceptions and warnings of the package. Each message is a sentence for a person; the attributes are for programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ._run import Run
+
+
+class JointplayError(Exception):
+    """Base of all exceptions of this package. Instances can be pickled with their attributes."""
+
+    def __init__(self, message: str, **details: Any) -> None:
+        super().__init__(message)
+        self.__dict__.update(details)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made_again, (type(self), self.args[0], self.__dict__)
+
+
+def _made_again(kind: type[JointplayError], message: str, details: dict[str, Any]) -> JointplayError:
+    return kind(message, **details)
+
+
+class SceneError(JointplayError, ValueError):
+    """A scene or parameter that is invalid, or a scene that cannot start.
+
+    Attributes: `file` as it was named, `line` and `column` counted from 1, `key` and `value` at fault, and `allowed`, the range
+    and the units of a parameter in words. Each is None where it is unknown.
+    """
+
+    file: str | None
+    line: int | None
+    column: int | None
+    key: str | None
+    value: str | None
+    allowed: str | None
+
+
+class OptionError(JointplayError, ValueError):
+    """An argument that is invalid; the message names it, its value and what is allowed."""
+
+
+class ChannelError(JointplayError, KeyError):
+    """A channel that the scene does not have, or that a run did not record."""
+
+    def __str__(self) -> str:
+        # KeyError would show the message in quotes.
+        return str(self.args[0])
+
+
+class Stopped(JointplayError, RuntimeError):
+    """A run that the divergence guard stopped.
+
+    Attributes: `time` of the last good state, s; `advice`, what to try, or None; and of `Scene.run` also `run` with the rows so far.
+    """
+
+    time: float
+    advice: str | None
+    run: Run | None = None
+
+
+class InternalError(JointplayError, RuntimeError):
+    """A bug in jointplay."""
+
+
+class DoubtWarning(UserWarning):
+    """A reason to doubt the results of a run."""

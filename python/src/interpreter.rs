@@ -1,0 +1,43 @@
+//! Work outside the interpreter's lock.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use pyo3::prelude::*;
+
+use crate::errors::exception;
+
+/// Steps of a simulation between two looks for Ctrl-C: some milliseconds.
+pub const STEPS_BETWEEN_LOOKS: u32 = 4096;
+
+/// Runs `work` without the interpreter's lock.
+///
+/// # Errors
+/// A panic in `work`, which is a bug, as `InternalError`.
+pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    // What a panic leaves behind is reported as a bug, not used further by the program.
+    py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| internal_error(py, &*panic))
+}
+
+fn internal_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
+    let words = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+    let message = format!(
+        "internal error in jointplay {}: {}. This is a bug in the program; please report this line and the call that led \
+         to it.",
+        env!("CARGO_PKG_VERSION"),
+        words.unwrap_or("unknown cause"),
+    );
+    exception(py, "InternalError", &message, None)
+}
+
+/// Calls `progress` with the part that is done, from 0 to 1, and lets Ctrl-C interrupt.
+///
+/// # Errors
+/// `KeyboardInterrupt`, or what `progress` raises.
+pub fn look(py: Python<'_>, progress: Option<&Bound<'_, PyAny>>, part: f64) -> PyResult<()> {
+    py.check_signals()?;
+    if let Some(progress) = progress {
+        progress.call1((part.clamp(0.0, 1.0),))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,30 @@
+//! The module `jointplay._native`: scenes, runs, simulations and sweeps for the package in `python/jointplay`, which documents
+//! them. SI units everywhere; text with a unit is accepted where a number is.
+//!
+//! Work runs without the interpreter's lock and asks for Ctrl-C between steps ([`interpreter`]). Errors become the exceptions of
+//! `jointplay.errors`.
+
+mod errors;
+mod interpreter;
+mod machine;
+mod quantity;
+mod report;
+mod run;
+mod scene;
+mod simulation;
+mod sweep;
+
+use pyo3::prelude::*;
+
+/// The parts of `jointplay` that are written in Rust.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::run::run;
+    #[pymodule_export]
+    use super::scene::{PyScene, scenes};
+    #[pymodule_export]
+    use super::simulation::{PySimulation, PyState};
+    #[pymodule_export]
+    use super::sweep::PySweep;
+}

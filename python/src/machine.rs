@@ -1,0 +1,117 @@
+//! A machine described by Python's dictionaries and lists, as the text of a scene file. A number in place of a quantity is SI.
+
+use jointplay_physics::units::{Dimension, exact_quantity, si_unit};
+use jointplay_scene::{FILE, FileKey, FileTable, Kind, Value, ValueType, Variants, find};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use toml::{Table, Value as Toml};
+
+use crate::errors::option_error;
+
+/// Text of a scene file with the sections `machine`.
+///
+/// # Errors
+/// `OptionError` with the place of what TOML cannot hold, or of a number whose unit depends on the joint.
+pub fn text_of(machine: &Bound<'_, PyDict>) -> PyResult<String> {
+    let table = table(machine, Some(&FILE), "")?;
+    toml::to_string(&table).map_err(|error| option_error(machine.py(), &error.to_string()))
+}
+
+/// `row` describes the keys of the table; `place` names it in errors.
+fn table(own: &Bound<'_, PyDict>, rows: Option<&FileTable>, place: &str) -> PyResult<Table> {
+    let variant = rows.and_then(|rows| variant(own, rows));
+    let mut all = Table::new();
+    for (key, value) in own.iter() {
+        let key: String = key.extract()?;
+        let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+        if value.is_none() {
+            continue;
+        }
+        // The reader of the text refuses unknown keys, with the nearest one.
+        let row = rows.and_then(|rows| row(rows, &key, variant));
+        all.insert(key, converted(&value, row.map(|row| (row, row.takes)), &place)?);
+    }
+    Ok(all)
+}
+
+fn row(rows: &FileTable, key: &str, variant: Option<&'static str>) -> Option<&'static FileKey> {
+    rows.key(key, variant).or_else(|| rows.also.and_then(|also| also.key(key, variant)))
+}
+
+/// The word that selects the variant of a table.
+fn variant(own: &Bound<'_, PyDict>, rows: &FileTable) -> Option<&'static str> {
+    match rows.variants? {
+        Variants::Word(by, _) => {
+            let word: String = own.get_item(by).ok()??.extract().ok()?;
+            rows.words().iter().copied().find(|known| *known == word)
+        }
+        Variants::Presence(words) => words.iter().copied().find(|word| own.contains(word).unwrap_or(false)),
+    }
+}
+
+/// `value` in TOML; of a known key, as its row and its type say.
+fn converted(value: &Bound<'_, PyAny>, row: Option<(&FileKey, ValueType)>, place: &str) -> PyResult<Toml> {
+    let wrong = |why: &str| Err(option_error(value.py(), &format!("{place}: {why}")));
+    if let Ok(own) = value.cast::<PyDict>() {
+        return Ok(Toml::Table(table(own, row.and_then(|(row, _)| row.table()), place)?));
+    }
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(Toml::String(text.to_cow()?.into_owned()));
+    }
+    if let Ok(flag) = value.cast::<PyBool>() {
+        return Ok(Toml::Boolean(flag.is_true()));
+    }
+    if let Ok(entries) = value.try_iter() {
+        let mut all = Vec::new();
+        for (i, entry) in entries.enumerate() {
+            let entry = entry?;
+            let is_list = !entry.is_instance_of::<PyString>() && entry.try_iter().is_ok();
+            let of_entry = row.map(|(row, takes)| (row, entry_of(takes, i, is_list)));
+            all.push(converted(&entry, of_entry, &format!("{place}[{i}]"))?);
+        }
+        return Ok(Toml::Array(all));
+    }
+    let is_whole =
+        value.is_instance_of::<PyInt>() || !value.is_instance_of::<PyFloat>() && value.extract::<i64>().is_ok();
+    let Ok(number) = value.extract::<f64>() else {
+        return wrong("expected a number, text, a list or a dictionary");
+    };
+    if !number.is_finite() {
+        return wrong("expected a finite number");
+    }
+    if let Some((row, takes)) = row {
+        if let Some(dimension) = dimension(takes) {
+            if row.on_hinge.is_some() {
+                return wrong("the unit depends on the joint: give it, as in \"0.1 rad\"");
+            }
+            return Ok(Toml::String(exact_quantity(number, si_unit(dimension), dimension)));
+        }
+        if let ValueType::Parameter(key) = takes
+            && let Some(parameter) = find(key).filter(|parameter| matches!(parameter.kind, Kind::Number { .. }))
+        {
+            return Ok(Toml::String(parameter.write(&Value::Number(number))));
+        }
+    }
+    if is_whole { Ok(Toml::Integer(value.extract()?)) } else { Ok(Toml::Float(number)) }
+}
+
+/// Type of entry `i` of a list of the type `takes`; the entry may be a list itself.
+fn entry_of(takes: ValueType, i: usize, is_list: bool) -> ValueType {
+    match takes {
+        ValueType::Vector(dimension, range) => ValueType::Number(dimension, range),
+        ValueType::Numbers(_, dimension) => ValueType::Number(dimension, (f64::NEG_INFINITY, f64::INFINITY)),
+        ValueType::Vectors(dimension, _) => ValueType::Numbers(3, dimension),
+        ValueType::Pairs(dimensions, _) if !is_list => ValueType::Numbers(1, dimensions[i.min(1)]),
+        other => other,
+    }
+}
+
+/// Dimension of a number of the type `takes`; `None` for what is written as it is.
+fn dimension(takes: ValueType) -> Option<Dimension> {
+    match takes {
+        ValueType::Number(dimension, _) | ValueType::Numbers(1, dimension) if !si_unit(dimension).is_empty() => {
+            Some(dimension)
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,82 @@
+//! What a simulation has found so far, as plain Python data.
+
+use jointplay_analysis::impact_row::{COLUMNS, row};
+use jointplay_physics::simulate::{Impact, Simulation};
+use numpy::ndarray::Array2;
+use numpy::{PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// An array that Python cannot change; it owns its memory.
+pub fn constant(py: Python<'_>, values: Array2<f64>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let array = PyArray2::from_owned_array(py, values);
+    array.try_readwrite()?.make_nonwriteable();
+    Ok(array)
+}
+
+/// State hash as all outputs of the program write it: 16 hexadecimal digits.
+pub fn hash_text(hash: u64) -> String {
+    format!("{hash:016x}")
+}
+
+/// Names of the columns of impacts, and an array with one row per column.
+pub fn impacts<'py>(py: Python<'py>, impacts: &[Impact]) -> PyResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+    let mut values = Array2::zeros((COLUMNS.len(), impacts.len()));
+    for (i, impact) in impacts.iter().enumerate() {
+        for (column, value) in row(impact).into_iter().enumerate() {
+            values[(column, i)] = value;
+        }
+    }
+    Ok((COLUMNS.to_vec(), constant(py, values)?))
+}
+
+/// Reasons to doubt the results so far.
+pub fn doubts(simulation: &Simulation) -> Vec<String> {
+    simulation.doubts().iter().map(ToString::to_string).collect()
+}
+
+/// Energy exchanged so far, J; `None` where `solver.energy_ledger` is off.
+pub fn ledger<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let Some(ledger) = simulation.ledger() else {
+        return Ok(None);
+    };
+    let all = PyDict::new(py);
+    for (name, value) in [
+        ("drive_work", ledger.drive_work),
+        ("gravity_work", ledger.gravity_work),
+        ("kinetic_change", ledger.kinetic_change),
+        ("elastic_change", ledger.elastic_change),
+        ("restitution_loss", ledger.restitution_loss),
+        ("friction_loss", ledger.friction_loss),
+        ("clearance_work", ledger.clearance_work),
+        ("damping_loss", ledger.damping_loss),
+        ("external_work", ledger.external_work),
+        ("change_work", ledger.change_work),
+        ("exchanged", ledger.exchanged),
+        ("residual", ledger.residual()),
+        ("relative_residual", ledger.relative_residual()),
+    ] {
+        all.set_item(name, value)?;
+    }
+    Ok(Some(all))
+}
+
+/// Counters so far, and for each ball joint its largest normal force, N, when it occurred, s, and the number of contacts begun.
+pub fn statistics<'py>(py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
+    let statistics = simulation.statistics();
+    let all = PyDict::new(py);
+    all.set_item("steps", statistics.steps)?;
+    all.set_item("evaluations", statistics.evaluations)?;
+    all.set_item("rejected", statistics.rejected)?;
+    let joints = PyDict::new(py);
+    for (j, joint) in simulation.machine().ball_joints.iter().enumerate() {
+        let (force, time) = simulation.peak(j);
+        let own = PyDict::new(py);
+        own.set_item("peak_normal", force)?;
+        own.set_item("peak_time", time)?;
+        own.set_item("impacts", statistics.impacts[j])?;
+        joints.set_item(&joint.name, own)?;
+    }
+    all.set_item("joints", joints)?;
+    Ok(all)
+}

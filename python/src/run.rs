@@ -1,0 +1,178 @@
+//! A run from t = 0 with rows at equal intervals, as `jointplay run` makes it.
+
+use jointplay_analysis::row_times::RowTimes;
+use jointplay_physics::simulate::{Frame, Impact, Listed, Stopped, matching};
+use jointplay_scene::LiveScene;
+use numpy::ndarray::Array2;
+use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors::option_error;
+use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached, look};
+use crate::quantity::duration as read_duration;
+use crate::report;
+use crate::scene::{PyScene, channels_at_start};
+
+/// Rows if no interval is given.
+const INTERVALS: f64 = 1000.0;
+
+/// Why a run ended before its time.
+enum Fault {
+    Stopped(Stopped),
+    NotFinite { channel: String, value: f64, time: f64 },
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stopped(stopped) => stopped.fmt(f),
+            Self::NotFinite { channel, value, time } => write!(
+                f,
+                "stopped: {channel} is {value} at t = {time:.6e} s; try a smaller solver.step or solver.tolerance"
+            ),
+        }
+    }
+}
+
+/// A run under way and its rows.
+struct Recorder {
+    live: LiveScene,
+    duration: f64,
+    times: RowTimes,
+    channels: Vec<Listed>,
+    frame: Frame,
+    /// One column after another, each of `capacity` values.
+    values: Vec<f64>,
+    capacity: usize,
+    /// Rows so far.
+    rows: usize,
+    impacts: Vec<Impact>,
+}
+
+impl Recorder {
+    /// Takes at most `steps` steps, and returns whether the run is over. A row never shortens a step.
+    fn advance(&mut self, steps: u32) -> Result<bool, Fault> {
+        for _ in 0..steps {
+            self.record()?;
+            if self.live.time() >= self.duration {
+                return Ok(true);
+            }
+            self.live.step_until(self.duration).map_err(Fault::Stopped)?;
+            self.live.take_impacts(&mut self.impacts);
+        }
+        Ok(false)
+    }
+
+    /// Records the rows that lie in the latest step.
+    fn record(&mut self) -> Result<(), Fault> {
+        while self.rows < self.capacity && self.times.at(self.rows as u64) <= self.live.time() {
+            let time = self.times.at(self.rows as u64);
+            self.live.sample(time, &mut self.frame);
+            for (c, channel) in self.channels.iter().enumerate() {
+                let value = channel.reading().read(&self.frame);
+                if let Some(value) = value.filter(|value| !value.is_finite()) {
+                    return Err(Fault::NotFinite { channel: channel.name.clone(), value, time });
+                }
+                // There is no tip error after the ideal mechanism has stopped.
+                self.values[c * self.capacity + self.rows] = value.unwrap_or(f64::NAN);
+            }
+            self.rows += 1;
+        }
+        Ok(())
+    }
+}
+
+/// Runs `scene` for `duration` with a row every `every`, and returns everything that the run found. `channels` are names or
+/// patterns; without any, those that the program writes.
+#[pyfunction]
+#[pyo3(signature = (scene, duration, every=None, channels=Vec::new(), progress=None))]
+pub fn run<'py>(
+    py: Python<'py>,
+    scene: &PyScene,
+    duration: &Bound<'py, PyAny>,
+    every: Option<&Bound<'py, PyAny>>,
+    channels: Vec<String>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let duration = read_duration("duration", duration)?;
+    let every = match every {
+        Some(every) => read_duration("every", every)?,
+        None if duration > 0.0 => duration / INTERVALS,
+        None => 1.0,
+    };
+    let positive = || option_error(py, "every = 0: the interval between rows must be greater than 0");
+    let times = RowTimes::new(duration, every).ok_or_else(positive)?;
+    let mut live = scene.start(py)?;
+    let all = detached(py, || channels_at_start(&mut live))?;
+    let chosen = chosen(py, all, &channels)?;
+    let capacity = usize::try_from(times.last()).unwrap_or(usize::MAX).saturating_add(1);
+    let values = allocate(capacity, chosen.len())?;
+    if live.load_peaks().is_none() {
+        live.keep_load_peaks();
+    }
+    let mut frame = Frame::default();
+    chosen.iter().for_each(|channel| channel.reading().ask(&mut frame));
+    let mut run =
+        Recorder { live, duration, times, channels: chosen, frame, values, capacity, rows: 0, impacts: Vec::new() };
+    let fault = loop {
+        match detached(py, || run.advance(STEPS_BETWEEN_LOOKS))? {
+            Ok(true) => break None,
+            Ok(false) => look(py, progress, run.live.time() / duration)?,
+            Err(fault) => break Some(fault),
+        }
+    };
+    look(py, progress, if fault.is_none() { 1.0 } else { run.live.time() / duration })?;
+    describe(py, run, fault.as_ref())
+}
+
+/// The channels that match one of `patterns`, and the time; without patterns, those that are written unasked.
+fn chosen(py: Python<'_>, all: Vec<Listed>, patterns: &[String]) -> PyResult<Vec<Listed>> {
+    for pattern in patterns {
+        let failed = |error| option_error(py, &format!("channels: {error}; Scene.channels() lists them"));
+        matching(&all, pattern).map_err(failed)?;
+    }
+    let is_chosen = |channel: &Listed| {
+        let named = patterns.iter().any(|pattern| channel.is_chosen_by(pattern));
+        channel.name == "time" || named || (patterns.is_empty() && channel.unasked)
+    };
+    Ok(all.into_iter().filter(is_chosen).collect())
+}
+
+fn allocate(rows: usize, columns: usize) -> PyResult<Vec<f64>> {
+    let mut values = Vec::new();
+    let count = rows.checked_mul(columns);
+    if count.is_none_or(|count| values.try_reserve_exact(count).is_err()) {
+        return Err(PyMemoryError::new_err(format!(
+            "{rows} rows of {columns} channels do not fit into memory: fewer channels, or a longer interval in `every`"
+        )));
+    }
+    values.resize(rows * columns, f64::NAN);
+    Ok(values)
+}
+
+fn describe<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> PyResult<Bound<'py, PyDict>> {
+    let live = &run.live;
+    let all = PyDict::new(py);
+    let channels: Vec<_> = run.channels.iter().map(|c| (&c.name[..], &c.column[..], c.unit, c.help)).collect();
+    all.set_item("channels", channels)?;
+    all.set_item("rows", run.rows)?;
+    all.set_item("end", live.time())?;
+    all.set_item("hash", report::hash_text(live.state_hash()))?;
+    all.set_item("doubts", report::doubts(live))?;
+    all.set_item("ledger", report::ledger(py, live)?)?;
+    all.set_item("statistics", report::statistics(py, live)?)?;
+    all.set_item("impacts", report::impacts(py, &run.impacts)?)?;
+    all.set_item("fault", fault.map(ToString::to_string))?;
+    let advice = match fault {
+        Some(Fault::Stopped(stopped)) => Some(stopped.advice.to_string()),
+        _ => None,
+    };
+    all.set_item("advice", advice)?;
+    let shape = (run.channels.len(), run.capacity);
+    let values = Array2::from_shape_vec(shape, run.values);
+    // The shape is that of the allocation.
+    let values = values.map_err(|error| PyMemoryError::new_err(error.to_string()))?;
+    all.set_item("values", report::constant(py, values)?)?;
+    Ok(all)
+}

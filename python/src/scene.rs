@@ -1,0 +1,232 @@
+//! Scenes: loaded, parsed, changed, checked.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use jointplay_analysis::near_singular::near_singular;
+use jointplay_analysis::presets::too_slow;
+use jointplay_physics::simulate::{Frame, Listed, Simulation, channels_of};
+use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, contact_parts};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::errors::scene_error;
+use crate::interpreter::detached;
+use crate::machine::text_of;
+use crate::quantity::{of_value, written};
+
+/// Names of the built-in scenes, then of the benchmarks.
+#[pyfunction]
+pub fn scenes() -> (Vec<&'static str>, Vec<&'static str>) {
+    (BUILT_IN.to_vec(), BENCHMARKS.to_vec())
+}
+
+/// A scene; it never changes.
+#[pyclass(frozen, name = "Scene", module = "jointplay._native")]
+pub struct PyScene {
+    /// The scene.
+    pub scene: Arc<Scene>,
+}
+
+/// What a scene is read from again: its text, its file, the files it names, its changes.
+type Origin = (String, Option<String>, BTreeMap<String, String>, Vec<(String, String)>);
+
+impl PyScene {
+    fn of(py: Python<'_>, read: impl FnOnce() -> Result<Scene, SceneError> + Send) -> PyResult<Self> {
+        let scene = detached(py, read)?.map_err(|error| scene_error(py, None, &error))?;
+        Ok(Self { scene: Arc::new(scene) })
+    }
+
+    /// The scene started at t = 0.
+    ///
+    /// # Errors
+    /// `SceneError` with the line and the change concerned: it cannot start.
+    pub fn start(&self, py: Python<'_>) -> PyResult<LiveScene> {
+        let live = detached(py, || LiveScene::new(&self.scene))?;
+        live.map_err(|error| scene_error(py, Some(&self.scene), &self.scene.locate(&error)))
+    }
+}
+
+/// The channels of a simulation that has just started.
+pub fn channels_at_start(simulation: &mut Simulation) -> Vec<Listed> {
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    channels_of(simulation.machine(), &frame)
+}
+
+#[pymethods]
+impl PyScene {
+    /// A built-in scene or benchmark by name, or a file.
+    #[staticmethod]
+    fn load(py: Python<'_>, name: PathBuf) -> PyResult<Self> {
+        Self::of(py, || Scene::load(name, &[]))
+    }
+
+    /// A scene from its text. Files that it names are read in `folder`.
+    #[staticmethod]
+    #[pyo3(signature = (text, file=None, folder=None))]
+    fn parse(py: Python<'_>, text: &str, file: Option<&str>, folder: Option<PathBuf>) -> PyResult<Self> {
+        Self::of(py, || Scene::parse_given(text, file, &BTreeMap::new(), folder.as_deref(), &[]))
+    }
+
+    /// Text of a scene file with the sections `machine`.
+    #[staticmethod]
+    fn text_of(machine: &Bound<'_, PyDict>) -> PyResult<String> {
+        text_of(machine)
+    }
+
+    /// The scene that [`Self::origin`] describes.
+    #[staticmethod]
+    fn read_again(py: Python<'_>, origin: Origin) -> PyResult<Self> {
+        let (text, file, beside, changes) = origin;
+        let beside: Texts = beside.into_iter().map(|(name, text)| (name, text.into())).collect();
+        Self::of(py, || Scene::parse_with(&text, file.as_deref(), &beside, &changes))
+    }
+
+    /// What the scene is read from again.
+    fn origin(&self) -> Origin {
+        let source = &self.scene.source;
+        let beside = source.beside.iter().map(|(name, text)| (name.clone(), text.to_string())).collect();
+        (source.text.clone(), source.file.clone(), beside, self.scene.changes.clone())
+    }
+
+    /// Short name.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.scene.name
+    }
+
+    /// Title of one line.
+    #[getter]
+    fn title(&self) -> &str {
+        &self.scene.title
+    }
+
+    /// A paragraph for the user.
+    #[getter]
+    fn description(&self) -> &str {
+        &self.scene.description
+    }
+
+    /// Names of the ball joints, in scene order.
+    #[getter]
+    fn ball_joints(&self) -> Vec<&str> {
+        self.scene.machine.ball_joints.iter().map(|joint| &joint.name[..]).collect()
+    }
+
+    /// Names of the bodies, in scene order.
+    #[getter]
+    fn bodies(&self) -> Vec<&str> {
+        self.scene.machine.bodies.iter().map(|body| &body.name[..]).collect()
+    }
+
+    /// Keys of the parameters: those of the scene, then those of each ball joint.
+    fn keys(&self) -> Vec<String> {
+        let own = self.scene.parameters().into_iter().map(|parameter| parameter.key.to_owned());
+        let joints = self.scene.machine.ball_joints.iter();
+        let of_joints =
+            joints.flat_map(|joint| contact_parts().map(move |part| format!("joint.{}.{part}", joint.name)));
+        own.chain(of_joints).collect()
+    }
+
+    /// What is known about the parameter `key`.
+    fn parameter<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
+        let failed = |error: SceneError| scene_error(py, Some(&self.scene), &error);
+        let parameter = self.scene.parameter(key).map_err(failed)?;
+        let value = self.scene.get(key).map_err(failed)?;
+        let all = PyDict::new(py);
+        all.set_item("key", key)?;
+        all.set_item("label", parameter.label)?;
+        all.set_item("group", parameter.group)?;
+        all.set_item("value", of_value(py, &value)?)?;
+        all.set_item("text", parameter.show(&value))?;
+        all.set_item("default", of_value(py, &parameter.default)?)?;
+        all.set_item("allowed", parameter.allowed())?;
+        let range = match parameter.kind {
+            Kind::Number { min, max, .. } => Some((min, max)),
+            Kind::Count { min, max } => Some((min as f64, max as f64)),
+            Kind::Choice(_) => None,
+        };
+        all.set_item("range", range)?;
+        let words = match parameter.kind {
+            Kind::Choice(words) => words.to_vec(),
+            _ => Vec::new(),
+        };
+        all.set_item("words", words)?;
+        all.set_item("at_reset", parameter.at_reset)?;
+        all.set_item("help", parameter.help)?;
+        all.set_item("equation", parameter.equation)?;
+        Ok(all)
+    }
+
+    /// Another scene with `changes`, each a key and a value; `None` returns to the value of the file.
+    fn set(&self, py: Python<'_>, changes: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Self> {
+        let failed = |error: SceneError| scene_error(py, Some(&self.scene), &error);
+        let mut texts = Vec::new();
+        for (key, value) in changes {
+            let parameter = self.scene.parameter(&key).map_err(failed)?;
+            let text = written(parameter, &key, &value)?;
+            texts.push((key, text));
+        }
+        let scene = detached(py, || changed(&self.scene, &texts))?.map_err(failed)?;
+        Ok(Self { scene: Arc::new(scene) })
+    }
+
+    /// Starts the scene. Returns its counts and its warnings.
+    fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let live = self.start(py)?;
+        let scene = &self.scene;
+        let contents = live.mechanism().summary();
+        let all = PyDict::new(py);
+        all.set_item("bodies", contents.bodies)?;
+        all.set_item("degrees_of_freedom", contents.degrees_of_freedom)?;
+        all.set_item("velocity_coordinates", contents.velocity_coordinates)?;
+        all.set_item("constraint_rows", contents.constraint_rows)?;
+        all.set_item("dependent_rows", contents.dependent_rows)?;
+        all.set_item("contacts", contents.contacts)?;
+        all.set_item("ideal_joints", contents.ideal_joints)?;
+        let of_scene = scene.machine.warnings().into_iter().map(|warning| warning.to_string());
+        let singular = detached(py, || near_singular(scene).map(|near| near.to_string()))?;
+        let slow = too_slow(scene).map(|slow| slow.to_string());
+        let warnings: Vec<String> = of_scene.chain(slow).chain(singular).collect();
+        all.set_item("warnings", warnings)?;
+        all.set_item("doubts", live.doubts().iter().map(ToString::to_string).collect::<Vec<_>>())?;
+        Ok(all)
+    }
+
+    /// Its channels: name, column, unit, description, and whether a run records it if none are named.
+    fn channels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        let mut live = self.start(py)?;
+        let rows = detached(py, || channels_at_start(&mut live))?;
+        PyList::new(py, rows.into_iter().map(|c| (c.name, c.column, c.unit, c.help, c.unasked)))
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        *self.scene == *other.scene
+    }
+}
+
+/// `scene` with changes; `None` returns to the value of the file.
+fn changed(scene: &Scene, changes: &[(String, Option<String>)]) -> Result<Scene, SceneError> {
+    let one_by_one = || {
+        let mut scene = scene.clone();
+        for (key, text) in changes {
+            match text {
+                Some(text) => scene.set(key, text)?,
+                None => scene.undo_change(key)?,
+            };
+        }
+        Ok(scene)
+    };
+    // On the way there may be values that the scene accepts only together, such as a large clearance and a larger ball.
+    let together = |error| {
+        let is_changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
+        let earlier = scene.changes.iter().filter(|(key, _)| !is_changed(key)).cloned();
+        let own = changes.iter().filter_map(|(key, text)| Some((key.clone(), text.clone()?)));
+        let all: Vec<(String, String)> = earlier.chain(own).collect();
+        let source = &scene.source;
+        Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, &all).map_err(|_| error)
+    };
+    one_by_one().or_else(together)
+}

@@ -1,0 +1,238 @@
+//! A simulation that is stepped, changed and read from Python.
+
+use std::collections::HashMap;
+
+use jointplay_physics::machine::{Mat3, Vec3};
+use jointplay_physics::simulate::{Effect, Frame, Listed, Stopped, matching};
+use jointplay_scene::{LiveScene, SceneSnapshot};
+use numpy::ndarray::{Array1, Array2, Array3};
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::errors::{exception, option_error, scene_error, set_error, stopped};
+use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached};
+use crate::quantity::{duration, written};
+use crate::report;
+use crate::scene::{PyScene, channels_at_start};
+
+/// A state to which a simulation can return.
+#[pyclass(frozen, name = "State", module = "jointplay._native")]
+pub struct PyState {
+    snapshot: SceneSnapshot,
+}
+
+#[pymethods]
+impl PyState {
+    /// Simulated time, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.snapshot.time()
+    }
+
+    /// Its hash, 16 hexadecimal digits.
+    #[getter]
+    fn hash(&self) -> String {
+        report::hash_text(self.snapshot.hash())
+    }
+}
+
+/// A running simulation of a scene.
+#[pyclass(subclass, name = "Simulation", module = "jointplay._native")]
+pub struct PySimulation {
+    live: LiveScene,
+    channels: Vec<Listed>,
+    /// Index of each channel by name and by column.
+    places: HashMap<String, usize>,
+    frame: Frame,
+}
+
+impl PySimulation {
+    /// Takes steps until `is_over`; looks for Ctrl-C between them.
+    fn advance(
+        &mut self,
+        py: Python<'_>,
+        step: impl Fn(&mut LiveScene) -> Result<(), Stopped> + Sync,
+        mut is_over: impl FnMut(&LiveScene) -> bool + Send,
+    ) -> PyResult<()> {
+        loop {
+            let live = &mut self.live;
+            let outcome = detached(py, || {
+                for _ in 0..STEPS_BETWEEN_LOOKS {
+                    if is_over(live) {
+                        return Ok(true);
+                    }
+                    step(live)?;
+                }
+                Ok(false)
+            })?;
+            if outcome.map_err(|error| stopped(py, &error))? {
+                return Ok(());
+            }
+            py.check_signals()?;
+        }
+    }
+
+    fn lay_out(&mut self) {
+        self.channels = channels_at_start(&mut self.live);
+        let columns = self.channels.iter().enumerate().map(|(i, channel)| (channel.column.clone(), i));
+        self.places = columns.collect();
+        self.places.extend(self.channels.iter().enumerate().map(|(i, channel)| (channel.name.clone(), i)));
+        self.channels.iter().for_each(|channel| channel.reading().ask(&mut self.frame));
+    }
+}
+
+#[pymethods]
+impl PySimulation {
+    #[new]
+    fn new(py: Python<'_>, scene: &PyScene) -> PyResult<Self> {
+        let live = scene.start(py)?;
+        let mut simulation = Self { live, channels: Vec::new(), places: HashMap::new(), frame: Frame::default() };
+        simulation.lay_out();
+        Ok(simulation)
+    }
+
+    /// Takes `count` steps, each as long as the method chooses.
+    #[pyo3(signature = (count=1))]
+    fn step(&mut self, py: Python<'_>, count: u64) -> PyResult<()> {
+        let mut left = count;
+        let is_over = move |_: &LiveScene| {
+            let over = left == 0;
+            left = left.saturating_sub(1);
+            over
+        };
+        self.advance(py, |live| live.step(), is_over)
+    }
+
+    /// Steps to exactly `time`, at which the last step ends.
+    fn run_until(&mut self, py: Python<'_>, time: &Bound<'_, PyAny>) -> PyResult<()> {
+        let end = duration("time", time)?;
+        self.advance(py, |live| live.step_until(end), |live| live.time() >= end)
+    }
+
+    /// Simulated time, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.live.time()
+    }
+
+    /// Hash of the state, 16 hexadecimal digits.
+    #[getter]
+    fn hash(&self) -> String {
+        report::hash_text(self.live.state_hash())
+    }
+
+    /// The whole state.
+    #[getter]
+    fn state(&self) -> PyState {
+        PyState { snapshot: self.live.snapshot() }
+    }
+
+    /// Returns to a state.
+    fn restore(&mut self, state: &PyState) {
+        self.live.restore(&state.snapshot);
+    }
+
+    /// Changes a parameter; returns whether it takes effect `now` or `at reset`.
+    fn change(&mut self, py: Python<'_>, key: &str, value: &Bound<'_, PyAny>) -> PyResult<&'static str> {
+        let pending = self.live.pending().clone();
+        let parameter = pending.parameter(key).map_err(|error| scene_error(py, Some(&pending), &error))?;
+        let Some(text) = written(parameter, key, value)? else {
+            return Err(option_error(py, &format!("{key} = None: a running simulation needs a value")));
+        };
+        let effect = detached(py, || self.live.set(key, &text))?.map_err(|error| set_error(py, &pending, &error))?;
+        Ok(match effect {
+            Effect::Now => "now",
+            Effect::AtReset => "at reset",
+        })
+    }
+
+    /// Restarts at t = 0 with all changes.
+    fn reset(&mut self, py: Python<'_>) -> PyResult<()> {
+        let outcome = detached(py, || self.live.reset())?;
+        let pending = self.live.pending();
+        outcome.map_err(|error| scene_error(py, Some(pending), &pending.locate(&error)))?;
+        self.lay_out();
+        Ok(())
+    }
+
+    /// Names of the channels, in the order of [`Self::frame`].
+    #[getter]
+    fn channels(&self) -> Vec<&str> {
+        self.channels.iter().map(|channel| &channel.name[..]).collect()
+    }
+
+    /// Value of a channel now, SI; NaN if it has none.
+    fn read(&mut self, py: Python<'_>, channel: &str) -> PyResult<f64> {
+        let Some(&place) = self.places.get(channel) else {
+            let known = matching(&self.channels, channel);
+            let message = match known {
+                Ok(several) => {
+                    let names: Vec<&str> = several.iter().map(|channel| &channel.name[..]).collect();
+                    format!("`{channel}` stands for several channels: {}", names.join(", "))
+                }
+                Err(error) => error.to_string(),
+            };
+            return Err(exception(py, "ChannelError", &message, None));
+        };
+        self.live.sample_now(&mut self.frame);
+        Ok(self.channels[place].reading().read(&self.frame).unwrap_or(f64::NAN))
+    }
+
+    /// Everything about this instant.
+    fn instant<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.live.sample_now(&mut self.frame);
+        let frame = &self.frame;
+        let all = PyDict::new(py);
+        all.set_item("time", frame.time)?;
+        let values = self.channels.iter().map(|channel| channel.reading().read(frame).unwrap_or(f64::NAN));
+        all.set_item("values", PyArray1::from_owned_array(py, Array1::from_iter(values)))?;
+        all.set_item("positions", vectors(py, frame.bodies.iter().map(|body| body.position)))?;
+        all.set_item("velocities", vectors(py, frame.bodies.iter().map(|body| body.velocity)))?;
+        all.set_item("angular_velocities", vectors(py, frame.bodies.iter().map(|body| body.angular_velocity)))?;
+        let rotations: Vec<Mat3> = frame.bodies.iter().map(|body| body.rotation).collect();
+        let rotations = Array3::from_shape_fn((rotations.len(), 3, 3), |(b, i, j)| rotations[b][(i, j)]);
+        all.set_item("rotations", PyArray3::from_owned_array(py, rotations))?;
+        all.set_item("eccentricities", vectors(py, frame.joints.iter().map(|joint| joint.eccentricity)))?;
+        all.set_item("normal_forces", vectors(py, frame.joints.iter().map(|joint| joint.normal_force)))?;
+        all.set_item("friction_forces", vectors(py, frame.joints.iter().map(|joint| joint.friction_force)))?;
+        Ok(all)
+    }
+
+    /// State vector: coordinates, then velocities, as the formulation orders them, SI.
+    #[getter]
+    fn vector<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.live.state_vector())
+    }
+
+    /// The finished impacts that were not taken before: names of the columns, and an array with one row per column.
+    fn finished_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+        let mut impacts = Vec::new();
+        self.live.take_impacts(&mut impacts);
+        report::impacts(py, &impacts)
+    }
+
+    /// Reasons to doubt the results so far.
+    #[getter]
+    fn doubts(&self) -> Vec<String> {
+        report::doubts(&self.live)
+    }
+
+    /// Energy exchanged so far, J.
+    #[getter]
+    fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        report::ledger(py, &self.live)
+    }
+
+    /// Counters so far.
+    #[getter]
+    fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        report::statistics(py, &self.live)
+    }
+}
+
+/// An array with one row per vector.
+fn vectors(py: Python<'_>, vectors: impl Iterator<Item = Vec3>) -> Bound<'_, PyArray2<f64>> {
+    let all: Vec<Vec3> = vectors.collect();
+    PyArray2::from_owned_array(py, Array2::from_shape_fn((all.len(), 3), |(row, i)| all[row][i]))
+}

@@ -1,0 +1,55 @@
+"""What the tests share: the program that the package must agree with."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def program():
+    """Calls the program, which `./test` has built, and returns what it prints."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    path = Path(os.environ.get("JOINTPLAY", target / "debug" / "jointplay"))
+
+    def call(*arguments):
+        done = subprocess.run([path, *map(str, arguments)], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def summary(program):
+    """Calls a command of the program and returns its summary."""
+    return lambda *arguments: json.loads(program(*arguments, "--summary", "json", "--quiet"))
+
+
+@pytest.fixture
+def falling():
+    """A ball in a socket with play, as a scene file: cheap, and unknown to the program."""
+    return """
+name = "falling"
+[gravity]
+z = "-9.81 m/s^2"
+[contact]
+clearance = "0.2 mm"
+[[body]]
+name = "bob"
+mass = "0.4 kg"
+inertia = "1e-3 1e-3 1e-3 kg m^2"
+[[joint]]
+name = "bob"
+kind = "free"
+child = "bob"
+start = { position = "0 0 0 mm" }
+[[ball_joint]]
+name = "S1"
+socket = { body = "world", at = "0 0 0 mm" }
+ball = { body = "bob", at = "0 0 0 mm" }
+"""

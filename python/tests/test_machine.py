@@ -1,0 +1,66 @@
+"""Machines built in code: the same as their scene files."""
+
+import jointplay as jp
+import numpy as np
+import pytest
+
+
+def chain(links, clearance):
+    """Links of 100 mm that hang from each other by balls with clearance, m."""
+    bodies = [{"name": f"L{i}", "mass": 0.1, "inertia": [1e-5, 1e-4, 1e-4]} for i in range(links)]
+    joints = [
+        {"name": f"L{i}", "kind": "free", "child": f"L{i}", "start": {"position": np.array([0, 0, -0.05 - 0.1 * i])}}
+        for i in range(links)
+    ]
+    sockets = [{"body": f"L{i - 1}", "at": (0, 0, -0.05)} if i else {"body": "world"} for i in range(links)]
+    balls = [
+        {"name": f"S{i}", "socket": socket, "ball": {"body": f"L{i}", "at": (0, 0, 0.05)}} for i, socket in enumerate(sockets)
+    ]
+    return {
+        "name": "links",
+        "gravity": {"z": -9.81},
+        "contact": {"clearance": clearance, "friction": np.float64(0.1)},
+        "body": bodies,
+        "joint": joints,
+        "ball_joint": balls,
+    }
+
+
+def test_a_machine_in_code_is_its_scene_file():
+    scene = jp.Scene.from_dict(chain(3, 2e-4))
+    assert scene.ball_joints == ["S0", "S1", "S2"] and scene["contact.clearance"] == 2e-4
+    assert "[[body]]" in scene.toml and 'mass = "0.1 kg"' in scene.toml
+    run = scene.run("30 ms", channels=["*.normal"], warn=False)
+    assert run.hash == jp.Scene.from_toml(scene.toml).run("30 ms", warn=False).hash
+    # It falls through its play, and hangs.
+    assert run["S0.normal"][0] == 0.0 and run["S0.normal"].max() > 3 * 0.1 * 9.81
+
+
+def test_every_kind_of_number_has_its_unit():
+    machine = chain(2, 1e-4)
+    machine["parameter"] = [{"name": "pull", "label": "Pull", "value": "2 N", "range": ["0 N", "5 N"], "help": "A force."}]
+    machine["spring"] = [
+        {"name": "s", "from": {"body": "world", "at": [0.0, 0.1, 0.0]}, "to": {"body": "L1"}, "length": 0.2, "stiffness": 50}
+    ]
+    machine["load"] = [{"name": "wind", "on": {"body": "L1"}, "force": ["pull", 0, 0]}]
+    machine["body"][0]["shapes"] = [{"form": "capsule", "from": (0, 0, -0.05), "to": (0, 0, 0.05), "radius": 0.004}]
+    machine["solver"] = {"method": "rk4", "step": 1e-6}
+    scene = jp.Scene.from_dict(machine)
+    assert scene["solver.step"] == 1e-6 and scene["parameter.pull"] == 2.0
+    assert scene["spring.s.stiffness"] == 50.0 and scene["spring.s.length"] == 0.2
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        ({"body": [{"name": "L0", "mass": object()}]}, r"body\[0\].mass: expected a number"),
+        ({"body": [{"name": "L0", "mass": float("nan")}]}, r"body\[0\].mass: expected a finite number"),
+        ({"body": [{"name": "L0", "mess": 1.0}]}, "mass"),
+        ({"contact": {"clearance": -1.0}}, "allowed"),
+        ({"sprung": [{}]}, "spring"),
+        ({"joint": [{"name": "L0", "kind": "revolute", "child": "L0", "axis": [0, 1, 0], "start": {"position": 0.1}}]}, "unit depends"),
+    ],
+)
+def test_what_is_wrong_is_named(change, said):
+    with pytest.raises(jp.JointplayError, match=said):
+        jp.Scene.from_dict(chain(1, 1e-4) | change)

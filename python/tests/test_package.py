@@ -1,0 +1,84 @@
+"""The package as it is installed: typed, documented, and as its documents say."""
+
+import ast
+import inspect
+import os
+import re
+from importlib import metadata
+from pathlib import Path
+
+import jointplay as jp
+import pytest
+from jointplay import _native
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = Path(jp.__file__).parent
+
+
+def test_the_installed_package_is_tested():
+    assert FOLDER.parent.name == "site-packages" and ROOT not in FOLDER.parents or "target" in FOLDER.parts
+    assert (FOLDER / "py.typed").exists()
+    wheel = metadata.distribution("jointplay").read_text("WHEEL")
+    assert re.search(r"^Tag: cp310-abi3-", wheel, re.MULTILINE), wheel
+    version = re.search(r'^version = "(.*)"', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)
+    assert metadata.version("jointplay") == version[1]
+
+
+def test_no_graphics_library_is_in_the_wheel():
+    library = next(FOLDER.glob("_native*.so")).read_bytes()
+    for name in [b"wgpu", b"libvulkan", b"libEGL", b"winit"]:
+        assert name not in library, name
+
+
+def test_stubs_name_what_there_is():
+    tree = ast.parse((FOLDER / "_native.pyi").read_text())
+
+    def public(names):
+        return {name for name in names if not name.startswith("_")}
+
+    named = [node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))]
+    assert public(node.name for node in named) == public(vars(_native))
+    for node in named:
+        if isinstance(node, ast.ClassDef):
+            methods = {own.name for own in node.body if isinstance(own, ast.FunctionDef)}
+            assert public(methods) == public(vars(getattr(_native, node.name))), node.name
+
+
+def test_everything_public_says_what_it_is():
+    for name in jp.__all__:
+        thing = getattr(jp, name)
+        assert inspect.getdoc(thing), name
+        if not inspect.isclass(thing):
+            continue
+        for member, own in vars(thing).items():
+            if not member.startswith("_") and (callable(own) or isinstance(own, (property, staticmethod, classmethod))):
+                assert inspect.getdoc(getattr(thing, member)), f"{name}.{member}"
+
+
+def blocks(document):
+    return re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / document).read_text(), re.MULTILINE | re.DOTALL)
+
+
+def test_the_examples_of_the_document_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    own = blocks("python.md")
+    assert len(own) >= 5
+    names = {}
+    for block in own:
+        exec(compile(block, "docs/python.md", "exec"), names)
+    assert "contact.clearance -3 mm allowed 0 mm" in capsys.readouterr().out
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_example_for_clusters_runs(monkeypatch, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    block = blocks("cluster.md")[0]
+    # As it is written, but on this machine and smaller.
+    smaller = block.replace('"0.01mm..1mm:200"', '"0.01mm..1mm:3"').replace("periods=100, discard=40", "periods=3, discard=1")
+    assert smaller.count(":3\"") == 1 and "periods=3" in smaller
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
+    ) as cluster:
+        names = {}
+        exec(compile(smaller.replace('"scheduler:8786"', "cluster"), "docs/cluster.md", "exec"), names | {"cluster": cluster}, names)
+    assert names["result"]["status"].tolist() == [0, 0, 0]

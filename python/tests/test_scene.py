@@ -1,0 +1,137 @@
+"""Scenes: loaded, changed, checked, and refused with their reasons."""
+
+import pickle
+
+import jointplay as jp
+import numpy as np
+import pytest
+
+
+def test_every_scene_of_the_program_loads(program):
+    named = [line.split()[0] for line in program("scenes").splitlines()]
+    assert jp.Scene.names() == named
+    for name in named:
+        assert jp.Scene.load(name).name == name
+
+
+def test_a_changed_scene_is_another_one():
+    scene = jp.Scene.load("four-bar")
+    loose = scene.set(clearance="0.5 mm", friction=0.1)
+    assert scene["contact.clearance"] == 1e-4 and scene.changes == {}
+    assert loose["contact.clearance"] == 5e-4 and loose["contact.friction"] == 0.1
+    assert loose != scene and loose.set(clearance=None, friction=None) == scene
+    one = loose.set({"joint.A.clearance": 2e-4, "solver.method": "radau5"})
+    assert (one["joint.A.clearance"], one["joint.B.clearance"], one["solver.method"]) == (2e-4, 5e-4, "radau5")
+
+
+def test_numbers_of_numpy_are_numbers():
+    scene = jp.Scene.load("chain")
+    for number in [np.float64(0.25), np.float32(0.25), np.int64(0), 0]:
+        assert scene.set(friction=number)["contact.friction"] == number
+    assert scene.set({"chain.links": np.int64(4)})["chain.links"] == 4
+
+
+def test_a_number_reaches_the_scene_with_all_its_bits():
+    scene = jp.Scene.load("pendulum")
+    for clearance in np.random.default_rng(1).uniform(1e-5, 1e-3, 50):
+        assert scene.set(clearance=clearance)["contact.clearance"] == clearance
+
+
+def test_values_that_fit_only_together_are_set_together():
+    scene = jp.Scene.load("pendulum")
+    radius = scene["contact.ball_radius"]
+    changes = {"contact.clearance": 2 * radius, "contact.ball_radius": 10 * radius}
+    assert scene.set(changes)["contact.clearance"] == 2 * radius
+
+
+def test_parameters_say_what_they_are():
+    parameters = jp.Scene.load("four-bar").parameters
+    clearance = parameters["contact.clearance"]
+    assert clearance.label == "Clearance" and clearance.text == "0.1 mm" and clearance.value == 1e-4
+    assert "ball radius" in clearance.allowed and clearance.range[0] == 0.0 and not clearance.words
+    assert "radau5" in parameters["solver.method"].words
+    assert {"joint.A.clearance", "joint.B.friction"} <= set(parameters)
+    assert all(parameter.help for parameter in parameters.values())
+
+
+def test_a_scene_survives_pickling(falling):
+    for scene in [jp.Scene.load("four-bar").set(clearance="0.5 mm"), jp.Scene.from_toml(falling).set(friction=0.3)]:
+        again = pickle.loads(pickle.dumps(scene))
+        assert again == scene and again.changes == scene.changes
+
+
+def test_the_check_counts_what_there_is():
+    check = jp.Scene.load("four-bar").check()
+    assert (check.bodies, check.degrees_of_freedom, check.contacts, check.ideal_joints) == (3, 7, 2, 0)
+    assert check.warnings == [] and check.doubts == []
+    warned = jp.Scene.load("four-bar").set({"solver.method": "rk4", "solver.step": "1 ms"}).check()
+    assert warned.warnings
+
+
+def test_an_error_in_a_file_names_line_key_and_range(falling):
+    text = falling.replace('"0.2 mm"', '"-3 mm"')
+    with pytest.raises(jp.SceneError) as caught:
+        jp.Scene.from_toml(text, file="falling.toml")
+    error = caught.value
+    assert isinstance(error, ValueError) and isinstance(error, jp.JointplayError)
+    line = text.splitlines().index('clearance = "-3 mm"') + 1
+    assert (error.file, error.line, error.key) == ("falling.toml", line, "contact.clearance")
+    assert "0 mm to below the ball radius" in error.allowed
+    assert str(error).startswith(f"falling.toml:{line}:") and "-3 mm" in error.value
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.line, again.allowed) == (str(error), error.line, error.allowed)
+
+
+@pytest.mark.parametrize(
+    "change, key, said",
+    [
+        ({"contact.clearence": 1e-4}, "contact.clearence", "did you mean `contact.clearance`?"),
+        ({"contact.clearance": "5 kg"}, "contact.clearance", "mm"),
+        ({"contact.clearance": -1.0}, "contact.clearance", "allowed 0 mm"),
+        ({"joint.A.friction": 99.0}, "joint.A.friction", "allowed"),
+    ],
+)
+def test_a_refused_change_names_key_and_range(change, key, said):
+    scene = jp.Scene.load("four-bar")
+    with pytest.raises(jp.SceneError) as caught:
+        scene.set(change)
+    assert caught.value.key == key and said in str(caught.value) and caught.value.line is None
+    if "clearence" not in key:
+        assert caught.value.allowed.startswith("allowed ")
+    assert scene.changes == {}
+
+
+@pytest.mark.parametrize("value", [True, [1], {}, float("nan"), float("inf"), b"1", object()])
+def test_what_is_no_number_is_refused(value):
+    with pytest.raises(jp.OptionError, match="contact.friction"):
+        jp.Scene.load("four-bar").set(friction=value)
+
+
+def test_a_keyword_that_several_parameters_have_is_refused(falling):
+    own = '[[parameter]]\nname = "friction"\nlabel = "Own"\nvalue = "1"\nrange = ["0", "2"]\nhelp = "A number."\n'
+    scene = jp.Scene.from_toml(f"{falling}\n{own}")
+    with pytest.raises(jp.OptionError, match="contact.friction, parameter.friction"):
+        scene.set(friction=0.1)
+    assert scene.set({"parameter.friction": 0.5})["parameter.friction"] == 0.5
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path):
+    for name in ["fourbar", str(tmp_path / "none.toml"), f"{tmp_path}/"]:
+        with pytest.raises(jp.SceneError) as caught:
+            jp.Scene.load(name)
+        assert name.strip("/") in str(caught.value)
+
+
+def test_a_machine_that_does_not_close_is_refused_where_it_is_described(falling):
+    far = falling.replace('clearance = "0.2 mm"', 'clearance = "0 mm"').replace('"0 0 0 mm" }\nball', '"0 0 90 mm" }\nball')
+    with pytest.raises(jp.SceneError) as caught:
+        jp.Scene.from_toml(far, file="far.toml").run("1 ms")
+    assert caught.value.line == far[: far.index("[[ball_joint]]")].count("\n") + 1
+
+
+def test_a_scene_shows_its_parameters_or_the_page(monkeypatch):
+    scene = jp.Scene.load("four-bar").set(clearance="0.5 mm")
+    monkeypatch.delenv("JOINTPLAY_PAGE", raising=False)
+    assert "<td>0.5 mm</td>" in scene._repr_html_()
+    monkeypatch.setenv("JOINTPLAY_PAGE", "https://example.org/lab/")
+    assert 'src="https://example.org/lab/#scene=four-bar&amp;contact.clearance=0.5+mm&amp;embed=controls"' in scene._repr_html_()

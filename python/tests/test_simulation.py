@@ -1,0 +1,180 @@
+"""Simulations: stepped, changed, restored, in threads."""
+
+import _thread
+import gc
+import resource
+import threading
+
+import jointplay as jp
+import numpy as np
+import pytest
+
+
+def test_the_end_of_a_run_is_that_of_the_program(summary):
+    told = summary("run", "four-bar", "--duration", "20ms")
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    simulation.run_until("20 ms")
+    assert (simulation.hash, simulation.time) == (told["state_hash"], 0.02)
+    assert simulation.statistics["steps"] == told["steps"] and simulation.ledger == told["energy_J"]
+
+
+def test_steps_by_one_and_by_many_are_the_same():
+    scene = jp.Scene.load("four-bar")
+    one, many = jp.Simulation(scene), jp.Simulation(scene)
+    for _ in range(300):
+        one.step()
+    many.step(300)
+    assert one.hash == many.hash and one.time == many.time > 0.0
+    assert one.statistics["steps"] == 300
+
+
+def test_a_state_is_returned_to_with_the_same_bits():
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    simulation.run_until("5 ms")
+    state = simulation.state
+    ends = []
+    for _ in range(2):
+        simulation.restore(state)
+        assert (simulation.time, simulation.hash) == (state.time, state.hash)
+        simulation.step(500)
+        ends.append(simulation.hash)
+    other = jp.Simulation(jp.Scene.load("four-bar"))
+    other.restore(state)
+    other.step(500)
+    assert ends == [other.hash] * 2
+
+
+def test_a_live_change_takes_effect_now_or_at_the_reset():
+    scene = jp.Scene.load("pendulum")
+    simulation = jp.Simulation(scene)
+    simulation.run_until("50 ms")
+    assert simulation.set("contact.friction", 0.3) == "now"
+    assert simulation.set("contact.clearance", "0 mm") == "at reset"
+    assert simulation["S1.clearance"] > 0.0
+    simulation.reset()
+    assert simulation.time == 0.0
+    simulation.run_until("50 ms")
+    fresh = jp.Simulation(scene.set(friction=0.3, clearance=0.0))
+    fresh.run_until("50 ms")
+    assert simulation.hash == fresh.hash
+    for key, value in [("contact.clearence", 1e-4), ("contact.clearance", "5 kg"), ("contact.clearance", -1.0)]:
+        with pytest.raises(jp.SceneError, match=key):
+            simulation.set(key, value)
+    with pytest.raises(jp.OptionError):
+        simulation.set("contact.friction", None)
+
+
+def test_a_frame_has_what_a_run_records():
+    scene = jp.Scene.load("four-bar")
+    simulation = jp.Simulation(scene)
+    simulation.run_until("10 ms")
+    frame = simulation.frame()
+    run = scene.run("10 ms", every="10 ms", channels=["*"])
+    assert frame.time == 0.01
+    for name, value in zip(simulation.channels, frame.values):
+        assert np.array_equal(value, run[name][-1], equal_nan=True), name
+        assert np.array_equal(simulation[name], value, equal_nan=True), name
+    crank = scene.bodies.index("crank")
+    assert frame.positions[crank].tolist() == [run[f"crank.pose.{axis}"][-1] for axis in "xyz"]
+    assert np.allclose(frame.rotations @ frame.rotations.transpose(0, 2, 1), np.eye(3), atol=1e-12)
+    a = scene.ball_joints.index("A")
+    assert np.isclose(np.linalg.norm(frame.normal_forces[a]), simulation["A.normal"], rtol=1e-12)
+    assert np.allclose(frame.eccentricities[a], run["A.eccentricity"][-1], rtol=0, atol=0)
+    with pytest.raises(jp.ChannelError, match="did you mean"):
+        simulation["A.nromal"]
+    with pytest.raises(jp.ChannelError, match="A.force.x"):
+        simulation["A.force"]
+
+
+def test_impacts_are_taken_once():
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    found = []
+    for _ in range(100):
+        simulation.step(20)
+        found.extend(simulation.take_impacts().tolist())
+    end = simulation.time
+    own = [tuple(row) for row in jp.Scene.load("four-bar").run(end).impacts.tolist()]
+    assert found[: len(own) - 1] == own[: len(own) - 1] and len(found) > 3
+    assert len(simulation.take_impacts()) == 0
+
+
+def test_a_stopped_simulation_keeps_its_last_good_state():
+    wild = jp.Scene.load("spcmm").set({"solver.method": "rk4", "solver.step": "1 ms", "contact.clearance": "0.5 mm"})
+    simulation = jp.Simulation(wild)
+    with pytest.raises(jp.Stopped) as caught:
+        simulation.run_until(1.0)
+    assert caught.value.time == simulation.time and np.all(np.isfinite(simulation.vector))
+
+
+def test_threads_give_the_same_bits_as_one():
+    scenes = [jp.Scene.load("four-bar"), jp.Scene.load("spcmm")]
+    alone = [scene.run("30 ms", warn=False).hash for scene in scenes]
+    simulations = [jp.Simulation(scene) for scene in scenes]
+    threads = [threading.Thread(target=simulation.run_until, args=(0.03,)) for simulation in simulations]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert [simulation.hash for simulation in simulations] == alone
+
+
+def test_stepping_lets_other_threads_run():
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    thread = threading.Thread(target=simulation.step, args=(20_000,))
+    thread.start()
+    turns = 0
+    while thread.is_alive():
+        turns += 1
+    # With the interpreter's lock held, this thread would get no turn before the end.
+    assert turns > 100
+    thread.join()
+
+
+def test_a_simulation_in_use_is_refused_to_another_thread():
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    thread = threading.Thread(target=simulation.step, args=(20_000,))
+    thread.start()
+    with pytest.raises(RuntimeError, match="borrowed"):
+        while thread.is_alive():
+            simulation.step()
+        raise AssertionError("the step ended too soon")
+    thread.join()
+    simulation.step()
+
+
+def test_ctrl_c_ends_steps_and_the_simulation_goes_on():
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    threading.Timer(0.2, _thread.interrupt_main).start()
+    with pytest.raises(KeyboardInterrupt):
+        simulation.run_until("1000 s")
+    time = simulation.time
+    simulation.step()
+    assert simulation.time > time > 0.0
+
+
+def test_a_million_steps_leak_nothing():
+    kinematic = jp.Scene.load("pendulum").set({"solver.method": "rk4", "solver.step": "1 us"})
+    simulation = jp.Simulation(kinematic)
+
+    def work(count):
+        for _ in range(count):
+            simulation.step()
+        gc.collect()
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    first = work(10_000)
+    # A leak of one object a step would be 16 MB or more.
+    assert work(1_000_000) - first < 4 * 1024
+
+
+def test_a_simulation_is_given_back():
+    scene = jp.Scene.load("four-bar")
+
+    def work(count):
+        for _ in range(count):
+            simulation = jp.Simulation(scene)
+            simulation.step()
+            simulation.state
+        gc.collect()
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    first = work(50)
+    assert work(500) - first < 8 * 1024

@@ -1,0 +1,142 @@
+"""Sweeps: the bytes of the program's archive, in this process, in others, and with a worker killed half-way."""
+
+import _thread
+import os
+import pickle
+import signal
+import threading
+import time
+
+import jointplay as jp
+import numpy as np
+import pytest
+
+CASES = [
+    (
+        "slider-crank-driven",
+        {"contact.clearance": "0.1mm..0.3mm:4"},
+        {"periods": 4, "discard": 1},
+        ["--periods", "4", "--discard", "1"],
+    ),
+    (
+        "pendulum",
+        {"contact.clearance": "0.05mm..0.2mm:3:log", "contact.normal_law": "hertz,flores"},
+        {"duration": "20 ms", "start_after": "5 ms", "keep": ["S1.normal:max", "energy.kinetic:mean"]},
+        ["--duration", "20ms", "--from", "5ms", "--keep", "S1.normal:max,energy.kinetic:mean"],
+    ),
+    (
+        "slider-crank-driven",
+        {"contact.friction": "0.1..0.2:3"},
+        {"periods": 3, "discard": 1, "start": ["cold", "follow-up"], "exponent": False},
+        ["--periods", "3", "--discard", "1", "--start", "cold,follow-up", "--no-exponent"],
+    ),
+]
+
+
+def archive(program, tmp_path, name, vary, options):
+    path = tmp_path / "sweep.npz"
+    varied = [f"--vary={key}={values}" for key, values in vary.items()]
+    program("sweep", name, *varied, *options, "--out", path, "--quiet", "--force")
+    return np.load(path)
+
+
+def same(result, written):
+    assert list(result) == [name for name in written.files if name not in ("meta", "start")]
+    for name, array in result.items():
+        assert array.shape == written[name].shape and array.dtype.kind == written[name].dtype.kind, name
+        if array.dtype.kind == "U":
+            assert array.tolist() == written[name].tolist(), name
+        else:
+            assert array.tobytes() == written[name].tobytes(), name
+
+
+@pytest.mark.parametrize("name, vary, options, arguments", CASES)
+def test_arrays_are_those_of_the_program(name, vary, options, arguments, program, tmp_path):
+    written = archive(program, tmp_path, name, vary, arguments)
+    sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
+    for threads in [1, 3]:
+        same(sweep.run(threads), written)
+    same(sweep.assemble(sweep.compute(block) for block in range(sweep.blocks)), written)
+
+
+def test_listed_values_are_numbers_or_texts():
+    scene = jp.Scene.load("pendulum")
+    for values in [np.linspace(1e-4, 2e-4, 3), ["0.1 mm", "0.15 mm", "0.2 mm"]]:
+        result = jp.sweep(scene, {"contact.clearance": values}, duration="2 ms", keep="S1.normal:max")
+        assert np.allclose(result.axes["contact.clearance"], [1e-4, 1.5e-4, 2e-4], rtol=1e-15)
+    table = result.to_pandas()
+    assert list(table.columns) == ["contact.clearance", "status", "stopped_at_s", "doubts", "energy_residual", "S1_normal_max_N"]
+    assert len(table) == 3
+
+
+@pytest.mark.parametrize(
+    "vary, options, said",
+    [
+        ({"contact.clearance": "0.1mm..0.2mm:3"}, {}, "either periods and discard, or duration"),
+        ({"contact.clearance": "0.1mm"}, {"duration": 0.01}, "expected"),
+        ({"contact.clearence": [1e-4]}, {"duration": 0.01}, "did you mean"),
+        ({"contact.clearance": [-1.0]}, {"duration": 0.01}, "allowed"),
+        ({"contact.clearance": [1e-4]}, {"duration": "1 mm"}, "duration"),
+        ({"contact.clearance": [1e-4]}, {"duration": 0.01, "start_after": 0.02}, "before the end"),
+        ({"contact.clearance": [1e-4]}, {"duration": 0.01, "keep": "S1.nromal:max"}, "did you mean"),
+        ({"contact.clearance": [1e-4]}, {"duration": 0.01, "start": "warm"}, "no such start"),
+        ({"contact.clearance": [1e-4]}, {"periods": 3, "discard": 1}, "driven"),
+        ({}, {"duration": 0.01}, "at least one"),
+    ],
+)
+def test_bad_sweeps_are_refused(vary, options, said):
+    with pytest.raises(jp.JointplayError, match=said):
+        jp.Sweep(jp.Scene.load("pendulum"), vary, **options)
+
+
+def test_blocks_that_are_missing_are_noticed():
+    sweep = jp.Sweep(jp.Scene.load("pendulum"), {"contact.clearance": [1e-4, 2e-4]}, duration="1 ms")
+    with pytest.raises(jp.OptionError, match="1 of them"):
+        sweep.assemble([sweep.compute(0)])
+    with pytest.raises(jp.OptionError, match="blocks 0 to 1"):
+        sweep.compute(2)
+
+
+def test_ctrl_c_ends_a_sweep_and_progress_rises():
+    scene = jp.Scene.load("four-bar")
+    parts = []
+    jp.sweep(scene, {"contact.friction": [0.1, 0.2, 0.3]}, duration="5 ms", progress=parts.append)
+    assert parts == sorted(parts) and parts[-1] == 1.0
+    threading.Timer(0.5, _thread.interrupt_main).start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        jp.sweep(scene, {"contact.friction": [0.1, 0.2, 0.3]}, duration="1000 s")
+    assert time.monotonic() - start < 60.0
+
+
+def test_a_sweep_computes_the_same_after_pickling():
+    sweep = jp.Sweep(jp.Scene.load("pendulum"), {"contact.clearance": [1e-4, 2e-4]}, duration="5 ms")
+    again = pickle.loads(pickle.dumps(sweep))
+    assert again.compute(1).tobytes() == sweep.compute(1).tobytes()
+
+
+def test_joblib_computes_the_same(program, tmp_path):
+    joblib = pytest.importorskip("joblib")
+    name, vary, options, arguments = CASES[0]
+    sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
+    blocks = joblib.Parallel(n_jobs=2)(joblib.delayed(sweep.compute)(block) for block in range(sweep.blocks))
+    same(sweep.assemble(blocks), archive(program, tmp_path, name, vary, arguments))
+
+
+def test_dask_loses_no_point_with_a_worker(program, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    name, options, arguments = "pendulum", {"duration": "0.4 s"}, ["--duration", "0.4s"]
+    vary = {"contact.clearance": "0.1mm..0.3mm:24"}
+    sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
+    )
+    with cluster, distributed.Client(cluster) as client:
+        futures = client.map(sweep.compute, range(sweep.blocks), pure=False)
+        # Half-way: a worker with finished blocks and one under way disappears.
+        distributed.wait(futures[: sweep.blocks // 3])
+        victim = client.run(os.getpid)
+        os.kill(next(iter(victim.values())), signal.SIGKILL)
+        assert any(not future.done() for future in futures), "the worker was killed too late"
+        result = sweep.assemble(client.gather(futures))
+    same(result, archive(program, tmp_path, name, vary, arguments))
