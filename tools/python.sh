@@ -9,7 +9,7 @@ prepare_python() {
     cmp -s python/requirements.txt "$python_env/.from" && return
     say "installing what the tests of the package for Python use"
     python3 -m venv --clear "$python_env"
-    "$python_env/bin/pip" install --quiet --disable-pip-version-check --requirement python/requirements.txt
+    "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-compile --requirement python/requirements.txt
     cp python/requirements.txt "$python_env/.from"
 }
 
@@ -17,7 +17,7 @@ prepare_python() {
 python_test() {
     local wheels=$python_env/wheels
     rm -rf "$wheels"
-    "$python_env/bin/maturin" build --quiet --locked --profile dev --manifest-path python/Cargo.toml --out "$wheels"
+    "$python_env/bin/maturin" build --quiet --locked --profile dev --features alike --manifest-path python/Cargo.toml --out "$wheels"
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
     # From elsewhere: the sources beside the tests are not the installed package.
     "$python_env/bin/python" -P -m pytest --quiet python/tests "$@"

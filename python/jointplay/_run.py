@@ -39,7 +39,7 @@ class Run:
         self.ledger: dict[str, float] | None = found["ledger"]
         """Energy exchanged, J, as in the summary of `jointplay run`; None where `solver.energy_ledger` is off."""
         self.statistics: dict[str, Any] = found["statistics"]
-        """Steps, evaluations and rejected steps; under `joints`, for each ball joint `peak_normal` (N), `peak_time` (s), `impacts`."""
+        """Steps, evaluations, rejected steps; under `joints`, for each ball joint `peak_normal`, N, `peak_time`, s, and `impacts`."""
         self.impacts = table_of_impacts(scene, *found["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 

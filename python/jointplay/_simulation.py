@@ -65,7 +65,7 @@ class Simulation(_native.Simulation):
         return self.read(channel)
 
     def take_impacts(self) -> NDArray[Any]:
-        """One row per impact that finished since the last call, as `Run.impacts`; older ones than the latest 64 may be missing."""
+        """One row per impact that finished since the last call, as `Run.impacts`; only the latest 64 are sure to be there."""
         return table_of_impacts(self.scene, *self.finished_impacts())
 
     def __repr__(self) -> str:

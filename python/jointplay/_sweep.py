@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from .errors import OptionError
+from .errors import ChannelError, OptionError
 
 if TYPE_CHECKING:
     import pandas
@@ -152,6 +152,8 @@ class SweepResult(Mapping[str, NDArray[Any]]):
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """An array: the first axes are those of the sweep; the last, if it has one more, counts the sections."""
+        if name not in self._arrays:
+            raise ChannelError(f"`{name}` is none of the arrays of this sweep: {', '.join(self._arrays)}")
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:

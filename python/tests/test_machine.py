@@ -58,7 +58,7 @@ def test_every_kind_of_number_has_its_unit():
         ({"body": [{"name": "L0", "mess": 1.0}]}, "mass"),
         ({"contact": {"clearance": -1.0}}, "allowed"),
         ({"sprung": [{}]}, "spring"),
-        ({"joint": [{"name": "L0", "kind": "revolute", "child": "L0", "axis": [0, 1, 0], "start": {"position": 0.1}}]}, "unit depends"),
+        ({"joint": [{"name": "L0", "kind": "revolute", "child": "L0", "axis": "y", "start": {"position": 0.1}}]}, "unit depends"),
     ],
 )
 def test_what_is_wrong_is_named(change, said):

@@ -7,8 +7,8 @@ import re
 from importlib import metadata
 from pathlib import Path
 
+import distributed
 import jointplay as jp
-import pytest
 from jointplay import _native
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -71,7 +71,6 @@ def test_the_examples_of_the_document_run(tmp_path, monkeypatch, capsys):
 
 
 def test_the_example_for_clusters_runs(monkeypatch, tmp_path):
-    distributed = pytest.importorskip("distributed")
     block = blocks("cluster.md")[0]
     # As it is written, but on this machine and smaller.
     smaller = block.replace('"0.01mm..1mm:200"', '"0.01mm..1mm:3"').replace("periods=100, discard=40", "periods=3, discard=1")
@@ -79,6 +78,6 @@ def test_the_example_for_clusters_runs(monkeypatch, tmp_path):
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
     ) as cluster:
-        names = {}
-        exec(compile(smaller.replace('"scheduler:8786"', "cluster"), "docs/cluster.md", "exec"), names | {"cluster": cluster}, names)
+        names = {"cluster": cluster}
+        exec(compile(smaller.replace('"scheduler:8786"', "cluster"), "docs/cluster.md", "exec"), names)
     assert names["result"]["status"].tolist() == [0, 0, 0]

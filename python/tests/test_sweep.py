@@ -7,6 +7,8 @@ import signal
 import threading
 import time
 
+import distributed
+import joblib
 import jointplay as jp
 import numpy as np
 import pytest
@@ -116,7 +118,6 @@ def test_a_sweep_computes_the_same_after_pickling():
 
 
 def test_joblib_computes_the_same(program, tmp_path):
-    joblib = pytest.importorskip("joblib")
     name, vary, options, arguments = CASES[0]
     sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
     blocks = joblib.Parallel(n_jobs=2)(joblib.delayed(sweep.compute)(block) for block in range(sweep.blocks))
@@ -124,7 +125,6 @@ def test_joblib_computes_the_same(program, tmp_path):
 
 
 def test_dask_loses_no_point_with_a_worker(program, tmp_path):
-    distributed = pytest.importorskip("distributed")
     name, options, arguments = "pendulum", {"duration": "0.4 s"}, ["--duration", "0.4s"]
     vary = {"contact.clearance": "0.1mm..0.3mm:24"}
     sweep = jp.Sweep(jp.Scene.load(name), vary, **options)

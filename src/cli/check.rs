@@ -15,7 +15,7 @@ use crate::integrate::{Method, StepControl};
 use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
 use crate::mechanism::{ElementReport, Summary};
 use crate::scene::Scene;
-use crate::simulate::{Frame, Listed, Peak, Simulation, channels_of};
+use crate::simulate::{Frame, Listed, Peak, channels_of};
 use crate::units::{format_quantity, format_quantity_digits, to_display};
 
 /// Runs `check`.

@@ -181,7 +181,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if let (Some(file), Some(times)) = (file, times) {
         let path = file.target().path().to_owned();
         let mut meta = meta.clone();
-        meta.insert("every_s".into(), json!(times.every));
+        meta.insert("every_s".into(), json!(times.every()));
         if !arguments.channels.is_empty() {
             meta.insert("channels".into(), json!(arguments.channels));
         }

@@ -22,6 +22,11 @@ impl RowTimes {
         Some(Self { every, last: last as u64, duration })
     }
 
+    /// Interval between rows, s.
+    pub fn every(&self) -> f64 {
+        self.every
+    }
+
     /// Index of the last row; the first is 0.
     pub fn last(&self) -> u64 {
         self.last
