@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _Array = NDArray[np.float64]
-_Impacts = tuple[list[str], _Array]
+_Impacts = tuple[list[str], list[str], _Array]
 _Origin = tuple[str, str | None, dict[str, str], list[tuple[str, str]]]
 
 def scenes() -> tuple[list[str], list[str]]: ...
@@ -68,7 +68,7 @@ class Simulation:
     def state(self) -> State:
         """The whole state, to which `restore` returns with the same bits."""
     def restore(self, state: State) -> None:
-        """Returns to a state of this simulation, or of any other one."""
+        """Returns to a state of a simulation of the same scene."""
     def change(self, key: str, value: float | int | str) -> str: ...
     def reset(self) -> None:
         """Restarts at t = 0 with all changes, including those that wait for a reset."""

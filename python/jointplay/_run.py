@@ -40,7 +40,7 @@ class Run:
         """Energy exchanged, J, as in the summary of `jointplay run`; None where `solver.energy_ledger` is off."""
         self.statistics: dict[str, Any] = found["statistics"]
         """Steps, evaluations, rejected steps; under `joints`, for each ball joint `peak_normal`, N, `peak_time`, s, and `impacts`."""
-        self.impacts = table_of_impacts(scene, *found["impacts"])
+        self.impacts = table_of_impacts(*found["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 
     @property
@@ -105,9 +105,9 @@ INTEGERS = ("steps",)
 FLAGS = ("floored", "disturbed")
 
 
-def table_of_impacts(scene: Scene, names: list[str], values: NDArray[np.float64]) -> NDArray[Any]:
+def table_of_impacts(ball_joints: list[str], names: list[str], values: NDArray[np.float64]) -> NDArray[Any]:
     """Structured array of impacts, whose values have one row per column."""
-    joints = np.array(scene.ball_joints or [""])
+    joints = np.array(ball_joints or [""])
     kinds: dict[str, Any] = {name: float for name in names}
     kinds.update({name: int for name in INTEGERS}, joint=joints.dtype, **{name: bool for name in FLAGS})
     table = np.zeros(values.shape[1], dtype=list(kinds.items()))

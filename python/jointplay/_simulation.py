@@ -66,7 +66,7 @@ class Simulation(_native.Simulation):
 
     def take_impacts(self) -> NDArray[Any]:
         """One row per impact that finished since the last call, as `Run.impacts`; only the latest 64 are sure to be there."""
-        return table_of_impacts(self.scene, *self.finished_impacts())
+        return table_of_impacts(*self.finished_impacts())
 
     def __repr__(self) -> str:
         return f"<jointplay.Simulation {self.scene.name} at {self.time:g} s>"

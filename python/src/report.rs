@@ -19,15 +19,19 @@ pub fn hash_text(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
-/// Names of the columns of impacts, and an array with one row per column.
-pub fn impacts<'py>(py: Python<'py>, impacts: &[Impact]) -> PyResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+/// Impacts: names of the ball joints, to which the first column refers; names of the columns; an array with one row per column.
+pub type Impacts<'py> = (Vec<String>, Vec<&'static str>, Bound<'py, PyArray2<f64>>);
+
+/// The impacts of a simulation.
+pub fn impacts<'py>(py: Python<'py>, simulation: &Simulation, impacts: &[Impact]) -> PyResult<Impacts<'py>> {
+    let joints = simulation.machine().ball_joints.iter().map(|joint| joint.name.clone()).collect();
     let mut values = Array2::zeros((COLUMNS.len(), impacts.len()));
     for (i, impact) in impacts.iter().enumerate() {
         for (column, value) in row(impact).into_iter().enumerate() {
             values[(column, i)] = value;
         }
     }
-    Ok((COLUMNS.to_vec(), constant(py, values)?))
+    Ok((joints, COLUMNS.to_vec(), constant(py, values)?))
 }
 
 /// Reasons to doubt the results so far.

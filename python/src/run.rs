@@ -162,7 +162,7 @@ fn describe<'py>(py: Python<'py>, run: Recorder, fault: Option<&Fault>) -> PyRes
     all.set_item("doubts", report::doubts(live))?;
     all.set_item("ledger", report::ledger(py, live)?)?;
     all.set_item("statistics", report::statistics(py, live)?)?;
-    all.set_item("impacts", report::impacts(py, &run.impacts)?)?;
+    all.set_item("impacts", report::impacts(py, live, &run.impacts)?)?;
     all.set_item("fault", fault.map(ToString::to_string))?;
     let advice = match fault {
         Some(Fault::Stopped(stopped)) => Some(stopped.advice.to_string()),

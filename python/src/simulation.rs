@@ -1,10 +1,11 @@
 //! A simulation that is stepped, changed and read from Python.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use jointplay_physics::machine::{Mat3, Vec3};
 use jointplay_physics::simulate::{Effect, Frame, Listed, Stopped, matching};
-use jointplay_scene::{LiveScene, SceneSnapshot};
+use jointplay_scene::{LiveScene, Scene, SceneSnapshot};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
@@ -16,10 +17,30 @@ use crate::quantity::{duration, written};
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
 
+/// The channels of a running machine.
+struct Layout {
+    channels: Vec<Listed>,
+    /// Index of each channel by name and by column.
+    places: HashMap<String, usize>,
+}
+
+impl Layout {
+    /// The channels of a simulation that has just started.
+    fn of(live: &mut LiveScene) -> Self {
+        let channels = channels_at_start(live);
+        let names = channels.iter().map(|channel| &channel.name);
+        let both = channels.iter().map(|channel| &channel.column).zip(0..).chain(names.zip(0..));
+        let places = both.map(|(name, place)| (name.clone(), place)).collect();
+        Self { places, channels }
+    }
+}
+
 /// A state to which a simulation can return.
 #[pyclass(frozen, name = "State", module = "jointplay._native")]
 pub struct PyState {
+    scene: Arc<Scene>,
     snapshot: SceneSnapshot,
+    layout: Arc<Layout>,
 }
 
 #[pymethods]
@@ -40,10 +61,10 @@ impl PyState {
 /// A running simulation of a scene.
 #[pyclass(subclass, name = "Simulation", module = "jointplay._native")]
 pub struct PySimulation {
+    /// The scene as it was given.
+    scene: Arc<Scene>,
     live: LiveScene,
-    channels: Vec<Listed>,
-    /// Index of each channel by name and by column.
-    places: HashMap<String, usize>,
+    layout: Arc<Layout>,
     frame: Frame,
 }
 
@@ -73,12 +94,10 @@ impl PySimulation {
         }
     }
 
-    fn lay_out(&mut self) {
-        self.channels = channels_at_start(&mut self.live);
-        let columns = self.channels.iter().enumerate().map(|(i, channel)| (channel.column.clone(), i));
-        self.places = columns.collect();
-        self.places.extend(self.channels.iter().enumerate().map(|(i, channel)| (channel.name.clone(), i)));
-        self.channels.iter().for_each(|channel| channel.reading().ask(&mut self.frame));
+    /// Samples this instant with all channels.
+    fn sample(&mut self) {
+        self.layout.channels.iter().for_each(|channel| channel.reading().ask(&mut self.frame));
+        self.live.sample_now(&mut self.frame);
     }
 }
 
@@ -86,10 +105,9 @@ impl PySimulation {
 impl PySimulation {
     #[new]
     fn new(py: Python<'_>, scene: &PyScene) -> PyResult<Self> {
-        let live = scene.start(py)?;
-        let mut simulation = Self { live, channels: Vec::new(), places: HashMap::new(), frame: Frame::default() };
-        simulation.lay_out();
-        Ok(simulation)
+        let mut live = scene.start(py)?;
+        let layout = Arc::new(detached(py, || Layout::of(&mut live))?);
+        Ok(Self { scene: scene.scene.clone(), live, layout, frame: Frame::default() })
     }
 
     /// Takes `count` steps, each as long as the method chooses.
@@ -125,12 +143,20 @@ impl PySimulation {
     /// The whole state.
     #[getter]
     fn state(&self) -> PyState {
-        PyState { snapshot: self.live.snapshot() }
+        PyState { scene: self.scene.clone(), snapshot: self.live.snapshot(), layout: self.layout.clone() }
     }
 
-    /// Returns to a state.
-    fn restore(&mut self, state: &PyState) {
+    /// Returns to a state of this scene.
+    fn restore(&mut self, py: Python<'_>, state: &PyState) -> PyResult<()> {
+        if !Arc::ptr_eq(&state.scene, &self.scene) && state.scene != self.scene {
+            let (own, other) = (&self.scene.name, &state.scene.name);
+            let message =
+                format!("state: one of the scene `{other}`, and this is a simulation of another one, `{own}`");
+            return Err(option_error(py, &message));
+        }
         self.live.restore(&state.snapshot);
+        self.layout = state.layout.clone();
+        Ok(())
     }
 
     /// Changes a parameter; returns whether it takes effect `now` or `at reset`.
@@ -152,20 +178,20 @@ impl PySimulation {
         let outcome = detached(py, || self.live.reset())?;
         let pending = self.live.pending();
         outcome.map_err(|error| scene_error(py, Some(pending), &pending.locate(&error)))?;
-        self.lay_out();
+        self.layout = Arc::new(detached(py, || Layout::of(&mut self.live))?);
         Ok(())
     }
 
     /// Names of the channels, in the order of [`Self::frame`].
     #[getter]
     fn channels(&self) -> Vec<&str> {
-        self.channels.iter().map(|channel| &channel.name[..]).collect()
+        self.layout.channels.iter().map(|channel| &channel.name[..]).collect()
     }
 
     /// Value of a channel now, SI; NaN if it has none.
     fn read(&mut self, py: Python<'_>, channel: &str) -> PyResult<f64> {
-        let Some(&place) = self.places.get(channel) else {
-            let known = matching(&self.channels, channel);
+        let Some(&place) = self.layout.places.get(channel) else {
+            let known = matching(&self.layout.channels, channel);
             let message = match known {
                 Ok(several) => {
                     let names: Vec<&str> = several.iter().map(|channel| &channel.name[..]).collect();
@@ -175,17 +201,17 @@ impl PySimulation {
             };
             return Err(exception(py, "ChannelError", &message, None));
         };
-        self.live.sample_now(&mut self.frame);
-        Ok(self.channels[place].reading().read(&self.frame).unwrap_or(f64::NAN))
+        self.sample();
+        Ok(self.layout.channels[place].reading().read(&self.frame).unwrap_or(f64::NAN))
     }
 
     /// Everything about this instant.
     fn instant<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.live.sample_now(&mut self.frame);
+        self.sample();
         let frame = &self.frame;
         let all = PyDict::new(py);
         all.set_item("time", frame.time)?;
-        let values = self.channels.iter().map(|channel| channel.reading().read(frame).unwrap_or(f64::NAN));
+        let values = self.layout.channels.iter().map(|channel| channel.reading().read(frame).unwrap_or(f64::NAN));
         all.set_item("values", PyArray1::from_owned_array(py, Array1::from_iter(values)))?;
         all.set_item("positions", vectors(py, frame.bodies.iter().map(|body| body.position)))?;
         all.set_item("velocities", vectors(py, frame.bodies.iter().map(|body| body.velocity)))?;
@@ -205,11 +231,11 @@ impl PySimulation {
         PyArray1::from_slice(py, self.live.state_vector())
     }
 
-    /// The finished impacts that were not taken before: names of the columns, and an array with one row per column.
-    fn finished_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+    /// The finished impacts that were not taken before.
+    fn finished_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<report::Impacts<'py>> {
         let mut impacts = Vec::new();
         self.live.take_impacts(&mut impacts);
-        report::impacts(py, &impacts)
+        report::impacts(py, &self.live, &impacts)
     }
 
     /// Reasons to doubt the results so far.

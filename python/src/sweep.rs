@@ -239,33 +239,7 @@ impl PySweep {
         threads: usize,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let length = self.sweep.layout().record_length();
-        let mut records = Vec::new();
-        if records.try_reserve_exact(self.points() * length).is_err() {
-            return Err(PyMemoryError::new_err(format!(
-                "{} points of {length} values do not fit into memory",
-                self.points()
-            )));
-        }
-        records.resize(self.points() * length, f64::NAN);
-        let progress: Option<Py<PyAny>> = progress.map(Bound::unbind);
-        let report =
-            |part: f64| Python::attach(|py| look(py, progress.as_ref().map(|progress| progress.bind(py)), part));
-        let outcome = detached(py, || {
-            compute(&self.sweep, threads, report, |block, own| {
-                let points = self.sweep.design().block(block);
-                records[points.start * length..points.end * length].copy_from_slice(own);
-            })
-        })?;
-        match outcome {
-            Ok(()) => rows(py, records, length),
-            Err(Ended::Raised(error)) => Err(error),
-            Err(Ended::Panicked) => {
-                let message =
-                    "internal error: a thread of the sweep panicked. This is a bug in the program; please report it.";
-                Err(exception(py, "InternalError", message, None))
-            }
-        }
+        rows(py, records(py, &self.sweep, threads, progress)?, self.sweep.layout().record_length())
     }
 }
 
@@ -282,6 +256,41 @@ impl PySweep {
             return Ok(());
         }
         Err(option_error(py, &format!("point = {point}: the sweep has points 0 to {}", self.points() - 1)))
+    }
+}
+
+/// The records of all points of `sweep`, computed on `threads` threads. `progress` is called with the part that is done.
+///
+/// # Errors
+/// `KeyboardInterrupt`, what `progress` raises, `MemoryError`, and `InternalError` for a panic.
+pub fn records(
+    py: Python<'_>,
+    sweep: &Sweep,
+    threads: usize,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<Vec<f64>> {
+    let (points, length) = (sweep.design().points(), sweep.layout().record_length());
+    let mut records = Vec::new();
+    if points.checked_mul(length).is_none_or(|count| records.try_reserve_exact(count).is_err()) {
+        return Err(PyMemoryError::new_err(format!("{points} points of {length} values do not fit into memory")));
+    }
+    records.resize(points * length, f64::NAN);
+    let progress: Option<Py<PyAny>> = progress.map(Bound::unbind);
+    let report = |part: f64| Python::attach(|py| look(py, progress.as_ref().map(|progress| progress.bind(py)), part));
+    let outcome = detached(py, || {
+        compute(sweep, threads, report, |block, own| {
+            let points = sweep.design().block(block);
+            records[points.start * length..points.end * length].copy_from_slice(own);
+        })
+    })?;
+    match outcome {
+        Ok(()) => Ok(records),
+        Err(Ended::Raised(error)) => Err(error),
+        Err(Ended::Panicked) => {
+            let message =
+                "internal error: a thread of the sweep panicked. This is a bug in the program; please report it.";
+            Err(exception(py, "InternalError", message, None))
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 """Scenes: loaded, changed, checked, and refused with their reasons."""
 
 import pickle
+import random
 
 import jointplay as jp
 import numpy as np
@@ -135,3 +136,21 @@ def test_a_scene_shows_its_parameters_or_the_page(monkeypatch):
     assert "<td>0.5 mm</td>" in scene._repr_html_()
     monkeypatch.setenv("JOINTPLAY_PAGE", "https://example.org/lab/")
     assert 'src="https://example.org/lab/#scene=four-bar&amp;contact.clearance=0.5+mm&amp;embed=controls"' in scene._repr_html_()
+
+
+def test_whatever_the_text_the_errors_are_those_of_the_package(falling):
+    chance = random.Random(3)
+    refused = 0
+    for _ in range(400):
+        text = list(falling)
+        for _ in range(chance.randint(1, 3)):
+            at = chance.randrange(len(text))
+            text[at : at + chance.randint(0, 2)] = chance.choice('"=[]{}.-0e9 \nµ\0x')
+        try:
+            jp.Scene.from_toml("".join(text)).run("1 ms", every="1 ms", warn=False)
+        except jp.SceneError as error:
+            refused += 1
+            assert str(error)
+        except (jp.Stopped, jp.OptionError):
+            pass
+    assert refused > 100

@@ -42,6 +42,21 @@ def test_a_state_is_returned_to_with_the_same_bits():
     other.restore(state)
     other.step(500)
     assert ends == [other.hash] * 2
+    with pytest.raises(jp.OptionError, match="`four-bar`.*`pendulum`"):
+        jp.Simulation(jp.Scene.load("pendulum")).restore(state)
+
+
+def test_a_reset_may_change_what_there_is():
+    simulation = jp.Simulation(jp.Scene.load("chain").set({"chain.links": 2}))
+    simulation.step(100)
+    before, channels = simulation.state, simulation.channels
+    assert simulation.set("chain.links", 5) == "at reset"
+    simulation.reset()
+    simulation.run_until("50 ms")
+    assert len(simulation.channels) > len(channels) and simulation.frame().positions.shape == (5, 3)
+    assert len(set(simulation.take_impacts()["joint"])) > 2
+    simulation.restore(before)
+    assert simulation.channels == channels and simulation.frame().positions.shape == (2, 3)
 
 
 def test_a_live_change_takes_effect_now_or_at_the_reset():
