@@ -1,8 +1,8 @@
 """Times of the package: a step called from Python, and two simulations in two threads.
 
-    target/python/bin/python python/bench.py
+    pip install ./python && python python/bench.py
 
-Build the package with `maturin build --release` first: a wheel of `./test` is not optimised throughout.
+The package of `./test python` is not optimised: its calls take some microseconds.
 """
 
 import statistics

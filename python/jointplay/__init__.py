@@ -12,6 +12,7 @@ program `jointplay`: compare `Run.hash` with the state hash that `jointplay run`
 from ._run import Run
 from ._scene import Check, Parameter, Scene
 from ._simulation import Frame, Simulation
+from ._study import Estimate, Indices, Quality, RejectDriver, Sensitivity, Study, Tolerance, sensitivity, tolerance
 from ._sweep import Sweep, SweepResult, sweep
 from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OptionError, SceneError, Stopped
 
@@ -19,17 +20,26 @@ __all__ = [
     "ChannelError",
     "Check",
     "DoubtWarning",
+    "Estimate",
     "Frame",
+    "Indices",
     "InternalError",
     "JointplayError",
     "OptionError",
     "Parameter",
+    "Quality",
+    "RejectDriver",
     "Run",
     "Scene",
     "SceneError",
+    "Sensitivity",
     "Simulation",
     "Stopped",
+    "Study",
     "Sweep",
     "SweepResult",
+    "Tolerance",
+    "sensitivity",
     "sweep",
+    "tolerance",
 ]

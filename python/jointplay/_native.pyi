@@ -91,6 +91,37 @@ class Simulation:
     def statistics(self) -> dict[str, Any]:
         """Counters so far, as `Run.statistics`."""
 
+class Study:
+    def __new__(
+        cls,
+        scene: Scene,
+        over: list[tuple[str, str | None]],
+        output: str,
+        length: float | str | None,
+        start_after: float | str | None,
+    ) -> Study: ...
+    @property
+    def inputs(self) -> list[tuple[str, float]]: ...
+    @property
+    def outputs(self) -> list[tuple[str, str]]: ...
+    @property
+    def span(self) -> tuple[float, float]: ...
+    def run(
+        self, rows: list[list[float]], threads: int, progress: Callable[[float], object] | None = None
+    ) -> _Array: ...
+    def indices(
+        self, rows: int, seed: int, threads: int, progress: Callable[[float], object] | None = None
+    ) -> dict[str, Any]: ...
+    def lot(
+        self,
+        limits: list[tuple[float | str | None, float | str | None]],
+        units: int,
+        sampling: str,
+        seed: int,
+        threads: int,
+        progress: Callable[[float], object] | None = None,
+    ) -> dict[str, Any]: ...
+
 class Sweep:
     def __new__(cls, scene: Scene, vary: list[tuple[str, Any]], options: dict[str, Any], tried: bool) -> Sweep: ...
     @property

@@ -12,6 +12,7 @@ mod report;
 mod run;
 mod scene;
 mod simulation;
+mod study;
 mod sweep;
 
 use pyo3::prelude::*;
@@ -25,6 +26,8 @@ mod _native {
     use super::scene::{PyScene, scenes};
     #[pymodule_export]
     use super::simulation::{PySimulation, PyState};
+    #[pymodule_export]
+    use super::study::PyStudy;
     #[pymodule_export]
     use super::sweep::PySweep;
 }

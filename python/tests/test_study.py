@@ -1,0 +1,93 @@
+"""Studies of uncertain parameters: the numbers of `jointplay sensitivity` and `jointplay tolerance`, and other libraries on top."""
+
+import json
+
+import jointplay as jp
+import numpy as np
+import pytest
+
+OVER = {"joint.*.clearance": "0.05mm..0.2mm", "contact.friction": "normal(0.15, 0.02, 0.05..0.25)"}
+ASKED = [f"--over={pattern}={text}" for pattern, text in OVER.items()]
+
+
+def same(estimate, told):
+    # JSON has no infinity: an interval without an end has null there.
+    return [value if np.isfinite(value) else None for value in estimate] == [told[name] for name in ("value", "low", "high")]
+
+
+def test_indices_are_those_of_the_program(program, tmp_path):
+    options = ["--duration", "20ms", "--from", "2ms", "--rows", "16", "--seed", "5", "--summary", "json", "--quiet"]
+    outputs = ["tip-error", "A.normal:max", "impacts"]
+    told = json.loads(
+        program("sensitivity", "four-bar", *ASKED, "--output", ",".join(outputs), *options, "--out", tmp_path / "found")
+    )
+    found = jp.sensitivity(
+        jp.Scene.load("four-bar"), OVER, outputs, rows=16, seed=5, duration="20 ms", start_after="2 ms", threads=2
+    )
+    assert list(found.inputs) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
+    assert list(found.indices) == outputs and found.values.shape == (16 * 5, 3) and found.results.shape == (80, 3)
+    for own in told["outputs"]:
+        indices = found.indices[own["name"]]
+        for parameter in own["parameters"]:
+            assert same(indices.first[parameter["key"]], parameter["first_order"]), parameter
+            assert same(indices.total[parameter["key"]], parameter["total"]), parameter
+    table = found.to_pandas()
+    assert len(table) == 9 and table["total_high"].ge(table["total_low"]).all()
+
+
+def test_yields_are_those_of_the_program(program, tmp_path):
+    options = ["--duration", "20ms", "--runs", "40", "--seed", "2", "--sampling", "sobol", "--summary", "json", "--quiet"]
+    told = json.loads(
+        program(
+            "tolerance", "four-bar", *ASKED, "--limit", "tip-error=250um", "--limit", "peak-force=20N..120N", *options,
+            "--out", tmp_path / "found",
+        )
+    )
+    limits = {"tip-error": "250 um", "peak-force": (20.0, "120 N")}
+    found = jp.tolerance(
+        jp.Scene.load("four-bar"), OVER, limits, units=40, seed=2, sampling="sobol", duration="20 ms", threads=2
+    )
+    assert same(found.yield_, told["yield"]) and found.accepted.sum() == told["accepted"]
+    for own in told["outputs"]:
+        quality = found.qualities[own["name"]]
+        assert same(quality.yield_, own["yield"]) and quality.mean == own["mean"] and quality.cp == own.get("cp")
+        assert same(quality.percentiles[95], own["percentile_95"]) and same(quality.cpk, own["cpk"])
+    drivers = {driver["key"]: driver for driver in told["reject_drivers"]}
+    assert 0 < told["accepted"] < 40 and list(found.drivers) == ["joint.A.clearance", "joint.B.clearance", "contact.friction"]
+    for key, driver in found.drivers.items():
+        assert (driver.mean_shift, driver.distance, driver.p_value) == tuple(
+            drivers[key][name] for name in ("mean_shift", "distance", "p_value")
+        )
+
+
+def test_a_study_is_a_function_of_its_parameters():
+    scene = jp.Scene.load("four-bar")
+    study = jp.Study(scene, ["contact.clearance"], "A.normal:max", duration="5 ms")
+    assert study.inputs == {"contact.clearance": 1e-4} and study.outputs == {"A.normal:max": "N"}
+    results = study.run(np.array([[1e-4], [2e-4]]))
+    for clearance, (force,) in zip([1e-4, 2e-4], results):
+        run = scene.set(clearance=clearance).run("5 ms", warn=False)
+        assert force == run.statistics["joints"]["A"]["peak_normal"]
+    with pytest.raises(jp.OptionError, match="2 numbers are given for 1"):
+        study.run([[1e-4, 2e-4]])
+
+
+@pytest.mark.parametrize(
+    "work, said",
+    [
+        (lambda scene: jp.sensitivity(scene, {"contact.clearence": None}), "did you mean"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": "normal(1)"}), "contact.clearance"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": "-1mm..1mm"}), "allowed"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, "tip-eror"), "tip-error"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, rows=0), "rows = 0"),
+        (lambda scene: jp.sensitivity(scene, {}), "at least one"),
+        (lambda scene: jp.sensitivity(scene, ["contact.clearance"], start_after="1 ms"), "duration"),
+        (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": "5 kg"}), "upper limit of tip-error"),
+        (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": (2.0, 1.0)}), "higher upper one"),
+        (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"*.normal:max": 1.0}), "not for a pattern"),
+        (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": 1.0}, sampling="sobl"), "did you mean `sobol`"),
+    ],
+)
+def test_bad_studies_are_refused(work, said):
+    with pytest.raises(jp.JointplayError, match=said.replace("*", r"\*")):
+        work(jp.Scene.load("four-bar"))
