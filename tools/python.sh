@@ -20,5 +20,5 @@ python_test() {
     "$python_env/bin/maturin" build --quiet --locked --profile dev --features alike --manifest-path python/Cargo.toml --out "$wheels"
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
     # From elsewhere: the sources beside the tests are not the installed package.
-    "$python_env/bin/python" -P -m pytest --quiet python/tests "$@"
+    "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
 }

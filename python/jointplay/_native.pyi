@@ -1,6 +1,6 @@
 from collections.abc import Callable
 from os import PathLike
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ class State:
         """State hash, 16 hexadecimal digits."""
 
 class Simulation:
-    def __new__(cls, scene: Scene) -> Simulation: ...
+    def __new__(cls, scene: Scene) -> Self: ...
     def step(self, count: int = 1) -> None:
         """Takes `count` steps, each as long as the method chooses."""
     def run_until(self, time: float | str) -> None:
@@ -106,9 +106,7 @@ class Study:
     def outputs(self) -> list[tuple[str, str]]: ...
     @property
     def span(self) -> tuple[float, float]: ...
-    def run(
-        self, rows: list[list[float]], threads: int, progress: Callable[[float], object] | None = None
-    ) -> _Array: ...
+    def run(self, rows: list[list[float]], threads: int, progress: Callable[[float], object] | None = None) -> _Array: ...
     def indices(
         self, rows: int, seed: int, threads: int, progress: Callable[[float], object] | None = None
     ) -> dict[str, Any]: ...

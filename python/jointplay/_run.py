@@ -39,7 +39,7 @@ class Run:
         self.ledger: dict[str, float] | None = found["ledger"]
         """Energy exchanged, J, as in the summary of `jointplay run`; None where `solver.energy_ledger` is off."""
         self.statistics: dict[str, Any] = found["statistics"]
-        """Steps, evaluations, rejected steps; under `joints`, for each ball joint `peak_normal`, N, `peak_time`, s, and `impacts`."""
+        """Steps, evaluations and rejected steps; under `joints` the `peak_normal`, N, `peak_time`, s, and `impacts` of each."""
         self.impacts = table_of_impacts(*found["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 
@@ -111,7 +111,7 @@ def table_of_impacts(ball_joints: list[str], names: list[str], values: NDArray[n
     kinds: dict[str, Any] = {name: float for name in names}
     kinds.update({name: int for name in INTEGERS}, joint=joints.dtype, **{name: bool for name in FLAGS})
     table = np.zeros(values.shape[1], dtype=list(kinds.items()))
-    for name, column in zip(names, values):
+    for name, column in zip(names, values, strict=True):
         table[name] = joints[column.astype(int)] if name == "joint" else column
     return table
 

@@ -12,6 +12,8 @@ from . import _native
 from ._run import table_of_impacts
 
 if TYPE_CHECKING:
+    from typing import Self
+
     from ._scene import Quantity, Scene
 
 
@@ -44,7 +46,7 @@ class Simulation(_native.Simulation):
 
     scene: Scene
 
-    def __new__(cls, scene: Scene) -> Simulation:
+    def __new__(cls, scene: Scene) -> Self:
         self = super().__new__(cls, scene._native)
         self.scene = scene
         return self

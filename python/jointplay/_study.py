@@ -52,7 +52,8 @@ class Study:
         reduced to: `tip-error`, `tip-error-rms`, `peak-force`, `impacts`, `energy-lost`, or CHANNEL:STATISTIC. A run takes
         `duration`, s, and is observed from `start_after`, s, on; by default three periods of the drives, the first a transient.
         """
-        requested = list(over.items()) if isinstance(over, Mapping) else [(key, None) for key in over]
+        requested: list[tuple[str, str | None]] = []
+        requested += over.items() if isinstance(over, Mapping) else [(key, None) for key in over]
         names = output if isinstance(output, str) else ",".join(output)
         self._native = _native.Study(scene._native, requested, names, duration, start_after)
 
@@ -113,7 +114,7 @@ class Sensitivity:
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:
-    return list(zip(("", "_low", "_high"), estimate))
+    return list(zip(("", "_low", "_high"), estimate, strict=True))
 
 
 def sensitivity(
@@ -130,14 +131,14 @@ def sensitivity(
 ) -> Sensitivity:
     """First-order and total indices of uncertain parameters, as `jointplay sensitivity` computes them without a screening.
 
-    The design has `rows` rows of a Sobol sequence, rows (k + 2) runs for k parameters; a power of two is best. The other arguments
-    are those of `Study`.
+    The design has `rows` rows of a Sobol sequence, rows (k + 2) runs for k parameters; a power of two is best. The other
+    arguments are those of `Study`.
     """
     study = Study(scene, over, output, duration=duration, start_after=start_after)
     found = study._native.indices(rows, seed, threads or os.cpu_count() or 1, progress)
     return Sensitivity(
         inputs=study.inputs,
-        indices={name: _indices(study, own) for name, own in zip(study.outputs, found["indices"])},
+        indices={name: _indices(study, own) for name, own in zip(study.outputs, found["indices"], strict=True)},
         values=found["values"],
         results=found["results"],
     )
@@ -145,8 +146,10 @@ def sensitivity(
 
 def _indices(study: Study, own: dict[str, Any]) -> Indices | str:
     if "fault" in own:
-        return own["fault"]
-    by_key = {name: {key: Estimate(*one) for key, one in zip(study.inputs, own[name])} for name in ("first", "total")}
+        return str(own["fault"])
+    by_key = {
+        name: {key: Estimate(*one) for key, one in zip(study.inputs, own[name], strict=True)} for name in ("first", "total")
+    }
     return Indices(own["mean"], own["variance"], **by_key)
 
 
@@ -221,8 +224,8 @@ def tolerance(
     drivers = found["drivers"]
     return Tolerance(
         yield_=Estimate(*found["yield"]),
-        qualities={name: _quality(own) for name, own in zip(study.outputs, found["qualities"])},
-        drivers=None if drivers is None else {key: RejectDriver(*own) for key, own in zip(study.inputs, drivers)},
+        qualities={name: _quality(own) for name, own in zip(study.outputs, found["qualities"], strict=True)},
+        drivers=None if drivers is None else {key: RejectDriver(*own) for key, own in zip(study.inputs, drivers, strict=True)},
         accepted=np.array(found["accepted"]),
         values=found["values"],
         results=found["results"],

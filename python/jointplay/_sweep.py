@@ -79,7 +79,7 @@ class Sweep:
         }
         self._is_tried = False
         # Errors come here, not at the first use.
-        self._native
+        _ = self._native
 
     @cached_property
     def _native(self) -> _native.Sweep:

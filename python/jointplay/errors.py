@@ -53,7 +53,7 @@ class ChannelError(JointplayError, KeyError):
 class Stopped(JointplayError, RuntimeError):
     """A run that the divergence guard stopped.
 
-    Attributes: `time` of the last good state, s; `advice`, what to try, or None; from `Scene.run` also `run` with the rows so far.
+    Attributes: `time` of the last good state, s; `advice`, what to try, or None; `run` with the rows so far, of `Scene.run`.
     """
 
     time: float

@@ -118,7 +118,9 @@ impl PyStudy {
         };
         if span.from >= span.duration {
             let (end, from) = (span.duration, span.from);
-            return Err(wrong(&format!("duration = {end}, start_after = {from}: the outputs must begin before the end")));
+            return Err(wrong(&format!(
+                "duration = {end}, start_after = {from}: the outputs must begin before the end"
+            )));
         }
         Ok(Self { scene, inputs, outputs, span })
     }

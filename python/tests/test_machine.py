@@ -1,8 +1,9 @@
 """Machines built in code: the same as their scene files."""
 
-import jointplay as jp
 import numpy as np
 import pytest
+
+import jointplay as jp
 
 
 def chain(links, clearance):

@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 import distributed
+
 import jointplay as jp
 from jointplay import _native
 
@@ -16,7 +17,7 @@ FOLDER = Path(jp.__file__).parent
 
 
 def test_the_installed_package_is_tested():
-    assert FOLDER.parent.name == "site-packages" and ROOT not in FOLDER.parents or "target" in FOLDER.parts
+    assert FOLDER.parent.name == "site-packages"
     assert (FOLDER / "py.typed").exists()
     wheel = metadata.distribution("jointplay").read_text("WHEEL")
     assert re.search(r"^Tag: cp310-abi3-", wheel, re.MULTILINE), wheel
@@ -74,7 +75,7 @@ def test_the_example_for_clusters_runs(monkeypatch, tmp_path):
     block = blocks("cluster.md")[0]
     # As it is written, but on this machine and smaller.
     smaller = block.replace('"0.01mm..1mm:200"', '"0.01mm..1mm:3"').replace("periods=100, discard=40", "periods=3, discard=1")
-    assert smaller.count(":3\"") == 1 and "periods=3" in smaller
+    assert smaller.count(':3"') == 1 and "periods=3" in smaller
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
     ) as cluster:

@@ -6,9 +6,10 @@ import resource
 import threading
 import warnings
 
-import jointplay as jp
 import numpy as np
 import pytest
+
+import jointplay as jp
 
 SCENES = [("four-bar", {}), ("spcmm", {"contact.clearance": "0.5 mm"}), ("slider-crank-driven", {"solver.method": "radau5"})]
 
@@ -17,9 +18,7 @@ SCENES = [("four-bar", {}), ("spcmm", {"contact.clearance": "0.5 mm"}), ("slider
 def test_bits_are_those_of_the_program(name, changes, summary, tmp_path):
     files = [tmp_path / "rows.npz", tmp_path / "impacts.npz"]
     options = [f"--set={key}={value}" for key, value in changes.items()]
-    told = summary(
-        "run", name, *options, "--duration", "20ms", "--every", "0.1ms", "--out", files[0], "--impacts", files[1]
-    )
+    told = summary("run", name, *options, "--duration", "20ms", "--every", "0.1ms", "--out", files[0], "--impacts", files[1])
     run = jp.Scene.load(name).set(changes).run("20 ms", every="0.1 ms", warn=False)
     assert run.hash == told["state_hash"]
     rows = np.load(files[0])

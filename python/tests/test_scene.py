@@ -3,9 +3,10 @@
 import pickle
 import random
 
-import jointplay as jp
 import numpy as np
 import pytest
+
+import jointplay as jp
 
 
 def test_every_scene_of_the_program_loads(program):

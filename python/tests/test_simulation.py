@@ -5,9 +5,10 @@ import gc
 import resource
 import threading
 
-import jointplay as jp
 import numpy as np
 import pytest
+
+import jointplay as jp
 
 
 def test_the_end_of_a_run_is_that_of_the_program(summary):

@@ -1,10 +1,11 @@
-"""Studies of uncertain parameters: the numbers of `jointplay sensitivity` and `jointplay tolerance`, and other libraries on top."""
+"""Studies of uncertain parameters: the numbers of `jointplay sensitivity` and `jointplay tolerance`."""
 
 import json
 
-import jointplay as jp
 import numpy as np
 import pytest
+
+import jointplay as jp
 
 OVER = {"joint.*.clearance": "0.05mm..0.2mm", "contact.friction": "normal(0.15, 0.02, 0.05..0.25)"}
 ASKED = [f"--over={pattern}={text}" for pattern, text in OVER.items()]
@@ -39,14 +40,20 @@ def test_yields_are_those_of_the_program(program, tmp_path):
     options = ["--duration", "20ms", "--runs", "40", "--seed", "2", "--sampling", "sobol", "--summary", "json", "--quiet"]
     told = json.loads(
         program(
-            "tolerance", "four-bar", *ASKED, "--limit", "tip-error=250um", "--limit", "peak-force=20N..120N", *options,
-            "--out", tmp_path / "found",
+            "tolerance",
+            "four-bar",
+            *ASKED,
+            "--limit",
+            "tip-error=250um",
+            "--limit",
+            "peak-force=20N..120N",
+            *options,
+            "--out",
+            tmp_path / "found",
         )
     )
     limits = {"tip-error": "250 um", "peak-force": (20.0, "120 N")}
-    found = jp.tolerance(
-        jp.Scene.load("four-bar"), OVER, limits, units=40, seed=2, sampling="sobol", duration="20 ms", threads=2
-    )
+    found = jp.tolerance(jp.Scene.load("four-bar"), OVER, limits, units=40, seed=2, sampling="sobol", duration="20 ms", threads=2)
     assert same(found.yield_, told["yield"]) and found.accepted.sum() == told["accepted"]
     for own in told["outputs"]:
         quality = found.qualities[own["name"]]

@@ -9,9 +9,10 @@ import time
 
 import distributed
 import joblib
-import jointplay as jp
 import numpy as np
 import pytest
+
+import jointplay as jp
 
 CASES = [
     (
@@ -128,9 +129,7 @@ def test_dask_loses_no_point_with_a_worker(program, tmp_path):
     name, options, arguments = "pendulum", {"duration": "0.4 s"}, ["--duration", "0.4s"]
     vary = {"contact.clearance": "0.1mm..0.3mm:24"}
     sweep = jp.Sweep(jp.Scene.load(name), vary, **options)
-    cluster = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
-    )
+    cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path))
     with cluster, distributed.Client(cluster) as client:
         futures = client.map(sweep.compute, range(sweep.blocks), pure=False)
         # Half-way: a worker with finished blocks and one under way disappears.
