@@ -19,6 +19,6 @@ python_test() {
     rm -rf "$wheels"
     "$python_env/bin/maturin" build --quiet --locked --profile dev --features alike --manifest-path python/Cargo.toml --out "$wheels"
     "$python_env/bin/pip" install --quiet --disable-pip-version-check --no-deps --force-reinstall "$wheels"/*.whl
-    # From elsewhere: the sources beside the tests are not the installed package.
+    # Without the folder of the tests in the path: what is tested is the installed package.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
 }

@@ -14,6 +14,7 @@ from ._scene import Check, Parameter, Scene
 from ._simulation import Frame, Simulation
 from ._study import Estimate, Indices, Quality, RejectDriver, Sensitivity, Study, Tolerance, sensitivity, tolerance
 from ._sweep import Sweep, SweepResult, sweep
+from ._tradeoff import Tradeoff, tradeoff
 from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OptionError, SceneError, Stopped
 
 __all__ = [
@@ -39,7 +40,9 @@ __all__ = [
     "Sweep",
     "SweepResult",
     "Tolerance",
+    "Tradeoff",
     "sensitivity",
     "sweep",
     "tolerance",
+    "tradeoff",
 ]

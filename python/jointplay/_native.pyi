@@ -18,6 +18,10 @@ def run(
     progress: Callable[[float], object] | None = None,
 ) -> dict[str, Any]: ...
 
+def tradeoff(
+    scene: Scene, quick: bool, clock: Callable[[], float], progress: Callable[[float], object] | None = None
+) -> str: ...
+
 class Scene:
     @staticmethod
     def load(name: str | PathLike[str]) -> Scene: ...

@@ -14,6 +14,7 @@ mod scene;
 mod simulation;
 mod study;
 mod sweep;
+mod tradeoff;
 
 use pyo3::prelude::*;
 
@@ -30,4 +31,6 @@ mod _native {
     use super::study::PyStudy;
     #[pymodule_export]
     use super::sweep::PySweep;
+    #[pymodule_export]
+    use super::tradeoff::tradeoff;
 }

@@ -1,0 +1,50 @@
+//! Cost and error of every method on a scene, as `jointplay tradeoff` measures them.
+
+use std::ops::ControlFlow;
+
+use jointplay_analysis::{AnalysisError, RunContext, WorkBudget, work_precision};
+use pyo3::prelude::*;
+
+use crate::errors::{option_error, scene_error, stopped};
+use crate::interpreter::{detached, look};
+use crate::scene::PyScene;
+
+/// Runs every method on `scene` over its steps or tolerances; `clock` returns the processor time of this thread, s. Returns the
+/// points as JSON, as in `tradeoff.json`.
+#[pyfunction]
+#[pyo3(signature = (scene, quick, clock, progress=None))]
+pub fn tradeoff(
+    py: Python<'_>,
+    scene: &PyScene,
+    quick: bool,
+    clock: Py<PyAny>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<String> {
+    let scene = &*scene.scene;
+    let budget = if quick { WorkBudget::QUICK } else { WorkBudget::FULL };
+    let mut raised = None;
+    let found = detached(py, || {
+        let mut now = || Python::attach(|py| clock.call0(py)?.extract::<f64>(py)).unwrap_or(f64::NAN);
+        let mut report = |part: f64| {
+            let outcome = Python::attach(|py| look(py, progress.as_ref().map(|progress| progress.bind(py)), part));
+            match outcome {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(error) => {
+                    raised = Some(error);
+                    ControlFlow::Break(())
+                }
+            }
+        };
+        work_precision(scene, &budget, &mut RunContext::new(&mut now, &mut report))
+    })?;
+    if let Some(error) = raised {
+        return Err(error);
+    }
+    let found = found.map_err(|error| match error {
+        AnalysisError::Start(error) => scene_error(py, Some(scene), &scene.locate(&error)),
+        AnalysisError::Scene(error) => scene_error(py, Some(scene), &error),
+        AnalysisError::Stopped(error) => stopped(py, &error),
+        other => option_error(py, &other.to_string()),
+    })?;
+    serde_json::to_string(&found.points).map_err(|error| option_error(py, &error.to_string()))
+}
