@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use jointplay_analysis::indices::{Bootstrap, SaltelliDesign};
+use jointplay_analysis::lot::{Limit, Lot, PERCENTILES};
 use jointplay_analysis::sampling::{Sampler, Sampling};
 use jointplay_analysis::study::{Input, Output, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
-use jointplay_analysis::yields::{
-    Estimate, capability, mean_and_deviation, percentile, reject_drivers, yield_fraction,
-};
+use jointplay_analysis::yields::{Estimate, reject_drivers};
 use jointplay_physics::suggest::nearest;
 use jointplay_physics::words::Words;
 use jointplay_scene::Scene;
@@ -22,11 +21,6 @@ use crate::quantity::duration;
 use crate::report::constant;
 use crate::scene::PyScene;
 use crate::sweep::records;
-
-/// Probability of all confidence intervals.
-const CONFIDENCE: f64 = 0.95;
-/// Percentiles of each output.
-const PERCENTILES: [f64; 3] = [0.5, 0.95, 0.99];
 
 /// Uncertain parameters of a scene, and the numbers to which its runs are reduced.
 #[pyclass(frozen, name = "Study", module = "jointplay._native")]
@@ -223,52 +217,39 @@ impl PyStudy {
             if lower.is_none() && upper.is_none() || lower.zip(upper).is_some_and(|(lower, upper)| lower >= upper) {
                 return Err(wrong(&format!("limits of {}: give a lower one, or a higher upper one", output.name)));
             }
-            ends.push((lower, upper));
+            ends.push(Limit { lower, upper });
         }
-        let holds = |(lower, upper): &(Option<f64>, Option<f64>), value: f64| {
-            !value.is_nan() && lower.is_none_or(|lower| value >= lower) && upper.is_none_or(|upper| value <= upper)
-        };
         let sampler = Sampler::new(sampling, self.inputs.len(), units, seed);
         let sampler = sampler.map_err(|error| wrong(&format!("units = {units}: {error}")))?;
         let values = self.values((0..sampler.points()).filter_map(|index| sampler.point(index)));
-        let results = self.results(py, &values, threads, progress)?;
-        let accepted: Vec<bool> =
-            results.iter().map(|outputs| ends.iter().zip(outputs).all(|(ends, value)| holds(ends, *value))).collect();
-        let part = |accepted: &[bool]| {
-            let held = accepted.iter().filter(|accepted| **accepted).count();
-            yield_fraction(held, accepted.len(), CONFIDENCE).map(|part| triple(&part)).map_err(|error| wrong(&error))
-        };
+        let lot = Lot::new(self.results(py, &values, threads, progress)?, &ends).map_err(|error| wrong(&error))?;
         let mut qualities = Vec::new();
-        for (o, (lower, upper)) in ends.iter().enumerate() {
-            let held: Vec<bool> = results.iter().map(|outputs| holds(&(*lower, *upper), outputs[o])).collect();
-            let known: Vec<f64> = results.iter().map(|outputs| outputs[o]).filter(|value| value.is_finite()).collect();
-            let (mean, deviation) = mean_and_deviation(&known);
+        for (o, limit) in ends.iter().enumerate() {
+            let found = lot.quality(o, limit).map_err(|error| wrong(&error))?;
             let own = PyDict::new(py);
-            own.set_item("yield", part(&held)?)?;
-            own.set_item("mean", mean)?;
-            own.set_item("deviation", deviation)?;
-            for p in PERCENTILES {
-                let value = percentile(&known, p, CONFIDENCE).ok();
+            own.set_item("yield", triple(&found.yielded))?;
+            own.set_item("mean", found.mean)?;
+            own.set_item("deviation", found.deviation)?;
+            for (p, value) in PERCENTILES.iter().zip(&found.percentiles) {
                 own.set_item(format!("percentile_{:.0}", 100.0 * p), value.as_ref().map(triple))?;
             }
-            let capability = capability(&known, *lower, *upper, CONFIDENCE).ok();
-            own.set_item("cp", capability.as_ref().and_then(|capability| capability.cp))?;
-            own.set_item("cpk", capability.as_ref().map(|capability| triple(&capability.cpk)))?;
+            own.set_item("cp", found.capability.as_ref().and_then(|capability| capability.cp))?;
+            own.set_item("cpk", found.capability.as_ref().map(|capability| triple(&capability.cpk)))?;
             qualities.push(own);
         }
         let columns: Vec<Vec<f64>> =
             (0..self.inputs.len()).map(|i| values.iter().map(|row| row[i]).collect()).collect();
-        let drivers = reject_drivers(&columns, &accepted).map_err(|error| wrong(&error))?;
+        let drivers = reject_drivers(&columns, &lot.accepted).map_err(|error| wrong(&error))?;
         let drivers = drivers.map(|drivers| {
             drivers.iter().map(|driver| (driver.mean_shift, driver.distance, driver.p_value)).collect::<Vec<_>>()
         });
         let found = PyDict::new(py);
-        found.set_item("yield", part(&accepted)?)?;
-        found.set_item("accepted", &accepted)?;
+        found.set_item("yield", triple(&lot.yielded))?;
+        found.set_item("accepted", &lot.accepted)?;
         found.set_item("qualities", qualities)?;
         found.set_item("drivers", drivers)?;
         found.set_item("values", array(py, &values)?)?;
-        found.set_item("results", array(py, &results)?)?;
+        found.set_item("results", array(py, &lot.outputs)?)?;
         Ok(found)
     }
 }

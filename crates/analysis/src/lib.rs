@@ -54,6 +54,7 @@ pub mod impact_row;
 pub mod indices;
 pub mod iso286;
 pub mod layout;
+pub mod lot;
 mod many_joints;
 pub mod map;
 pub mod map_task;

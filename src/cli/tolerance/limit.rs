@@ -1,16 +1,10 @@
 //! Limits of outputs.
 
+use crate::analysis::lot::Limit;
 use crate::analysis::study::Output;
 use crate::cli::Failure;
 use crate::cli::study::{outputs, shown};
 use crate::scene::Scene;
-
-/// Limits of an output, SI; one of them at least.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Limit {
-    pub lower: Option<f64>,
-    pub upper: Option<f64>,
-}
 
 /// Reads the options `--limit OUTPUT=HIGH`, `OUTPUT=LOW..HIGH` or `OUTPUT=LOW..`; a pattern of channels limits each of them.
 ///
@@ -26,7 +20,7 @@ pub fn read(scene: &Scene, options: &[String]) -> Result<(Vec<Output>, Vec<Limit
             if all.iter().any(|known| known.name == output.name) {
                 return Err(wrong(&format!("{} has a limit already; LOW..HIGH gives both", output.name)));
             }
-            let limit = Limit::read(&output, range).map_err(|error| wrong(&error))?;
+            let limit = read_one(&output, range).map_err(|error| wrong(&error))?;
             all.push(output);
             limits.push(limit);
         }
@@ -34,36 +28,25 @@ pub fn read(scene: &Scene, options: &[String]) -> Result<(Vec<Output>, Vec<Limit
     Ok((all, limits))
 }
 
-impl Limit {
-    fn read(output: &Output, text: &str) -> Result<Self, String> {
-        let end = |text: &str| if text.trim().is_empty() { Ok(None) } else { output.read(text).map(Some) };
-        let (lower, upper) = match text.split_once("..") {
-            Some((lower, upper)) => (end(lower)?, end(upper)?),
-            None => (None, end(text)?),
-        };
-        match (lower, upper) {
-            (None, None) => Err("expected a value, or LOW..HIGH".to_owned()),
-            (Some(lower), Some(upper)) if lower >= upper => {
-                Err("the lower limit must be below the upper one".to_owned())
-            }
-            _ => Ok(Self { lower, upper }),
-        }
+fn read_one(output: &Output, text: &str) -> Result<Limit, String> {
+    let end = |text: &str| if text.trim().is_empty() { Ok(None) } else { output.read(text).map(Some) };
+    let (lower, upper) = match text.split_once("..") {
+        Some((lower, upper)) => (end(lower)?, end(upper)?),
+        None => (None, end(text)?),
+    };
+    match (lower, upper) {
+        (None, None) => Err("expected a value, or LOW..HIGH".to_owned()),
+        (Some(lower), Some(upper)) if lower >= upper => Err("the lower limit must be below the upper one".to_owned()),
+        _ => Ok(Limit { lower, upper }),
     }
+}
 
-    /// Whether `value` is within; NaN is not.
-    pub fn holds(&self, value: f64) -> bool {
-        !value.is_nan()
-            && self.lower.is_none_or(|lower| value >= lower)
-            && self.upper.is_none_or(|upper| value <= upper)
-    }
-
-    /// In words.
-    pub fn describe(&self, unit: &str) -> String {
-        let shown = |value| shown(value, unit);
-        match (self.lower, self.upper) {
-            (Some(lower), Some(upper)) => format!("from {} to {}", shown(lower), shown(upper)),
-            (Some(lower), None) => format!("at least {}", shown(lower)),
-            (None, upper) => format!("at most {}", shown(upper.unwrap_or(f64::NAN))),
-        }
+/// A limit in words.
+pub fn describe(limit: &Limit, unit: &str) -> String {
+    let shown = |value| shown(value, unit);
+    match (limit.lower, limit.upper) {
+        (Some(lower), Some(upper)) => format!("from {} to {}", shown(lower), shown(upper)),
+        (Some(lower), None) => format!("at least {}", shown(lower)),
+        (None, upper) => format!("at most {}", shown(upper.unwrap_or(f64::NAN))),
     }
 }

@@ -11,42 +11,12 @@ use super::study::{Study, inputs};
 use super::{Failure, load, print};
 use crate::analysis::distribution::Distribution;
 use crate::analysis::fits::{FitSearch, FitSearchError, RequiredYield, cheapest_fits};
+use crate::analysis::lot::{Limit, Lot, Quality};
 use crate::analysis::sampling::{Sampler, Sampling};
-use crate::analysis::yields::{
-    Capability, Estimate, RejectDriver, YieldsError, capability, mean_and_deviation, percentile, reject_drivers,
-    yield_fraction,
-};
+use crate::analysis::yields::{Estimate, RejectDriver, YieldsError, reject_drivers};
 use crate::files::Folder;
 
 use self::candidates::Candidates;
-use self::limit::Limit;
-
-/// Probability of all confidence intervals.
-const CONFIDENCE: f64 = 0.95;
-/// Percentiles of each output.
-const PERCENTILES: [f64; 3] = [0.5, 0.95, 0.99];
-
-/// Units made alike: a run of each.
-struct Lot {
-    /// Values of the limited outputs of each unit, SI; NaN without a result.
-    outputs: Vec<Vec<f64>>,
-    /// Whether each unit holds all limits.
-    accepted: Vec<bool>,
-    yielded: Estimate,
-}
-
-/// Statistics of a limited output.
-struct Quality {
-    /// Part of all units that holds this limit.
-    yielded: Estimate,
-    /// Mean and standard deviation of the units with a result.
-    mean: f64,
-    deviation: f64,
-    /// For each of [`PERCENTILES`]; `None` without results.
-    percentiles: Vec<Option<Estimate>>,
-    /// `None` without a spread.
-    capability: Option<Capability>,
-}
 
 /// The cheapest fits.
 struct Cheapest {
@@ -101,7 +71,7 @@ fn find(
     let own: Vec<Distribution> = study.inputs().iter().map(|input| input.distribution.clone()).collect();
     let lot = lot(study, limits, "lot", &sample, &own)?;
     let statistics = |error: YieldsError| Failure::usage(error.to_string());
-    let qualities = limits.iter().enumerate().map(|(o, limit)| quality(&lot, o, limit)).collect::<Result<_, _>>();
+    let qualities = limits.iter().enumerate().map(|(o, limit)| lot.quality(o, limit)).collect::<Result<_, _>>();
     let qualities = qualities.map_err(statistics)?;
     let of_input =
         |(i, distribution): (usize, &Distribution)| sample.iter().map(|u| distribution.quantile(u[i])).collect();
@@ -136,27 +106,7 @@ fn lot(
 ) -> Result<Lot, Failure> {
     let unit = |u: &Vec<f64>| distributions.iter().zip(u).map(|(distribution, &u)| distribution.quantile(u)).collect();
     let outputs = study.run(stage, sample.iter().map(unit).collect())?;
-    let holds_all = |outputs: &Vec<f64>| limits.iter().zip(outputs).all(|(limit, &value)| limit.holds(value));
-    let accepted: Vec<bool> = outputs.iter().map(holds_all).collect();
-    let yielded = part(&accepted).map_err(|error| Failure::usage(error.to_string()))?;
-    Ok(Lot { outputs, accepted, yielded })
-}
-
-fn part(accepted: &[bool]) -> Result<Estimate, YieldsError> {
-    yield_fraction(accepted.iter().filter(|accepted| **accepted).count(), accepted.len(), CONFIDENCE)
-}
-
-fn quality(lot: &Lot, o: usize, limit: &Limit) -> Result<Quality, YieldsError> {
-    let held: Vec<bool> = lot.outputs.iter().map(|outputs| limit.holds(outputs[o])).collect();
-    let values: Vec<f64> = lot.outputs.iter().map(|outputs| outputs[o]).filter(|value| value.is_finite()).collect();
-    let (mean, deviation) = mean_and_deviation(&values);
-    Ok(Quality {
-        yielded: part(&held)?,
-        mean,
-        deviation,
-        percentiles: PERCENTILES.iter().map(|&p| percentile(&values, p, CONFIDENCE).ok()).collect(),
-        capability: capability(&values, limit.lower, limit.upper, CONFIDENCE).ok(),
-    })
+    Lot::new(outputs, limits).map_err(|error| Failure::usage(error.to_string()))
 }
 
 /// Searches the cheapest choice of candidates on the units of `sample`, and runs other units with it.

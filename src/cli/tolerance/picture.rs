@@ -1,7 +1,6 @@
 //! Distribution function of each limited output, with its limits.
 
-use super::Lot;
-use super::limit::Limit;
+use crate::analysis::lot::{Limit, Lot};
 use crate::chart::{Axis, Chart, PALETTE, Series, Sheet};
 use crate::cli::study::{Study, drawn};
 

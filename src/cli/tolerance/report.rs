@@ -2,8 +2,9 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::limit::Limit;
-use super::{Cheapest, Found, PERCENTILES, Quality};
+use super::limit::describe;
+use super::{Cheapest, Found};
+use crate::analysis::lot::{Limit, PERCENTILES, Quality};
 use crate::analysis::study::Output;
 use crate::analysis::yields::{Estimate, RejectDriver};
 use crate::cli::args::ToleranceArguments;
@@ -88,7 +89,7 @@ pub fn text(study: &Study, limits: &[Limit], found: &Found, arguments: &Toleranc
         text += &format!(
             "\n{} {}: {} of the lot\n",
             output.name,
-            limit.describe(output.unit),
+            describe(limit, output.unit),
             with_interval(&quality.yielded)
         );
         let rows = statistics(output, quality).into_iter().map(|(name, _, unit, value)| {
