@@ -17,10 +17,7 @@ def run(
     channels: list[str] = ...,
     progress: Callable[[float], object] | None = None,
 ) -> dict[str, Any]: ...
-
-def tradeoff(
-    scene: Scene, quick: bool, clock: Callable[[], float], progress: Callable[[float], object] | None = None
-) -> str: ...
+def tradeoff(scene: Scene, quick: bool, clock: Callable[[], float], progress: Callable[[float], object] | None = None) -> str: ...
 
 class Scene:
     @staticmethod

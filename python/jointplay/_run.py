@@ -43,6 +43,11 @@ class Run:
         self.impacts = table_of_impacts(*found["impacts"])
         """One row per finished impact: the columns of `jointplay run --impacts`, with the names of the joints."""
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        # NumPy forgets it.
+        self._values.flags.writeable = False
+
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of each row, s."""

@@ -2,6 +2,7 @@
 
 import _thread
 import gc
+import pickle
 import threading
 import warnings
 
@@ -51,6 +52,13 @@ def test_arrays_share_the_memory_of_the_run_and_outlive_it():
     gc.collect()
     ballast = [np.ones(1000) for _ in range(1000)]
     assert np.array_equal(normal, copy) and len(ballast) == 1000
+
+
+def test_a_run_survives_pickling():
+    run = jp.Scene.load("four-bar").run("2 ms", every="1 ms")
+    again = pickle.loads(pickle.dumps(run))
+    assert (again.hash, again.scene, again.channels) == (run.hash, run.scene, run.channels)
+    assert again["A.force"].tobytes() == run["A.force"].tobytes() and not again["A.force"].flags.writeable
 
 
 def test_rows_lie_where_they_were_asked_for():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jointplay as jp
+from jointplay._link import link_of
 
 
 def test_every_scene_of_the_program_loads(program):
@@ -137,6 +138,12 @@ def test_a_scene_shows_its_parameters_or_the_page(monkeypatch):
     assert "<td>0.5 mm</td>" in scene._repr_html_()
     monkeypatch.setenv("JOINTPLAY_PAGE", "https://example.org/lab/")
     assert 'src="https://example.org/lab/#scene=four-bar&amp;contact.clearance=0.5+mm&amp;embed=controls"' in scene._repr_html_()
+
+
+def test_a_link_opens_the_same_scene_in_the_program(falling, summary):
+    for scene in [jp.Scene.load("four-bar").set(clearance="0.5 mm"), jp.Scene.from_toml(falling).set(friction=0.3)]:
+        told = summary("run", "--link", f"?{link_of(scene)}", "--duration", "5ms")
+        assert told["state_hash"] == scene.run("5 ms").hash
 
 
 def test_whatever_the_text_the_errors_are_those_of_the_package(falling):
