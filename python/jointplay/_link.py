@@ -18,8 +18,11 @@ LONGEST = 32_000
 """Longest link that the page accepts, in characters."""
 
 
-def link_of(scene: Scene) -> str | None:
-    """Pairs of a link that opens `scene`; None for one that no link can hold: it needs further files, or is too long."""
+def link_of(scene: Scene, time: float | None = None) -> str | None:
+    """Pairs of a link that opens `scene`, and runs it to `time`, s.
+
+    None for a scene that no link can hold: it needs further files, or is too long.
+    """
     text, _, beside, changes = scene._native.origin()
     pairs: dict[str, str] = {}
     known = [name for names in _native.scenes() for name in names]
@@ -32,6 +35,8 @@ def link_of(scene: Scene) -> str | None:
         packed = packer.compress(text.encode()) + packer.flush()
         pairs["text"] = base64.urlsafe_b64encode(packed).decode().rstrip("=")
     pairs.update(changes)
+    if time is not None:
+        pairs["t"] = f"{time!r}s"
     link = urlencode(pairs)
     return link if len(link) <= LONGEST else None
 
@@ -41,10 +46,10 @@ def text_of_built_in(name: str) -> str:
     return _native.Scene.load(name).origin()[0]
 
 
-def frame_of(scene: Scene) -> str | None:
-    """HTML of a frame with the page that shows `scene`, if the environment variable JOINTPLAY_PAGE names the page."""
+def frame_of(scene: Scene, time: float | None = None) -> str | None:
+    """HTML of a frame with the page that shows `scene` at `time`, if the environment variable JOINTPLAY_PAGE names the page."""
     page = os.environ.get("JOINTPLAY_PAGE")
-    link = link_of(scene) if page else None
+    link = link_of(scene, time) if page else None
     if not page or link is None:
         return None
     address = html.escape(f"{page}#{link}&embed=controls", quote=True)

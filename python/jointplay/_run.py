@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._link import frame_of
 from .errors import ChannelError, DoubtWarning, Stopped
 
 if TYPE_CHECKING:
@@ -104,6 +106,9 @@ class Run:
 
     def __repr__(self) -> str:
         return f"<jointplay.Run {self.scene.name}: {self._rows} rows, {len(self._channels)} channels, to {self.end:g} s>"
+
+    def _repr_html_(self) -> str:
+        return frame_of(self.scene, self.end) or html.escape(repr(self))
 
 
 INTEGERS = ("steps",)

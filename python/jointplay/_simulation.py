@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from ._link import frame_of
 from ._run import table_of_impacts
 
 if TYPE_CHECKING:
@@ -45,10 +47,12 @@ class Simulation(_native.Simulation):
     """A running simulation. Two simulations step in two threads at the same time; one belongs to one thread at a time."""
 
     scene: Scene
+    """The scene as it was given."""
 
     def __new__(cls, scene: Scene) -> Self:
         self = super().__new__(cls, scene._native)
         self.scene = scene
+        self._is_plain = True
         return self
 
     def set(self, key: str, value: Quantity) -> str:
@@ -56,19 +60,32 @@ class Simulation(_native.Simulation):
 
         Returns "now" if it takes effect from the next step on, or "at reset".
         """
-        return self.change(key, value)
+        effect = self._change(key, value)
+        self._is_plain = False
+        return effect
+
+    def restore(self, state: _native.State) -> None:
+        """Returns to a state of a simulation of the same scene."""
+        super().restore(state)
+        # The state may have had changes.
+        self._is_plain = False
 
     def frame(self) -> Frame:
         """Everything about this instant."""
-        return Frame(**self.instant())
+        return Frame(**self._instant())
 
     def __getitem__(self, channel: str) -> float:
         """Value of a channel at this instant, SI."""
-        return self.read(channel)
+        return self._read(channel)
 
     def take_impacts(self) -> NDArray[Any]:
         """One row per impact that finished since the last call, as `Run.impacts`; only the latest 64 are sure to be there."""
-        return table_of_impacts(*self.finished_impacts())
+        return table_of_impacts(*self._take_impacts())
+
+    def _repr_html_(self) -> str:
+        # A link says nothing about changes during the run.
+        frame = frame_of(self.scene, self.time) if self._is_plain else None
+        return frame or html.escape(repr(self))
 
     def __repr__(self) -> str:
         return f"<jointplay.Simulation {self.scene.name} at {self.time:g} s>"

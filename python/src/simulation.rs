@@ -160,6 +160,7 @@ impl PySimulation {
     }
 
     /// Changes a parameter; returns whether it takes effect `now` or `at reset`.
+    #[pyo3(name = "_change")]
     fn change(&mut self, py: Python<'_>, key: &str, value: &Bound<'_, PyAny>) -> PyResult<&'static str> {
         let pending = self.live.pending().clone();
         let parameter = pending.parameter(key).map_err(|error| scene_error(py, Some(&pending), &error))?;
@@ -189,6 +190,7 @@ impl PySimulation {
     }
 
     /// Value of a channel now, SI; NaN if it has none.
+    #[pyo3(name = "_read")]
     fn read(&mut self, py: Python<'_>, channel: &str) -> PyResult<f64> {
         let Some(&place) = self.layout.places.get(channel) else {
             let known = matching(&self.layout.channels, channel);
@@ -206,6 +208,7 @@ impl PySimulation {
     }
 
     /// Everything about this instant.
+    #[pyo3(name = "_instant")]
     fn instant<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.sample();
         let frame = &self.frame;
@@ -232,7 +235,8 @@ impl PySimulation {
     }
 
     /// The finished impacts that were not taken before.
-    fn finished_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<report::Impacts<'py>> {
+    #[pyo3(name = "_take_impacts")]
+    fn take_impacts<'py>(&mut self, py: Python<'py>) -> PyResult<report::Impacts<'py>> {
         let mut impacts = Vec::new();
         self.live.take_impacts(&mut impacts);
         report::impacts(py, &self.live, &impacts)

@@ -144,6 +144,21 @@ def test_a_link_opens_the_same_scene_in_the_program(falling, summary):
     for scene in [jp.Scene.load("four-bar").set(clearance="0.5 mm"), jp.Scene.from_toml(falling).set(friction=0.3)]:
         told = summary("run", "--link", f"?{link_of(scene)}", "--duration", "5ms")
         assert told["state_hash"] == scene.run("5 ms").hash
+        told = summary("run", "--link", f"?{link_of(scene, 0.005)}")
+        assert told["time_s"] >= 0.005
+
+
+def test_runs_and_simulations_show_the_page_at_their_end(monkeypatch):
+    scene = jp.Scene.load("four-bar")
+    run, simulation = scene.run("2 ms"), jp.Simulation(scene)
+    simulation.run_until("1 ms")
+    monkeypatch.delenv("JOINTPLAY_PAGE", raising=False)
+    assert "iframe" not in run._repr_html_() + simulation._repr_html_()
+    monkeypatch.setenv("JOINTPLAY_PAGE", "https://example.org/")
+    assert "#scene=four-bar&amp;t=0.002s&amp;" in run._repr_html_()
+    assert "#scene=four-bar&amp;t=0.001s&amp;" in simulation._repr_html_()
+    simulation.set("contact.friction", 0.3)
+    assert "iframe" not in simulation._repr_html_()
 
 
 def test_whatever_the_text_the_errors_are_those_of_the_package(falling):
