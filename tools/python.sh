@@ -22,3 +22,14 @@ python_test() {
     # Without the folder of the tests in the path: what is tested is the installed package.
     "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests "$@"
 }
+
+# The same with graphics, for the pictures alone. Built beside the examples, whose libraries it shares.
+python_pictures_test() {
+    local site=$python_env/pictures
+    cargo build --quiet --locked --workspace "${sound[@]}" --features jointplay-python/render --lib --examples
+    rm -rf "$site"
+    mkdir -p "$site"
+    cp -r python/jointplay "$site"
+    cp "${CARGO_TARGET_DIR:-target}/debug/libjointplay_python.so" "$site/jointplay/_native.abi3.so"
+    PYTHONPATH=$site "$python_env/bin/python" -P -B -m pytest --quiet -p no:cacheprovider python/tests/test_render.py
+}

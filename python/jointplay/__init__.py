@@ -9,6 +9,7 @@ Quantities are floats in SI units, or text with a unit ("0.5 mm"). The same scen
 program `jointplay`: compare `Run.hash` with the state hash that `jointplay run` prints.
 """
 
+from ._render import render
 from ._run import Run
 from ._scene import Check, Parameter, Scene
 from ._simulation import Frame, Simulation
@@ -41,6 +42,7 @@ __all__ = [
     "SweepResult",
     "Tolerance",
     "Tradeoff",
+    "render",
     "sensitivity",
     "sweep",
     "tolerance",

@@ -8,6 +8,8 @@ mod errors;
 mod interpreter;
 mod machine;
 mod quantity;
+#[cfg(feature = "render")]
+mod render;
 mod report;
 mod run;
 mod scene;
@@ -21,6 +23,9 @@ use pyo3::prelude::*;
 /// The parts of `jointplay` that are written in Rust.
 #[pymodule]
 mod _native {
+    #[cfg(feature = "render")]
+    #[pymodule_export]
+    use super::render::render;
     #[pymodule_export]
     use super::run::run;
     #[pymodule_export]

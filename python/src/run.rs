@@ -104,14 +104,13 @@ pub fn run<'py>(
     let positive = || option_error(py, "every = 0: the interval between rows must be greater than 0");
     let times = RowTimes::new(duration, every).ok_or_else(positive)?;
     let mut live = scene.start(py)?;
-    let all = detached(py, || channels_at_start(&mut live))?;
+    let (all, mut frame) = detached(py, || channels_at_start(&mut live))?;
     let chosen = chosen(py, all, &channels)?;
     let capacity = usize::try_from(times.last()).unwrap_or(usize::MAX).saturating_add(1);
     let values = allocate(capacity, chosen.len())?;
     if live.load_peaks().is_none() {
         live.keep_load_peaks();
     }
-    let mut frame = Frame::default();
     chosen.iter().for_each(|channel| channel.reading().ask(&mut frame));
     let mut run =
         Recorder { live, duration, times, channels: chosen, frame, values, capacity, rows: 0, impacts: Vec::new() };

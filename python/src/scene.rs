@@ -48,11 +48,11 @@ impl PyScene {
     }
 }
 
-/// The channels of a simulation that has just started.
-pub fn channels_at_start(simulation: &mut Simulation) -> Vec<Listed> {
+/// The channels of a simulation that has just started, and its first instant.
+pub fn channels_at_start(simulation: &mut Simulation) -> (Vec<Listed>, Frame) {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
-    channels_of(simulation.machine(), &frame)
+    (channels_of(simulation.machine(), &frame), frame)
 }
 
 #[pymethods]
@@ -198,7 +198,7 @@ impl PyScene {
     /// Its channels: name, column, unit, description, and whether a run records it if none are named.
     fn channels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let mut live = self.start(py)?;
-        let rows = detached(py, || channels_at_start(&mut live))?;
+        let (rows, _) = detached(py, || channels_at_start(&mut live))?;
         PyList::new(py, rows.into_iter().map(|c| (c.name, c.column, c.unit, c.help, c.unasked)))
     }
 

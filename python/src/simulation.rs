@@ -22,16 +22,19 @@ struct Layout {
     channels: Vec<Listed>,
     /// Index of each channel by name and by column.
     places: HashMap<String, usize>,
+    /// The first instant.
+    #[cfg_attr(not(feature = "render"), expect(dead_code, reason = "pictures are composed around it"))]
+    start: Frame,
 }
 
 impl Layout {
     /// The channels of a simulation that has just started.
     fn of(live: &mut LiveScene) -> Self {
-        let channels = channels_at_start(live);
+        let (channels, start) = channels_at_start(live);
         let names = channels.iter().map(|channel| &channel.name);
         let both = channels.iter().map(|channel| &channel.column).zip(0..).chain(names.zip(0..));
         let places = both.map(|(name, place)| (name.clone(), place)).collect();
-        Self { places, channels }
+        Self { places, channels, start }
     }
 }
 
@@ -92,6 +95,13 @@ impl PySimulation {
             }
             py.check_signals()?;
         }
+    }
+
+    /// The scene in effect, its first instant, and this one.
+    #[cfg(feature = "render")]
+    pub fn now(&mut self) -> (&Scene, [&Frame; 2]) {
+        self.sample();
+        (self.live.running(), [&self.layout.start, &self.frame])
     }
 
     /// Samples this instant with all channels.
