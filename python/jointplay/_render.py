@@ -18,8 +18,8 @@ ABSENT = "this jointplay was built without graphics: pip install ./python --conf
 def render(simulation: Simulation, size: tuple[int, int] = (960, 540)) -> NDArray[np.uint8]:
     """The machine of `simulation` now, as `jointplay render --hide trail,peaks` draws it.
 
-    The array has the shape (height, width, 4): red, green, blue, opacity. `size` is width and height in pixels. Needs a wheel that
-    was built with graphics, and a graphics adapter, which may be a software driver.
+    The array has the shape (height, width, 4): red, green, blue, opacity. `size` is width and height in pixels. Needs a wheel
+    that was built with graphics, and a graphics adapter, which may be a software driver.
     """
     draw = getattr(_native, "render", None)
     if draw is None:
