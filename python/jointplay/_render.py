@@ -12,7 +12,10 @@ from . import _native
 if TYPE_CHECKING:
     from ._simulation import Simulation
 
-ABSENT = "this jointplay was built without graphics: pip install ./python --config-settings=build-args='--features render'"
+ABSENT = (
+    "this jointplay was built without graphics: "
+    "pip install ./python --config-settings=maturin.build-args='--features render' builds one that draws"
+)
 
 
 def render(simulation: Simulation, size: tuple[int, int] = (960, 540)) -> NDArray[np.uint8]:
