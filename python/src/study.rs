@@ -45,7 +45,8 @@ impl PyStudy {
         threads: usize,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Vec<Vec<f64>>> {
-        let runs = StudyRuns::new(&self.scene, &self.inputs, &self.outputs, self.span, rows);
+        let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
+        let runs = StudyRuns::new(&self.scene, &keys, &self.outputs, self.span, rows);
         let runs = runs.map_err(|error| option_error(py, &error.to_string()))?;
         let records = records(py, runs.sweep(), threads, progress)?;
         let length = runs.sweep().layout().record_length();
