@@ -24,13 +24,20 @@ const laboratory = { page: null, mirror: null, code: null, backend: null, ready:
 globalThis.jointplay = laboratory;
 
 const LEFT_OUT = {
-    wasm: 'This browser cannot run WebAssembly, which the laboratory is compiled to.',
+    wasm:
+        'This browser cannot run WebAssembly with vectors, which the laboratory is compiled to. Firefox from 89, Chrome and Edge ' +
+        'from 91 and Safari from 16.4 can.',
     graphics:
         'The laboratory draws with WebGPU or WebGL2, and this browser offers neither. They may be switched off in its ' +
         'settings, or the graphics driver is not supported. A current Firefox, Chrome, Edge or Safari has at least WebGL2.',
     webgpu: 'The address asks for WebGPU, which this browser does not offer.',
     webgl: 'The address asks for WebGL2, which this browser does not offer.',
 };
+
+/** The smallest module with an instruction on vectors. */
+const WITH_VECTORS = Uint8Array.of(
+    ...[0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11],
+);
 
 /** The way to draw that the address asks for, if any. */
 const asked = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
@@ -348,7 +355,7 @@ function load() {
 }
 
 async function main() {
-    if (typeof WebAssembly !== 'object') return showTrouble('Something is missing', LEFT_OUT.wasm);
+    if (typeof WebAssembly !== 'object' || !WebAssembly.validate(WITH_VECTORS)) return showTrouble('Something is missing', LEFT_OUT.wasm);
     $('loading').hidden = false;
     stage('Loading', 0);
     const { framed, inSight, Messages, stayPolite } = await import(`./guest.js${build}`);

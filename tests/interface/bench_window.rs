@@ -603,8 +603,12 @@ fn a_map_of_the_tip_error_is_drawn_while_its_panel_is_open() {
     harness.get_by_label("No map yet");
     click(&mut harness, Role::Button, "Map tip error");
     harness.run();
-    harness.get_by_label("5 points");
+    harness.get_by_label("24 points");
     let with = view(&mut harness);
+    if let Some(keep) = std::env::var_os("KEEP_PICTURES") {
+        let path = std::path::Path::new(&keep).join("map.png");
+        harness.render().unwrap().save(path).unwrap();
+    }
     let arrows = differing(&without, &with);
     assert!(arrows > 200, "{arrows}");
     harness.get_by_role_and_label(Role::Slider, "Scale of the arrows").set_value_accesskit(1.0);

@@ -10,7 +10,7 @@ use crate::app::host::{Host, Running};
 use crate::app::layout::reserved;
 use crate::app::player::Player;
 use crate::app::{theme, value};
-use crate::machine::{Machine, Vec3};
+use crate::machine::{Drive, Machine, Vec3};
 use crate::mechanism::drive_positions;
 use crate::units::format_quantity_digits;
 use crate::view::{Cloud, to_f32};
@@ -69,13 +69,19 @@ impl Which {
     }
 }
 
-/// Axes around the positions of the first drives at t = 0, one per line.
-fn around_start(machine: &Machine) -> String {
-    let drives = machine.driven().zip(drive_positions(machine));
-    let axes = drives.take(MOST_DRIVES).map(|((joint, freedom), at)| {
-        let (unit, reach) = if freedom.turns() { ("deg", 10_f64.to_radians()) } else { ("mm", 0.01) };
-        let [from, to] = [at - reach, at + reach].map(|end| format_quantity_digits(end, unit, 4));
-        format!("{}.{}={from}..{to}:5", joint.name, freedom.word())
+/// Axes of the first drives, one per line: around their positions at t = 0, or a whole turn where a crank that goes round is alone.
+fn at_first(machine: &Machine) -> String {
+    let driven = || machine.joints.iter().flat_map(|joint| joint.drives().map(move |drive| (joint, drive)));
+    let alone = driven().nth(1).is_none();
+    let axes = driven().zip(drive_positions(machine)).take(MOST_DRIVES).map(|((joint, (freedom, drive)), at)| {
+        let round = alone && matches!(drive, Drive::Constant { velocity, .. } if *velocity != 0.0);
+        let (unit, ends, count) = match (freedom.turns(), round) {
+            (true, true) => ("deg", [0.0, 345.0_f64.to_radians()], 24),
+            (true, false) => ("deg", [-1.0, 1.0].map(|side: f64| side * 10.0_f64.to_radians()), 5),
+            (false, _) => ("mm", [-0.01, 0.01], 5),
+        };
+        let [from, to] = ends.map(|end| format_quantity_digits(at + end, unit, 4));
+        format!("{}.{}={from}..{to}:{count}", joint.name, freedom.word())
     });
     axes.collect::<Vec<_>>().join("\n")
 }
@@ -182,7 +188,7 @@ impl MapPanel {
         self.shown = true;
         let scene = player.pending();
         if self.scene != scene.name {
-            (self.scene, self.over) = (scene.name.clone(), around_start(&scene.machine));
+            (self.scene, self.over) = (scene.name.clone(), at_first(&scene.machine));
         }
         ui.label("Over").on_hover_text(
             "One axis per line, all combined: a driven coordinate at which the drive is held, such as \
@@ -376,11 +382,13 @@ mod tests {
     }
 
     #[test]
-    fn axes_at_first_are_around_the_start() {
+    fn axes_at_first_are_positions_of_the_first_drives() {
         let scene = Scene::load("hexapod", &[]).expect("built in");
-        let over: Vec<String> = around_start(&scene.machine).lines().map(str::to_owned).collect();
+        let over: Vec<String> = at_first(&scene.machine).lines().map(str::to_owned).collect();
         assert_eq!(over.len(), MOST_DRIVES);
         let map = WorkspaceMap::new(scene, &over, 2).expect("it reads them");
         assert!(map.point(0).is_ok() && map.point(62).is_ok());
+        let crank = Scene::load("four-bar", &[]).expect("built in");
+        assert!(at_first(&crank.machine).ends_with("deg:24"), "{}", at_first(&crank.machine));
     }
 }
