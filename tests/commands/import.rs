@@ -256,3 +256,154 @@ fn a_description_that_would_be_another_machine_is_refused_with_its_line() {
     let missing = jointplay(folder().path(), "import nothing.urdf").expect(1).stderr;
     assert!(missing.contains("nothing.urdf: cannot read this file"), "{missing}");
 }
+
+/// Angular acceleration about z, rad/s^2, of the first body of a file without gravity, and its inertia about z.
+fn turning(settings: &str, inside: &str) -> (f64, f64) {
+    let flag = "<option><flag gravity=\"disable\"/></option>";
+    let (scene, _) = imported(&mujoco(inside).replace("<worldbody>", &format!("{settings}{flag}<worldbody>")));
+    (start(&scene).bodies[0].angular_acceleration.z, scene.machine.bodies[0].inertia.m33)
+}
+
+#[test]
+fn an_orientation_supersedes_every_other_way_to_say_one_in_a_class() {
+    let inertia = |defaults: &str, own: &str| {
+        let body = format!("<body><joint/><geom type=\"box\" size=\"0.1 0.2 0.3\" {own}/></body>");
+        let text = mujoco(&body).replace("<worldbody>", &format!("<default>{defaults}</default><worldbody>"));
+        imported(&text).0.machine.bodies[0].inertia
+    };
+    let expected = inertia("", "euler=\"20 30 40\"");
+    let inner = "<geom quat=\"0.9 0.1 0.2 0.3\"/><default class=\"turned\"><geom euler=\"20 30 40\"/></default>";
+    for (defaults, own) in [
+        ("<geom quat=\"0.9 0.1 0.2 0.3\"/>", "euler=\"20 30 40\""),
+        ("<geom axisangle=\"1 0 0 50\" quat=\"0.9 0.1 0.2 0.3\"/>", "euler=\"20 30 40\""),
+        (inner, "class=\"turned\""),
+    ] {
+        let found = inertia(defaults, own);
+        assert!((found - expected).amax() < 1e-14 * expected.amax(), "{defaults} {own}: {found}");
+    }
+    assert!((inertia(inner, "") - expected).amax() > 0.1 * expected.amax());
+}
+
+#[test]
+fn a_loop_closes_at_sites_and_on_parts_without_joints() {
+    let text = |connect: &str| {
+        mujoco(
+            "<site name=\"ground\" pos=\"0.5 0 0\"/><body name=\"base\" pos=\"0.1 0 0\" euler=\"0 0 90\"/>
+            <body name=\"crank\" euler=\"0 10 0\"><joint axis=\"0 1 0\"/><geom size=\"0.1\"/>
+                <body name=\"rod\" pos=\"0 0 0.2\"><joint axis=\"0 1 0\"/><geom size=\"0.1\"/>
+                    <body name=\"eye\" pos=\"0.3 0 0.1\" euler=\"0 90 0\"><site name=\"end\" pos=\"0.2 0 0\"/></body></body></body>",
+        )
+        .replace("</mujoco>", &format!("<equality><connect name=\"c\" {connect}/></equality></mujoco>"))
+    };
+    // The x axis of the eye is -z of the rod.
+    let point = jointplay::machine::Vec3::new(0.3, 0.0, -0.1);
+    let (scene, said) = imported(&text("site1=\"end\" site2=\"ground\""));
+    let ball = &scene.machine.ball_joints[0];
+    assert_eq!(said.matches("<site>").count(), 0, "{said}");
+    let places = |ball: &jointplay::machine::BallJoint| [ball.socket.point, ball.ball.point];
+    assert!((places(ball)[0] - point).norm() < 1e-12, "{}", places(ball)[0]);
+    assert!((places(ball)[1] - jointplay::machine::Vec3::new(0.5, 0.0, 0.0)).norm() < 1e-12);
+    let (by_body, _) = imported(&text("body1=\"eye\" body2=\"base\" anchor=\"0.2 0 0\""));
+    let found = places(&by_body.machine.ball_joints[0]);
+    let (sine, cosine) = 10.0_f64.to_radians().sin_cos();
+    let there = jointplay::machine::Vec3::new(cosine * 0.3 + sine * 0.1, 0.0, -sine * 0.3 + cosine * 0.1);
+    assert!((found[0] - point).norm() < 1e-12 && (found[1] - there).norm() < 1e-12, "{} {}", found[0], found[1]);
+    for (connect, expected) in [
+        ("site1=\"end\" site2=\"x\"", "connect c: site2 = \"x\": there is no such site"),
+        ("site1=\"end\"", "connect c: the attribute `site2` is missing"),
+        ("body1=\"x\" anchor=\"0 0 0\"", "connect c: body1 = \"x\": there is no such body"),
+        ("anchor=\"0 0 0\"", "connect c: the attribute `body1` is missing"),
+    ] {
+        let said = refused(&text(connect));
+        assert!(said.contains(expected), "{connect}: {said}");
+    }
+}
+
+#[test]
+fn springs_pull_from_where_the_file_draws_the_machine() {
+    let geom = "<geom type=\"box\" size=\"0.1 0.2 0.3\"/>";
+    let hinge = "<joint stiffness=\"5\" springref=\"30\" ref=\"10\"/>";
+    let (found, inertia) = turning("", &format!("<body>{hinge}{geom}</body>"));
+    let expected = 5.0 * 20.0_f64.to_radians() / inertia;
+    assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    // A hinge that points against the slide of its body turns the other way.
+    let both =
+        "<joint type=\"slide\" axis=\"0 0 1\"/><joint name=\"h\" axis=\"0 0 -1\" stiffness=\"5\" springref=\"0.3\"/>";
+    let (found, inertia) = turning("<compiler angle=\"radian\"/>", &format!("<body>{both}{geom}</body>"));
+    assert!((found * inertia / (-5.0 * 0.3) - 1.0).abs() < 1e-9, "{found}");
+}
+
+#[test]
+fn flags_of_the_option_are_named_and_gravity_goes_with_its_own() {
+    let text = mujoco("<body><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"1 0 0\"/></body>");
+    let with = |flags: &str| {
+        imported(
+            &text.replace("<worldbody>", &format!("<option gravity=\"0 0 -5\"><flag {flags}/></option><worldbody>")),
+        )
+    };
+    let (still, said) = with("gravity=\"disable\" equality=\"disable\"");
+    assert_eq!(start(&still).bodies[0].angular_acceleration.norm(), 0.0);
+    assert!(said.contains("not taken: flag equality of <option> (line 2)") && !said.contains("flag gravity"), "{said}");
+    let (falling, _) = with("gravity=\"enable\"");
+    let found = start(&falling).bodies[0].angular_acceleration.y;
+    assert!((found - 5.0 / (1.0 + 0.4 * 0.01)).abs() < 1e-9, "{found}");
+}
+
+#[test]
+fn a_grain_has_its_inertia() {
+    let (scene, _) = imported(&mujoco("<body><joint type=\"free\"/><geom size=\"0.0001\" mass=\"1e-9\"/></body>"));
+    let expected = 0.4 * 1e-9 * 1e-8;
+    assert!((scene.machine.bodies[0].inertia.m11 / expected - 1.0).abs() < 1e-12);
+    let robot = r#"<robot><link name="base"/><link name="grain"><inertial><mass value="1e-9"/>
+        <inertia ixx="3e-18" ixy="1e-18" ixz="0" iyy="4e-18" iyz="-5e-19" izz="5e-18"/></inertial></link>
+        <joint name="j" type="continuous"><parent link="base"/><child link="grain"/></joint></robot>"#;
+    let found = imported(robot).0.machine.bodies[0].inertia;
+    for (part, expected) in [(found.m11, 3e-18), (found.m12, 1e-18), (found.m13, 0.0), (found.m23, -5e-19)] {
+        assert!((part - expected).abs() < 1e-30, "{part} {expected}");
+    }
+}
+
+/// MuJoCo takes z by the shortest turn to the direction from the second point to the first.
+#[test]
+fn a_box_between_two_points_is_turned_as_in_mujoco() {
+    let (scene, _) = imported(&mujoco(
+        "<body><joint/><geom type=\"box\" size=\"0.01\" fromto=\"0 0 0 0.1 0.2 0.4\"/><geom size=\"9\" rgba=\"1 1 1 0\" mass=\"0\"/></body>",
+    ));
+    let file: toml::Value = toml::from_str(&scene.source.text).unwrap();
+    let shapes = file["body"][0]["shapes"].as_array().unwrap();
+    assert_eq!(shapes.len(), 1, "what cannot be seen is not drawn");
+    let corner = |at: usize| {
+        let text = shapes[0]["corners"][at].as_str().unwrap();
+        let parts: Vec<f64> = text.split(' ').take(3).map(|part| part.parse().unwrap()).collect();
+        jointplay::machine::Vec3::new(parts[0], parts[1], parts[2])
+    };
+    let z = -jointplay::machine::Vec3::new(0.1, 0.2, 0.4).normalize();
+    let x = jointplay::machine::Vec3::new(1.0 - z.x * z.x / (1.0 + z.z), -z.x * z.y / (1.0 + z.z), -z.x);
+    assert!(((corner(0) - corner(1)) / 0.02 - x).norm() < 1e-9, "{}", corner(0) - corner(1));
+}
+
+#[test]
+fn macros_and_settings_that_change_masses_are_refused_and_mirrored_meshes_are_named() {
+    let ball = "<body><joint/><geom size=\"0.1\"/></body>";
+    let with = |setting: &str| mujoco(ball).replace("<worldbody>", &format!("<compiler {setting}/><worldbody>"));
+    for (text, expected) in [
+        (with("settotalmass=\"3\""), "compiler: settotalmass = \"3\": is not read: scale the masses in the file"),
+        (with("inertiagrouprange=\"3 4\""), "inertiagrouprange = \"3 4\": is not read"),
+        (
+            "<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\">\n<xacro:arm prefix=\"l\"/></robot>"
+                .to_owned(),
+            "robot:2: arm: a macro of xacro: expand the file first",
+        ),
+    ] {
+        let said = refused(&text);
+        assert!(said.contains(expected), "{text}\n  should say `{expected}`, says: {said}");
+    }
+    assert_eq!(imported(&with("settotalmass=\"-1\" inertiagrouprange=\"0 5\"")).1.lines().count(), 1);
+    let mesh = |scale: &str| {
+        let asset = format!("<asset><mesh name=\"m\" file=\"m.stl\" scale=\"{scale}\"/></asset><worldbody>");
+        let geom = "<joint/><geom type=\"mesh\" mesh=\"m\" mass=\"0\"/>";
+        imported(&mujoco(&ball.replace("<joint/>", geom)).replace("<worldbody>", &asset)).1
+    };
+    assert!(mesh("-1 -1 -1").contains("mesh m, whose scale is not above 0 along every axis"));
+    assert!(mesh("1 1 2").contains("mesh m, whose scale differs between axes"));
+}

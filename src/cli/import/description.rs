@@ -57,6 +57,15 @@ pub enum Form {
     Mesh(String, f64),
 }
 
+/// Length of a mesh file's unit, m, or why a scene has no mesh of this scale.
+pub fn mesh_unit(scale: [f64; 3]) -> Result<f64, &'static str> {
+    match scale {
+        _ if scale.iter().any(|part| *part <= 0.0) => Err("whose scale is not above 0 along every axis"),
+        _ if scale != [scale[0]; 3] => Err("whose scale differs between axes"),
+        [unit, ..] => Ok(unit),
+    }
+}
+
 /// A shape of a body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {

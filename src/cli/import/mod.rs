@@ -58,6 +58,10 @@ fn read(name: &str, text: &str) -> Result<Description, Failure> {
         .map_err(|error| Failure::usage(format!("{name}: is not an XML file: {error}")))?;
     let root = document.root_element();
     let source = Source { file: name, document: &document };
+    let is_macro = |node: &Node| node.tag_name().namespace().is_some_and(|space| space.ends_with("/xacro"));
+    if let Some(node) = root.descendants().find(is_macro) {
+        return Err(source.error(node, "a macro of xacro: expand the file first, xacro FILE > robot.urdf"));
+    }
     match root.tag_name().name() {
         "robot" => urdf::read(&source, root),
         "mujoco" => mjcf::read(&source, root),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
-use super::description::{Body, Description, Form, Joint, Kind, Place, Shape, Spring};
+use super::description::{Body, Description, Form, Joint, Kind, Place, Shape, Spring, mesh_unit};
 use super::inertia::Inertial;
 use super::xml::{Source, child};
 use super::{DEEPEST, too_deep};
@@ -214,15 +214,18 @@ impl<'n> Tree<'_, 'n, '_> {
             "mesh" => {
                 let file = self.source.require(node, "filename")?;
                 let scale = self.source.numbers::<3>(node, "scale")?.unwrap_or([1.0; 3]);
-                if scale != [scale[0]; 3] || scale[0] <= 0.0 {
-                    self.found.leave_out(line, format!("mesh {file}, whose scale differs between axes"));
-                    return Ok(None);
-                }
+                let unit = match mesh_unit(scale) {
+                    Ok(unit) => unit,
+                    Err(fault) => {
+                        self.found.leave_out(line, format!("mesh {file}, {fault}"));
+                        return Ok(None);
+                    }
+                };
                 // The package is the folder in which the scene lies.
                 let inside =
                     file.strip_prefix("package://").and_then(|rest| rest.split_once('/')).map(|(_, inside)| inside);
                 let file = inside.or(file.strip_prefix("file://")).unwrap_or(file).trim_start_matches("./");
-                Form::Mesh(file.to_owned(), scale[0])
+                Form::Mesh(file.to_owned(), unit)
             }
             other => {
                 self.found.leave_out(line, format!("shape <{other}>"));

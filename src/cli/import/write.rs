@@ -60,11 +60,11 @@ pub fn scene(description: &Description, file: &str) -> Result<String, Failure> {
         let i = inertial.inertia;
         let _ = writeln!(text, "\n[[body]]\nname = \"{name}\"\nmass = \"{} kg\"", inertial.mass);
         let _ = writeln!(text, "centre = {}", vector(inertial.centre, "m"));
-        let _ = writeln!(text, "inertia = {}", vector(i.diagonal(), "kg m^2"));
+        let _ = writeln!(text, "inertia = {}", components(i.diagonal(), "kg m^2"));
         let products =
             -Vec3::new(i.m12, i.m13, i.m23).map(|part| if part.abs() < ROUNDING * i.amax() { 0.0 } else { part });
         if products != Vec3::zeros() {
-            let _ = writeln!(text, "products = {}", vector(products, "kg m^2"));
+            let _ = writeln!(text, "products = {}", components(products, "kg m^2"));
         }
         if !body.shapes.is_empty() {
             let shapes: Vec<String> =
@@ -232,8 +232,12 @@ fn number(value: f64) -> String {
 }
 
 fn vector(v: Vec3, unit: &str) -> String {
-    let [x, y, z] = rounded(v);
-    format!("\"{x} {y} {z} {unit}\"")
+    components(Vec3::from(rounded(v)), unit)
+}
+
+/// The components as they are, however small.
+fn components(v: Vec3, unit: &str) -> String {
+    format!("\"{} {} {} {unit}\"", v.x, v.y, v.z)
 }
 
 fn direction(v: Vec3) -> String {

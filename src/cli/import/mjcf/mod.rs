@@ -1,24 +1,34 @@
 //! MJCF, the XML of MuJoCo, <https://mujoco.readthedocs.io/en/stable/XMLreference.html>: a tree of bodies with joints and geoms.
 
+mod equality;
+mod geom;
+
 use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
-use super::description::{Body, Closure, Description, Form, Joint, Kind, Place, Shape, Spring};
-use super::inertia::{Inertial, Solid};
+use super::description::{Body, Description, Joint, Kind, Place, Shape, Spring};
+use super::inertia::Inertial;
 use super::xml::{Source, child};
 use super::{DEEPEST, too_deep};
 use crate::cli::Failure;
 use crate::machine::{Mat3, Quat, Vec3};
 
-/// Density of a geom without one of its own, kg/m^3.
-const DENSITY: f64 = 1000.0;
 /// Cosine of the angle between two axes from which they count as parallel, and up to which as perpendicular.
 const PARALLEL: f64 = 1.0 - 1e-10;
 const PERPENDICULAR: f64 = 1e-6;
 
 /// Defaults of elements by their tag, of one class.
 type Defaults<'n> = BTreeMap<&'n str, BTreeMap<&'n str, &'n str>>;
+
+/// A site.
+struct Site {
+    /// The moving body, `None` for the world, and the point there, m.
+    point: (Option<usize>, Vec3),
+    line: u32,
+    /// Whether a loop is closed there.
+    connected: bool,
+}
 
 /// Settings and names of a file.
 struct Model<'s, 'n, 'i> {
@@ -33,31 +43,13 @@ struct Model<'s, 'n, 'i> {
     /// Meshes by name.
     meshes: BTreeMap<String, Node<'n, 'i>>,
     colours: BTreeMap<&'n str, &'n str>,
-    bodies: BTreeMap<&'n str, usize>,
+    /// Bodies by name: the moving body of which each is a part, `None` for the world, and its place there.
+    bodies: BTreeMap<&'n str, (Option<usize>, Place)>,
+    sites: BTreeMap<&'n str, Site>,
     found: Description,
 }
 
-/// Attributes that are read, or noted elsewhere, or act on limits and contacts alone.
-const GEOM: [&str; 18] = [
-    "type",
-    "size",
-    "fromto",
-    "mass",
-    "density",
-    "rgba",
-    "material",
-    "mesh",
-    "contype",
-    "conaffinity",
-    "condim",
-    "priority",
-    "friction",
-    "solmix",
-    "solref",
-    "solimp",
-    "margin",
-    "gap",
-];
+/// Attributes of a joint that are read, or noted elsewhere, or act on limits alone.
 const JOINT: [&str; 13] = [
     "type",
     "axis",
@@ -73,6 +65,10 @@ const JOINT: [&str; 13] = [
     "frictionloss",
     "ref",
 ];
+/// Ways to say an orientation, of which one alone counts.
+const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
+/// What is said of a site where nothing is connected.
+const UNUSED_SITE: &str = "<site> of a body";
 /// Class of the defaults of a whole file.
 const MAIN: &str = "main";
 
@@ -91,6 +87,7 @@ pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Descripti
         meshes: BTreeMap::new(),
         colours: BTreeMap::new(),
         bodies: BTreeMap::new(),
+        sites: BTreeMap::new(),
         found: Description::new(root.attribute("model").unwrap_or("model")),
     };
     let sections = || root.children().filter(Node::is_element);
@@ -118,6 +115,9 @@ pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Descripti
     if model.found.bodies.is_empty() {
         return Err(source.error(root, "no body has a joint"));
     }
+    for site in model.sites.values().filter(|site| !site.connected) {
+        model.found.leave_out(site.line, UNUSED_SITE);
+    }
     Ok(model.found)
 }
 
@@ -135,6 +135,19 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 ("inertiafromgeom", "auto") => self.inertia_from_geoms = None,
                 ("inertiafromgeom", "true") => self.inertia_from_geoms = Some(true),
                 ("inertiafromgeom", "false") => self.inertia_from_geoms = Some(false),
+                ("settotalmass", value) if value.trim().starts_with('-') => {}
+                ("settotalmass", _) => {
+                    return Err(self.source.error_in(
+                        node,
+                        "settotalmass",
+                        "is not read: scale the masses in the file",
+                    ));
+                }
+                ("inertiagrouprange", value) if value.split_whitespace().eq(["0", "5"]) => {}
+                ("inertiagrouprange", _) => {
+                    let message = "is not read: give the geoms of the other groups mass = \"0\"";
+                    return Err(self.source.error_in(node, "inertiagrouprange", message));
+                }
                 ("coordinate", "local")
                 | ("autolimits" | "texturedir" | "strippath" | "discardvisual" | "usethread", _) => {}
                 (key @ ("angle" | "eulerseq" | "inertiafromgeom" | "coordinate"), _) => {
@@ -154,6 +167,15 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         for attribute in others {
             self.found.leave_out(self.source.line(node), format!("setting {} of <option>", attribute.name()));
         }
+        for flag in node.children().filter(|child| child.has_tag_name("flag")) {
+            for attribute in flag.attributes() {
+                match (attribute.name(), attribute.value()) {
+                    ("gravity", "disable") => self.found.gravity = Vec3::zeros(),
+                    ("gravity", _) => {}
+                    (key, _) => self.found.leave_out(self.source.line(flag), format!("flag {key} of <option>")),
+                }
+            }
+        }
         Ok(())
     }
 
@@ -171,6 +193,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         let mut own: Defaults = inherited.or_else(|| self.classes.get(class)).cloned().unwrap_or_default();
         for element in node.children().filter(|child| child.is_element() && !child.has_tag_name("default")) {
             let values = own.entry(element.tag_name().name()).or_default();
+            if turned(element) {
+                values.retain(|key, _| !ORIENTATIONS.contains(key));
+            }
             values.extend(element.attributes().map(|attribute| (attribute.name(), attribute.value())));
         }
         self.classes.insert(class, own);
@@ -205,7 +230,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
     /// The attribute `key` of an element: its own, or that of its class.
     fn attribute(&self, node: Node<'n, 'i>, class: &str, key: &str) -> Option<&'n str> {
         let class = node.attribute("class").unwrap_or(class);
-        let default = || self.classes.get(class)?.get(node.tag_name().name())?.get(key).copied();
+        let superseded = ORIENTATIONS.contains(&key) && turned(node);
+        let values = || self.classes.get(class)?.get(node.tag_name().name()).filter(|_| !superseded);
+        let default = || values()?.get(key).copied();
         node.attribute(key).or_else(default)
     }
 
@@ -306,9 +333,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let inertial = Inertial { mass: 0.0, centre: Vec3::zeros(), inertia: Mat3::zeros() };
             self.found.bodies.push(Body { name, inertial, shapes: Vec::new() });
             (owner, at) = (Some(index), Place::identity());
-            if let Some(name) = node.attribute("name") {
-                self.bodies.insert(name, index);
-            }
+        }
+        if let Some(name) = node.attribute("name") {
+            self.bodies.insert(name, (owner, at));
         }
         self.contents(node, owner, &at, class)?;
         for inner in node.children().filter(|child| child.has_tag_name("body")) {
@@ -342,6 +369,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let line = self.source.line(part);
             match part.tag_name().name() {
                 "body" | "joint" | "freejoint" | "inertial" => {}
+                "site" => self.site_at(part, owner, place, class)?,
                 "geom" => {
                     let (shape, mass) = self.geom(part, class, from_geoms)?;
                     if let Some(mass) = mass {
@@ -368,6 +396,23 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(())
     }
 
+    /// Remembers a site of the body `owner`, or of a part of it that lies at `place`.
+    fn site_at(&mut self, node: Node<'n, 'i>, owner: Option<usize>, place: &Place, class: &str) -> Result<(), Failure> {
+        let line = self.source.line(node);
+        let Some(name) = node.attribute("name") else {
+            self.found.leave_out(line, UNUSED_SITE);
+            return Ok(());
+        };
+        let ends = self.numbers::<6>(node, class, "fromto")?;
+        let middle = ends.map(|[a, b, c, d, e, f]| 0.5 * Vec3::new(a + d, b + e, c + f));
+        let own = match middle {
+            Some(middle) => middle,
+            None => self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from),
+        };
+        self.sites.insert(name, Site { point: (owner, place.point(own)), line, connected: false });
+        Ok(())
+    }
+
     fn inertial(&self, node: Node<'n, 'i>, class: &str) -> Result<Inertial, Failure> {
         let place = self.place(node, class)?;
         self.source.require(node, "mass")?;
@@ -380,113 +425,6 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             }
         };
         Ok(place.inertial(Inertial { mass, centre: Vec3::zeros(), inertia }))
-    }
-
-    /// Shape and, if `weighs`, mass of a geom, in the axes of its body.
-    fn geom(
-        &mut self,
-        node: Node<'n, 'i>,
-        class: &str,
-        weighs: bool,
-    ) -> Result<(Option<Shape>, Option<Inertial>), Failure> {
-        let line = self.source.line(node);
-        self.leave_out_attributes(node, &GEOM);
-        if ["contype", "conaffinity"].iter().any(|key| self.attribute(node, class, key) != Some("0")) {
-            self.found.leave_out(line, "contact between geoms: bodies do not touch each other");
-        }
-        let mut place = self.place(node, class)?;
-        let kind = self.attribute(node, class, "type").unwrap_or("sphere");
-        let sizes = self.attribute(node, class, "size").map(|text| self.source.parse(node, "size", text, [1, 3]));
-        let sizes = sizes.transpose()?.unwrap_or_default();
-        let size = |at: usize| {
-            let size = sizes.get(at).copied().filter(|size| *size > 0.0);
-            size.ok_or_else(|| self.source.error(node, &format!("size: a {kind} needs number {} above 0", at + 1)))
-        };
-        let mut half = None;
-        if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? {
-            let (from, to) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
-            let along = (to - from).try_normalize(1e-12);
-            let along = along.ok_or_else(|| self.source.error(node, "fromto: both points are the same"))?;
-            place = Place { position: 0.5 * (from + to), rotation: to_z(along) };
-            half = Some(0.5 * (to - from).norm());
-        }
-        let length = |at: usize| half.map_or_else(|| size(at), Ok);
-        let colour = self.attribute(node, class, "rgba");
-        let material = || self.attribute(node, class, "material").and_then(|name| self.colours.get(name).copied());
-        let colour = colour.or_else(material).map(|text| self.source.parse(node, "rgba", text, [4, 4])).transpose()?;
-        let colour = colour.map(|rgba| [rgba[0], rgba[1], rgba[2]]);
-        let (form, solid) = match kind {
-            "sphere" => (Some(Form::Sphere(size(0)?)), Some(Solid::Ellipsoid([size(0)?; 3]))),
-            "capsule" => {
-                let (r, h) = (size(0)?, length(1)?);
-                (Some(Form::Capsule(r, h)), Some(Solid::Capsule(r, h)))
-            }
-            "cylinder" => {
-                let (r, h) = (size(0)?, length(1)?);
-                (Some(Form::Cylinder(r, h)), Some(Solid::Cylinder(r, h)))
-            }
-            "box" | "ellipsoid" => {
-                let axes = match half {
-                    Some(half) => [size(0)?, size(0)?, half],
-                    None => [size(0)?, size(1)?, size(2)?],
-                };
-                if kind == "box" {
-                    (Some(Form::Box(axes)), Some(Solid::Box(axes)))
-                } else {
-                    self.found.leave_out(line, "picture of an ellipsoid");
-                    (None, Some(Solid::Ellipsoid(axes)))
-                }
-            }
-            "mesh" => (self.mesh(node, class, line)?, None),
-            "plane" | "hfield" => {
-                self.found.leave_out(line, format!("geom of type {kind}"));
-                return Ok((None, None));
-            }
-            _ => {
-                let allowed = "allowed: sphere, capsule, cylinder, box, ellipsoid, mesh, plane, hfield";
-                return Err(self.source.error(node, &format!("type = \"{kind}\": {allowed}")));
-            }
-        };
-        let mass = self.numbers::<1>(node, class, "mass")?.map(|[mass]| mass);
-        let density = self.numbers::<1>(node, class, "density")?.map_or(DENSITY, |[density]| density);
-        let mass = match (weighs, solid) {
-            (false, _) => None,
-            _ if mass == Some(0.0) || (mass.is_none() && density == 0.0) => None,
-            (true, Some(solid)) => {
-                let mass = mass.unwrap_or_else(|| density * solid.volume());
-                let turn = *place.rotation.to_rotation_matrix().matrix();
-                Some(Inertial::of_solid(solid, mass, place.position, turn))
-            }
-            (true, None) => {
-                let message =
-                    "the mass of a mesh is not computed: give its body an <inertial>, or the geom mass = \"0\"";
-                return Err(self.source.error(node, message));
-            }
-        };
-        Ok((form.map(|form| Shape { form, place, colour, line }), mass))
-    }
-
-    fn mesh(&mut self, node: Node<'n, 'i>, class: &str, line: u32) -> Result<Option<Form>, Failure> {
-        let name = self.attribute(node, class, "mesh");
-        let name = name.ok_or_else(|| self.source.error(node, "the attribute `mesh` is missing"))?;
-        let asset =
-            *self.meshes.get(name).ok_or_else(|| self.source.error(node, &format!("there is no mesh {name}")))?;
-        let scale = self.numbers::<3>(asset, MAIN, "scale")?.unwrap_or([1.0; 3]);
-        let moved = ["refpos", "refquat"].into_iter().find(|key| asset.attribute(*key).is_some());
-        let fault = match (asset.attribute("file"), moved) {
-            (None, _) => Some("has no file".to_owned()),
-            (_, Some(key)) => Some(format!("has {key}")),
-            _ if scale != [scale[0]; 3] || scale[0] <= 0.0 => Some("whose scale differs between axes".to_owned()),
-            _ => None,
-        };
-        if let Some(fault) = fault {
-            self.found.leave_out(line, format!("mesh {name}, which {fault}").replace("which whose", "whose"));
-            return Ok(None);
-        }
-        let folder = self.mesh_folder.trim_end_matches('/').trim_start_matches("./");
-        let file = asset.attribute("file").unwrap_or_default();
-        let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
-        Ok(Some(Form::Mesh(file, scale[0])))
     }
 
     /// The joint of a body with these joint elements.
@@ -550,7 +488,13 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         if let (Kind::Free, Some(_)) = (kind, parent) {
             return Err(self.source.error(body, "only a body of the world moves freely"));
         }
-        let springs = self.springs(&parts.iter().map(|part| (part.0, part.1)).collect::<Vec<_>>(), class, kind)?;
+        // The axis of a cylindrical joint is that of its first part; the second may point the other way.
+        let sign = |axis: Vec3| match kind {
+            Kind::Cylindrical(first) => first.dot(&axis).signum(),
+            _ => 1.0,
+        };
+        let signed: Vec<_> = parts.iter().map(|&(node, of, axis, _)| (node, of, sign(axis))).collect();
+        let springs = self.springs(&signed, class, kind)?;
         // Of a cylindrical joint, the point on the axis of its hinge.
         let anchor = parts.iter().find(|part| part.1 == "hinge").unwrap_or(&parts[0]).3;
         let name = nodes[0].attribute("name").unwrap_or(body_name).to_owned();
@@ -558,10 +502,15 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(Joint { name, kind, parent, child: child.unwrap_or_default(), place: *place, anchor, springs })
     }
 
-    /// Springs and dampers of joint elements.
-    fn springs(&mut self, parts: &[(Node<'n, 'i>, &str)], class: &str, kind: Kind) -> Result<Vec<Spring>, Failure> {
+    /// Springs and dampers of joint elements, each with its type and the sign of its coordinate in the scene.
+    fn springs(
+        &mut self,
+        parts: &[(Node<'n, 'i>, &str, f64)],
+        class: &str,
+        kind: Kind,
+    ) -> Result<Vec<Spring>, Failure> {
         let mut found = Vec::new();
-        for (at, &(node, of)) in parts.iter().enumerate() {
+        for (at, &(node, of, sign)) in parts.iter().enumerate() {
             let (stiffness, damping) = (self.number(node, class, "stiffness")?, self.number(node, class, "damping")?);
             if stiffness == 0.0 && damping == 0.0 {
                 continue;
@@ -577,42 +526,18 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 (Kind::Universal(..), ..) => Some("child_angle"),
                 _ => None,
             };
-            let rest = self.number(node, class, "springref")? * if turns { self.angle } else { 1.0 };
+            // The scene's coordinate is 0 where MuJoCo's is `ref`.
+            let rest = self.number(node, class, "springref")? - self.number(node, class, "ref")?;
+            let rest = sign * rest * if turns { self.angle } else { 1.0 };
             found.push(Spring { coordinate, turns, stiffness, damping, rest });
         }
         Ok(found)
     }
+}
 
-    /// Reads `<connect>`: a ball joint that closes a loop.
-    fn equality(&mut self, section: Node<'n, 'i>) -> Result<(), Failure> {
-        let poses = self.found.poses();
-        for node in section.children().filter(Node::is_element) {
-            let connects = node.has_tag_name("connect") && node.attribute("body1").is_some();
-            if !connects || node.attribute("active") == Some("false") {
-                self.found.leave_out(self.source.line(node), format!("<{}> of <equality>", node.tag_name().name()));
-                continue;
-            }
-            let find = |key: &str| match node.attribute(key) {
-                None | Some("world") => Ok(None),
-                Some(name) => match self.bodies.get(name) {
-                    Some(&body) => Ok(Some(body)),
-                    None => Err(self.source.error_in(node, key, "is no body with a joint")),
-                },
-            };
-            let bodies = [find("body1")?, find("body2")?];
-            self.source.require(node, "anchor")?;
-            let anchor = self.source.numbers(node, "anchor")?.map_or_else(Vec3::zeros, Vec3::from);
-            let pose = |body: Option<usize>| body.map_or_else(Place::identity, |body| poses[body]);
-            let there = pose(bodies[0]).point(anchor);
-            let second = pose(bodies[1]);
-            let points = [anchor, second.rotation.inverse() * (there - second.position)];
-            let name = node
-                .attribute("name")
-                .map_or_else(|| format!("connect{}", self.found.closures.len() + 1), str::to_owned);
-            self.found.closures.push(Closure { name, bodies, points });
-        }
-        Ok(())
-    }
+/// Whether an element has an orientation of its own.
+fn turned(node: Node) -> bool {
+    ORIENTATIONS.iter().any(|key| node.attribute(*key).is_some())
 }
 
 /// A turn about a unit axis, rad.
