@@ -184,7 +184,9 @@ fn what_cannot_be_computed_is_refused_before_it_runs() {
     let folder = folder();
     hung(folder.path());
     let bad = [
-        ("--over joint.*.clearence=1um..2um", "clearence"),
+        ("--over joint.*.clearence=1um..2um", "(did you mean `joint.*.clearance`?)"),
+        ("--over body.link1.mas", "(did you mean `body.link1.mass`?)"),
+        ("--over joint.J1.clearance --output peak-force --rows 4", "--rows 4: allowed at least 8, or 0"),
         ("--over contact.friction=0.1..-2", "--over contact.friction=0.1..-2"),
         ("--over contact.friction=-1..2", "out of range"),
         ("--over contact.friction_law=coulomb", "contact.friction_law"),
@@ -208,4 +210,51 @@ fn what_cannot_be_computed_is_refused_before_it_runs() {
     let [low, high] = ["low", "high"].map(|key| own[key].as_f64().unwrap());
     // Of 20 mm: H7 0 to 21 um, g6 -20 to -7 um (ISO 286-2, tables 2 and 4).
     assert!((low - 3.5e-6).abs() < 1e-9 && (high - 20.5e-6).abs() < 1e-9, "{low} {high}");
+}
+
+/// Where a mass rests on a spring: -m g / k, from a number of the file and a parameter of the scene's own.
+#[test]
+fn numbers_of_the_file_vary_as_parameters_do() {
+    let folder = folder();
+    let text = r#"
+start = "equilibrium"
+[[parameter]]
+name = "k"
+label = "Spring"
+value = "20 N/mm"
+range = ["10 N/mm", "40 N/mm"]
+help = "Stiffness."
+[[body]]
+name = "car"
+mass = "400 kg"
+inertia = "1 1 1 kg m^2"
+[[joint]]
+name = "heave"
+kind = "prismatic"
+child = "car"
+axis = [0, 0, 1]
+[[joint_spring]]
+name = "spring"
+joint = "heave"
+stiffness = "k"
+damping = "1000 N s/m"
+"#;
+    fs::write(folder.path().join("car.toml"), text).unwrap();
+    // The deviation of the stiffness is below its smallest value.
+    let line = "sensitivity ./car.toml --quiet --over body.*.mass=normal(400kg,10kg) --over parameter.k=normal(20N/mm,0.5N/mm) \
+                --output heave.position:mean --duration 1ms --rows 0 --out out";
+    jointplay(folder.path(), line).expect(0);
+    let found = results(&folder.path().join("out"));
+    let parameters = &found["outputs"][0]["parameters"];
+    // 97.5 % quantile of the normal distribution.
+    let z = 1.959_963_984_540_054;
+    let rest = |m: f64, k: f64| -m * 9.81 / k;
+    let ends = [-z, z].map(|z| [rest(400.0 + 10.0 * z, 20e3), rest(400.0, 20e3 + 500.0 * z)]);
+    for (i, key) in ["body.car.mass", "parameter.k"].iter().enumerate() {
+        assert_eq!(parameters[i]["key"], *key);
+        for (end, name) in ["alone_low", "alone_high"].iter().enumerate() {
+            let value = parameters[i][name].as_f64().unwrap();
+            assert!((value / ends[end][i] - 1.0).abs() < 1e-6, "{key} {name}: {value} {}", ends[end][i]);
+        }
+    }
 }

@@ -6,7 +6,7 @@ use crate::sampling::{MOST_DIMENSIONS, MOST_POINTS, Sampler, Sampling, SamplingE
 use crate::yields::{Estimate, interpolated_quantile};
 
 /// Least number of complete rows from which indices are estimated.
-const LEAST_ROWS: usize = 8;
+pub const LEAST_ROWS: usize = 8;
 /// Least number of resamples of an interval.
 const LEAST_RESAMPLES: usize = 100;
 

@@ -39,8 +39,13 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(Box<SceneError>),
     /// A pattern without a match.
-    #[error("no numeric parameter of the scene matches {0}")]
-    NoMatch(String),
+    #[error("no number of the scene matches {pattern}{nearest}")]
+    NoMatch {
+        /// The pattern.
+        pattern: String,
+        /// The nearest key, in words; empty for none.
+        nearest: String,
+    },
     /// A parameter whose values are words or counts.
     #[error("its values are no real numbers")]
     NotReal,

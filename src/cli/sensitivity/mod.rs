@@ -7,7 +7,7 @@ mod target;
 use super::args::{SensitivityArguments, SummaryForm};
 use super::study::{Study, inputs, outputs};
 use super::{Failure, load, print, warn};
-use crate::analysis::indices::{Bootstrap, IndicesError, SaltelliDesign, SensitivityIndices};
+use crate::analysis::indices::{Bootstrap, IndicesError, LEAST_ROWS, SaltelliDesign, SensitivityIndices};
 use crate::analysis::morris::{ElementaryEffects, MorrisPlan};
 use crate::analysis::sampling::Sampling;
 use crate::analysis::study::{self, ENDS};
@@ -58,6 +58,10 @@ pub fn sensitivity(arguments: &SensitivityArguments) -> Result<(), Failure> {
     let inputs = inputs(&scene, None, &arguments.over)?;
     let outputs = outputs(&scene, "--output", &arguments.output)?;
     let target = arguments.target.as_deref().map(|text| target::read(&outputs[0], text)).transpose()?;
+    let rows = arguments.rows;
+    if (1..LEAST_ROWS).contains(&(rows as usize)) {
+        return Err(Failure::usage(format!("--rows {rows}: allowed at least {LEAST_ROWS}, or 0 for no indices")));
+    }
     let folder = Folder::claim(&arguments.study.out, arguments.study.force)?;
     let mut study = Study::new(scene, inputs, outputs, &arguments.study)?;
     let found = find(&mut study, arguments, target)?;

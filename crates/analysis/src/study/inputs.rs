@@ -4,7 +4,9 @@ use super::StudyError;
 use crate::distribution::Distribution;
 use crate::iso286::{Fit, FitError};
 use jointplay_physics::simulate::matches_pattern;
-use jointplay_scene::{Kind, Parameter, Scene, Value, contact_parts};
+use jointplay_physics::suggest::nearest;
+use jointplay_physics::units::{QuantityError, parse_quantity};
+use jointplay_scene::{Kind, Parameter, Scene, Value, ValueError, ValueFault, contact_parts};
 
 /// Range of an input without one of its own, over its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
@@ -90,17 +92,28 @@ pub(super) fn check_end(parameter: &Parameter, end: f64) -> Result<(), StudyErro
     parameter.check(&value).map_err(|error| StudyError::End { value: parameter.show(&value), error })
 }
 
-/// Keys of the numeric parameters that match `pattern`; at least one.
+/// Keys of the numeric parameters that match `pattern`, or, where there are none, of the numbers of the file; at least one.
 ///
 /// # Errors
 /// There are none.
 pub fn matching(scene: &Scene, pattern: &str) -> Result<Vec<String>, StudyError> {
-    let keys: Vec<String> = keys(scene).into_iter().filter(|key| matches_pattern(pattern, key)).collect();
-    if keys.is_empty() {
-        scene.parameter(pattern)?;
-        return Err(StudyError::NoMatch(pattern.to_owned()));
+    let parameters = keys(scene);
+    let numbers = || scene.source.numbers.keys().cloned();
+    let matches = |key: &String| matches_pattern(pattern, key);
+    let mut found: Vec<String> = parameters.iter().filter(|key| matches(key)).cloned().collect();
+    if found.is_empty() {
+        found.extend(numbers().filter(matches));
     }
-    Ok(keys)
+    if found.is_empty() {
+        if !pattern.contains(['*', '?']) {
+            scene.parameter(pattern)?;
+        }
+        let of_all_joints = contact_parts().map(|part| format!("joint.*.{part}"));
+        let known: Vec<String> = of_all_joints.chain(parameters).chain(numbers()).collect();
+        let nearest = nearest(pattern, known.iter().map(String::as_str));
+        return Err(StudyError::NoMatch { pattern: pattern.to_owned(), nearest });
+    }
+    Ok(found)
 }
 
 impl Input {
@@ -127,13 +140,14 @@ impl Input {
                 Some((low, high)) => Distribution::uniform(number(low.trim())?, number(high.trim())?),
                 None => Distribution::parse(
                     text,
-                    |text| number(text).map_err(|error| error.to_string()),
+                    |text| unlimited(parameter, text).map_err(|error| error.to_string()),
                     |fit| of_fit(scene, key, fit),
                 ),
             },
         }?;
         let (low, high) = distribution.support();
-        for end in [low, high].into_iter().filter(|end| end.is_finite()) {
+        // Of a distribution without limits, its middle.
+        for end in [low, distribution.quantile(0.5), high].into_iter().filter(|end| end.is_finite()) {
             check_end(parameter, end)?;
         }
         Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), nominal, distribution })
@@ -142,6 +156,19 @@ impl Input {
     /// Its value at the fraction `u` of all values, 0 < u < 1.
     pub fn at(&self, u: f64) -> f64 {
         self.distribution.quantile(u)
+    }
+}
+
+/// A number in the unit of `parameter`, SI, within its range or not: a standard deviation has another range than its mean.
+fn unlimited(parameter: &Parameter, text: &str) -> Result<f64, StudyError> {
+    match (parameter.read(text), parameter.kind) {
+        (Ok(Value::Number(value)), _) => Ok(value),
+        (Err(ValueError { fault: ValueFault::OutOfRange, .. }), Kind::Number { dimension, .. }) => {
+            let fault = |error: QuantityError| ValueError { fault: error.into(), allowed: parameter.allowed() };
+            Ok(parse_quantity(text.trim(), dimension).map_err(fault)?)
+        }
+        (Err(error), _) => Err(error.into()),
+        (Ok(Value::Count(_) | Value::Choice(_) | Value::Unset), _) => Err(StudyError::NotReal),
     }
 }
 
@@ -177,5 +204,38 @@ mod tests {
         assert_eq!(ends("contact.restitution"), (0.45, 1.0));
         let nominal = scene.machine.ball_joints[0].contact.clearance;
         assert_eq!(ends("joint.A.clearance"), (0.5 * nominal, 1.5 * nominal));
+    }
+
+    #[test]
+    fn a_deviation_may_be_smaller_than_every_value_of_its_parameter() {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        // A ball has a radius of at least 0.1 mm.
+        let of = |text: &str| Input::new(&scene, "contact.ball_radius", Some(text));
+        let ball = of("normal(10 mm, 20 um)").expect("a distribution");
+        assert!((ball.at(0.841_344_746_068_543) - 10.02e-3).abs() < 1e-12, "{}", ball.at(0.841_344_746_068_543));
+        for (text, expected) in [
+            ("normal(10 mm, -20 um)", "standard deviation of a normal distribution must be above 0"),
+            ("normal(10 um, 20 um)", "0.01 mm: out of range; allowed 0.1 mm to 1000 mm"),
+            ("normal(1 mm, 20 um, 10 um..2 mm)", "0.01 mm: out of range; allowed 0.1 mm to 1000 mm"),
+            ("triangular(10 um, 1 mm, 2 mm)", "0.01 mm: out of range; allowed 0.1 mm to 1000 mm"),
+            ("normal(10 mm, 20 s)", "unit"),
+        ] {
+            let said = of(text).expect_err(text).to_string();
+            assert!(said.contains(expected), "{text}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_pattern_finds_parameters_then_numbers_of_the_file() {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        let found = |pattern: &str| matching(&scene, pattern).map_err(|error| error.to_string());
+        assert_eq!(found("joint.A.clearance"), Ok(vec!["joint.A.clearance".to_owned()]));
+        let masses = found("body.*.mass").expect("masses");
+        assert!(masses.len() > 1 && masses.iter().all(|key| scene.source.numbers.contains_key(key)), "{masses:?}");
+        assert_eq!(found(&masses[0]), Ok(vec![masses[0].clone()]));
+        assert_eq!(
+            found("joint.*.clearence"),
+            Err("no number of the scene matches joint.*.clearence (did you mean `joint.*.clearance`?)".to_owned())
+        );
     }
 }
