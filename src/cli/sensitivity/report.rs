@@ -11,7 +11,7 @@ use crate::analysis::yields::Estimate;
 use crate::cli::Failure;
 use crate::cli::args::SensitivityArguments;
 use crate::cli::output::significant;
-use crate::cli::study::{Study, estimate, number, shown, value_of};
+use crate::cli::study::{Study, digits_apart, estimate, number, shown, shown_with, value_of};
 use crate::cli::summary::count;
 use crate::cli::tables::{Table, quoted};
 use crate::files::Folder;
@@ -38,7 +38,13 @@ pub fn fill(
 }
 
 fn interval(estimate: Option<&Estimate>) -> String {
-    estimate.map_or_else(|| "-".to_owned(), |e| format!("{:.2} ({:.2} to {:.2})", e.value, e.low, e.high))
+    // Adding 0 turns -0 into 0.
+    let hundredths = |value: f64| format!("{:.2}", (100.0 * value).round() / 100.0 + 0.0);
+    let [value, low, high] = match estimate {
+        Some(e) => [e.value, e.low, e.high].map(hundredths),
+        None => return "-".to_owned(),
+    };
+    format!("{value} ({low} to {high})")
 }
 
 /// For a terminal.
@@ -69,15 +75,13 @@ pub fn text(study: &Study, found: &Found, out: &Path) -> String {
         text += &Table::new(heads, rows).text();
     }
     for (o, output) in study.outputs().iter().enumerate() {
-        text += &format!(
-            "\n{}: {} with the values of the scene\n",
-            output.name,
-            shown(found.alone.nominal[o], output.unit)
-        );
-        let mut rows: Vec<Vec<String>> = (0..study.inputs().len()).map(|i| line(study, found, o, i)).collect();
-        let [low, high] = &found.alone.together;
-        let together = [low, high].map(|outputs| shown(outputs[o], output.unit));
-        let [low, high] = together;
+        let nominal = found.alone.nominal[o];
+        let ends = found.alone.ends.iter().flatten().map(|(_, outputs)| outputs);
+        let digits = digits_apart(nominal, ends.chain(&found.alone.together).map(|outputs| outputs[o]));
+        let cell = |outputs: &[f64]| shown_with(outputs[o], output.unit, digits);
+        text += &format!("\n{}: {} with the values of the scene\n", output.name, cell(&found.alone.nominal));
+        let mut rows: Vec<Vec<String>> = (0..study.inputs().len()).map(|i| line(study, found, o, i, &cell)).collect();
+        let [low, high] = found.alone.together.each_ref().map(|outputs| cell(outputs));
         rows.push(vec![
             "all together".into(),
             "lower ends".into(),
@@ -113,9 +117,9 @@ pub fn text(study: &Study, found: &Found, out: &Path) -> String {
     text + &format!("\nWritten           {}\nVersion           jointplay {}\n", out.display(), crate::VERSION)
 }
 
-/// Row of parameter `i` in the table of output `o`.
-fn line(study: &Study, found: &Found, o: usize, i: usize) -> Vec<String> {
-    let (input, output) = (&study.inputs()[i], &study.outputs()[o]);
+/// Row of parameter `i` in the table of output `o`, of which `cell` writes a value.
+fn line(study: &Study, found: &Found, o: usize, i: usize, cell: &impl Fn(&[f64]) -> String) -> Vec<String> {
+    let input = &study.inputs()[i];
     let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
     let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
     let at = found.kept.iter().position(|&kept| kept == i);
@@ -126,9 +130,9 @@ fn line(study: &Study, found: &Found, o: usize, i: usize) -> Vec<String> {
     vec![
         input.key.clone(),
         value_of(input, *low),
-        shown(at_low[o], output.unit),
+        cell(at_low),
         value_of(input, *high),
-        shown(at_high[o], output.unit),
+        cell(at_high),
         interval(first),
         interval(total),
     ]
@@ -241,4 +245,16 @@ fn table(study: &Study, found: &Found) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_index_of_nothing_has_no_sign() {
+        let estimate = Estimate { value: -1e-9, low: -0.014, high: 0.236 };
+        assert_eq!(interval(Some(&estimate)), "0.00 (-0.01 to 0.24)");
+        assert_eq!(interval(None), "-");
+    }
 }

@@ -3,7 +3,7 @@
 mod report;
 mod rows;
 
-pub use report::{drawn, estimate, number, shown, value_of};
+pub use report::{digits_apart, drawn, estimate, number, shown, shown_with, value_of};
 pub use rows::{Row, rows};
 
 use std::path::{Path, PathBuf};

@@ -14,13 +14,29 @@ use crate::units::format_quantity_digits;
 
 /// Significant digits for people.
 const DIGITS: usize = 4;
+/// Of the largest of several differences, and of any number.
+const DISTINCT: usize = 3;
+const MOST_DIGITS: usize = 9;
 /// PNG pixels per pixel of a chart.
 const PNG_SCALE: f32 = 2.0;
 
 /// A value with its unit, lengths in mm; `-` if unknown or unlimited.
 pub fn shown(value: f64, unit: &str) -> String {
+    shown_with(value, unit, DIGITS)
+}
+
+/// The same with so many significant digits.
+pub fn shown_with(value: f64, unit: &str, digits: usize) -> String {
     let display = if unit == "m" { "mm" } else { unit };
-    if value.is_finite() { format_quantity_digits(value, display, DIGITS) } else { "-".to_owned() }
+    if value.is_finite() { format_quantity_digits(value, display, digits) } else { "-".to_owned() }
+}
+
+/// Significant digits with which the largest distance of `values` from `nominal` has three, within four and nine.
+pub fn digits_apart(nominal: f64, values: impl Iterator<Item = f64>) -> usize {
+    let distance = |value: f64| (value - nominal).abs();
+    let largest = values.filter(|value| value.is_finite()).map(distance).fold(0.0, f64::max);
+    let lost = libm::log10(nominal.abs() / largest);
+    if lost.is_finite() { (lost.ceil().max(0.0) as usize + DISTINCT).clamp(DIGITS, MOST_DIGITS) } else { DIGITS }
 }
 
 /// One of the values of `input`, with unit.
@@ -109,5 +125,22 @@ impl Study {
             out += &format!("{},{}\n", run.stage, cells.join(","));
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_that_differ_little_have_the_digits_that_tell_them_apart() {
+        let cells = |values: [f64; 3]| {
+            let digits = digits_apart(values[0], values.into_iter());
+            values.map(|value| shown_with(value, "m", digits))
+        };
+        assert_eq!(cells([0.1, 0.2, 0.301_234_56]), ["100 mm", "200 mm", "301.2 mm"]);
+        assert_eq!(cells([-0.264_9, -0.264_901_234, f64::NAN]), ["-264.9 mm", "-264.901234 mm", "-"]);
+        assert_eq!(cells([1.0, 1.0 + 1e-14, 1.0]), ["1000 mm"; 3]);
+        assert_eq!(cells([0.0, 1.234_567e-3, 0.0]), ["0 mm", "1.235 mm", "0 mm"]);
     }
 }
