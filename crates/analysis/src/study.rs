@@ -49,6 +49,12 @@ pub enum StudyError {
     /// A parameter whose values are words or counts.
     #[error("its values are no real numbers")]
     NotReal,
+    /// A parameter without a distribution, and whose value gives none.
+    #[error("is {value} in the scene, and half to one and a half of that is no range: give one, KEY=A..B")]
+    NoRange {
+        /// Its value in the scene, with its unit.
+        value: String,
+    },
     /// Not a value of the parameter.
     #[error(transparent)]
     Read(#[from] ValueError),

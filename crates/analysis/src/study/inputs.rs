@@ -134,6 +134,9 @@ impl Input {
                     _ => value,
                 };
                 let [low, high] = DEFAULT_RANGE.map(|part| allowed(part * nominal));
+                if low == high {
+                    return Err(StudyError::NoRange { value: parameter.show(&Value::Number(nominal)) });
+                }
                 Distribution::uniform(low.min(high), low.max(high))
             }
             Some(text) => match text.split_once("..").filter(|_| !text.contains('(')) {
@@ -204,6 +207,15 @@ mod tests {
         assert_eq!(ends("contact.restitution"), (0.45, 1.0));
         let nominal = scene.machine.ball_joints[0].contact.clearance;
         assert_eq!(ends("joint.A.clearance"), (0.5 * nominal, 1.5 * nominal));
+    }
+
+    #[test]
+    fn a_value_of_nothing_has_no_range_by_default() {
+        let changes = [("contact.clearance".to_owned(), "0mm".to_owned())];
+        let scene = Scene::load("four-bar", &changes).expect("built in");
+        let said = Input::new(&scene, "contact.clearance", None).expect_err("no range").to_string();
+        assert_eq!(said, "is 0 mm in the scene, and half to one and a half of that is no range: give one, KEY=A..B");
+        assert!(Input::new(&scene, "contact.clearance", Some("0mm..0.1mm")).is_ok());
     }
 
     #[test]
