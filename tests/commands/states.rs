@@ -193,13 +193,13 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     // Right in itself, and not a state of this scene.
     let mut json: Json = serde_json::from_str(&good).unwrap();
     for (pointer, value, words) in [
-        ("/state/now/y", serde_json::json!([1.0]), "not those of a run"),
-        ("/state/flights", serde_json::json!([null, null]), "not those of a run"),
-        ("/state/sampled", serde_json::json!([]), "not those of a run"),
+        ("/state/now/y", serde_json::json!([1.0]), "these values do not describe a state of this scene"),
+        ("/state/flights", serde_json::json!([null, null]), "these values do not describe a state of this scene"),
+        ("/state/sampled", serde_json::json!([]), "these values do not describe a state of this scene"),
         (
             "/state/loads",
             serde_json::json!({"parts": [[[1.0, 0.0], null]], "seen": 0.0, "actuators": []}),
-            "not those of a run",
+            "these values do not describe a state of this scene",
         ),
         ("/state", serde_json::json!({}), "not a state"),
     ] {
