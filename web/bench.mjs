@@ -23,6 +23,8 @@ const RUNS = [
     ['slider-crank', 'automatic', 6],
     ['chain', 'rk4', 0.3],
     ['chain', 'radau5', 0.04],
+    ['hexapod', 'discrete-gradient', 5],
+    ['delta', 'discrete-gradient', 2],
 ];
 /** Both sides run in turn so often; the median of the ratios counts. */
 const REPEATS = 5;
