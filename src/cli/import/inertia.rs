@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::machine::{Mat3, Vec3};
+use crate::machine::{self, Geometry, Mat3, Vec3};
 
 /// Mass and its distribution, in the axes of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,39 +29,38 @@ pub enum Solid {
 }
 
 impl Solid {
-    /// Volume, m^3.
-    pub fn volume(self) -> f64 {
-        match self {
-            Self::Ellipsoid([a, b, c]) => 4.0 / 3.0 * PI * a * b * c,
-            Self::Box([a, b, c]) => 8.0 * a * b * c,
-            Self::Cylinder(r, h) => 2.0 * PI * r * r * h,
-            Self::Capsule(r, h) => PI * r * r * (2.0 * h + 4.0 / 3.0 * r),
-        }
+    /// Volume, m^3, and principal inertias about its centre over its mass, m^2.
+    fn measures(self) -> (f64, Vec3) {
+        let ends = |half: f64| [-half, half].map(|z| Vec3::new(0.0, 0.0, z));
+        let geometry = match self {
+            Self::Ellipsoid([a, b, c]) => {
+                let gyration = 0.2 * Vec3::new(b * b + c * c, a * a + c * c, a * a + b * b);
+                return (4.0 / 3.0 * PI * a * b * c, gyration);
+            }
+            Self::Box(half) => Geometry::Box { centre: Vec3::zeros(), size: 2.0 * Vec3::from(half) },
+            Self::Cylinder(radius, half) => {
+                let [from, to] = ends(half);
+                Geometry::Cylinder { from, to, radius }
+            }
+            Self::Capsule(radius, half) => {
+                let [from, to] = ends(half);
+                Geometry::Capsule { from, to, radius }
+            }
+        };
+        let solid = machine::Solid::of(&geometry);
+        (solid.volume, solid.inertia().diagonal() / solid.volume)
     }
 
-    /// Principal inertias about its centre, over its mass, m^2.
-    pub fn gyration(self) -> Vec3 {
-        let by = |part: f64, [a, b, c]: [f64; 3]| part * Vec3::new(b * b + c * c, a * a + c * c, a * a + b * b);
-        let round = |across: f64, along: f64| Vec3::new(across, across, along);
-        match self {
-            Self::Ellipsoid(axes) => by(0.2, axes),
-            Self::Box(edges) => by(1.0 / 3.0, edges),
-            Self::Cylinder(r, h) => round(0.25 * r * r + h * h / 3.0, 0.5 * r * r),
-            Self::Capsule(r, h) => {
-                // Cylinder, and two hemispheres whose centroids are 3/8 r beyond its ends.
-                let (barrel, caps) = (2.0 * h, 4.0 / 3.0 * r);
-                let (barrel, caps) = (barrel / (barrel + caps), caps / (barrel + caps));
-                let across = barrel * (0.25 * r * r + h * h / 3.0) + caps * (0.4 * r * r + h * h + 0.75 * h * r);
-                round(across, barrel * 0.5 * r * r + caps * 0.4 * r * r)
-            }
-        }
+    /// Volume, m^3.
+    pub fn volume(self) -> f64 {
+        self.measures().0
     }
 }
 
 impl Inertial {
     /// A solid of `mass` with its centre at `centre` and its axes turned by `rotation`.
     pub fn of_solid(solid: Solid, mass: f64, centre: Vec3, rotation: Mat3) -> Self {
-        let own = Mat3::from_diagonal(&(mass * solid.gyration()));
+        let own = Mat3::from_diagonal(&(mass * solid.measures().1));
         Self { mass, centre, inertia: rotation * own * rotation.transpose() }
     }
 
@@ -102,7 +101,8 @@ mod tests {
         let cell = 8.0 * reach[0] * reach[1] * reach[2] / f64::from(N).powi(3);
         assert!((sums[0] * cell / solid.volume() - 1.0).abs() < 1e-2);
         let gyration = Vec3::new(sums[1], sums[2], sums[3]) / sums[0];
-        let error = (gyration - solid.gyration()).component_div(&solid.gyration());
+        let own = solid.measures().1;
+        let error = (gyration - own).component_div(&own);
         assert!(error.amax() < 1e-2, "{solid:?}: {error}");
     }
 
