@@ -294,7 +294,16 @@ fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
 fn a_value_that_waits_for_the_reset_says_so() {
     let mut harness = window("spcmm");
     let frequency = |harness: &Harness<'_, App>| {
-        harness.state().player().simulation().pending().machine.spcmm.expect("the paper's scene").frequency
+        harness
+            .state()
+            .player()
+            .simulation()
+            .pending()
+            .machine
+            .closed_form
+            .as_ref()
+            .expect("the paper's scene")
+            .frequency
     };
     harness.state_mut().player_mut().run_to(1e-3);
     harness.state_mut().player_mut().set("spcmm.frequency", "0.4 Hz").expect("in range");

@@ -265,8 +265,8 @@ fn what_waits_in_a_snapshot_takes_effect_at_the_reset_of_a_copy() {
     fresh.restore(&simulation.snapshot());
     assert_eq!(fresh.running().machine.contact.friction, 0.3);
     fresh.reset().unwrap();
-    assert_eq!(fresh.pending().machine.spcmm.unwrap().frequency, 1.0);
-    assert_eq!(fresh.running().machine.spcmm.unwrap().frequency, 1.0);
+    assert_eq!(fresh.pending().machine.closed_form.as_ref().unwrap().frequency, 1.0);
+    assert_eq!(fresh.running().machine.closed_form.as_ref().unwrap().frequency, 1.0);
     assert_eq!(frame_now(&mut fresh).joints[0].clearance, 0.1e-3);
 }
 

@@ -131,5 +131,9 @@ fn a_file_in_a_turned_scene_turns_with_it() {
 fn a_machine_with_a_closed_form_stays_where_it_is() {
     let text = format!("{PLACE}{}", built_in_text("spcmm").unwrap());
     let error = Scene::parse(&text, None, &[]).unwrap_err().to_string();
-    assert!(error.contains("position = ") && error.contains("[spcmm] has its own place"), "{error}");
+    assert!(
+        error.contains("position = ")
+            && error.contains("the functions of [closed_form] are those of the machine where it is"),
+        "{error}"
+    );
 }

@@ -179,7 +179,7 @@ fn what_is_wrong_with_a_tyre_is_named() {
             ["tyre.t.on", "acts on a body, not on the world"],
         ),
         (wheel(REST, "").replace("stiffness = \"5e4 N/m\"", "stiffness = 0"), ["tyre.t", "does nothing"]),
-        (wheel(REST, "ground = { law = \"spcmm\", slider = 1 }"), ["tyre.t.ground.law", "[spcmm]"]),
+        (wheel(REST, "ground = { law = \"function\", function = \"f\" }"), ["tyre.t.ground.function", "[closed_form]"]),
         (
             wheel(REST, "ground = { law = \"pulse\", height = \"1 deg\", duration = \"1 s\" }"),
             ["tyre.t.ground.height", "wrong unit `deg`"],

@@ -145,8 +145,8 @@ fn drives_of_two_degrees_name_their_coordinates() {
             ["joint.j.start.angular_velocity", "says where it starts"],
         ),
         (
-            "drive = { position = { law = \"spcmm\", slider = 1 } }\n".to_owned(),
-            ["joint.j.drive.position.law", "[spcmm]"],
+            "drive = { position = { law = \"function\", function = \"f\" } }\n".to_owned(),
+            ["joint.j.drive.position.function", "[closed_form]"],
         ),
     ] {
         refused(&hung(&more), &words);

@@ -41,11 +41,11 @@ pub fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let mut rigid = scene.clone();
     rigid.machine.formulation = Formulation::Tree;
     rigid.machine.elements.clear();
-    let drive = rigid.machine.spcmm.as_mut()?;
-    // Sliders at rest have a single pose.
-    let instants = if drive.frequency > 0.0 { INSTANTS } else { 0 };
+    let form = rigid.machine.closed_form.as_mut()?;
+    // Drives at rest have a single pose.
+    let instants = if form.frequency > 0.0 { INSTANTS } else { 0 };
     // At a low frequency only weight loads the joints; the poses do not depend on it.
-    drive.frequency = SLOW;
+    form.pace = if form.frequency > 0.0 { SLOW / form.frequency } else { 1.0 };
     let period = 1.0 / SLOW;
     for joint in &mut rigid.machine.ball_joints {
         joint.contact.clearance = 0.0;

@@ -248,15 +248,15 @@ impl Program {
         stack[0]
     }
 
-    /// The same program with `values` bound to all variables but the first, and constants folded.
+    /// The same program with `values` bound to all variables but the first `kept`, and constants folded.
     ///
     /// # Panics
     /// As [`Self::eval`].
-    pub fn bound(&self, values: &[f64]) -> Self {
+    pub fn bound(&self, kept: usize, values: &[f64]) -> Self {
         let mut steps: Vec<Step> = Vec::new();
         for &step in &self.steps {
             let step = match step {
-                Step::Variable(index @ 1..) => Step::Constant(values[index - 1]),
+                Step::Variable(index) if index >= kept => Step::Constant(values[index - kept]),
                 step => step,
             };
             match (step, &mut steps[..]) {

@@ -36,7 +36,6 @@ impl Scene {
     fn has(&self, parameter: &Parameter) -> bool {
         match parameter.scope {
             Scope::Every | Scope::Contact => true,
-            Scope::Spcmm => self.machine.spcmm.is_some(),
             Scope::Own => self.source.numbers.contains_key(parameter.key),
         }
     }

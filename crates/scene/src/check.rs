@@ -12,7 +12,7 @@ impl Scene {
         let own = self.source.own.iter();
         let counts = own.clone().filter(|own| matches!(own.kind, Kind::Count { .. }));
         let one = |joint: &str, parts: &[&str]| {
-            let mut keys = ["spcmm.", "parameter.", "formulation", "start"].map(str::to_owned).to_vec();
+            let mut keys = ["parameter.", "formulation", "start"].map(str::to_owned).to_vec();
             keys.extend(own.clone().map(|own| own.key.to_owned()));
             for part in parts {
                 keys.push(format!("contact.{part}"));
@@ -22,7 +22,7 @@ impl Scene {
         };
         let (title, keys) = match &error.0 {
             MechanismError::Unreachable(_) | MechanismError::OtherBranch | MechanismError::Singular => {
-                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
+                ("closed_form".to_owned(), own.map(|own| own.key.to_owned()).collect())
             }
             MechanismError::Open { given: gap }
             | MechanismError::NoClosure { given: gap, .. }
@@ -127,10 +127,10 @@ mod tests {
             let at = text.lines().position(|line| line == what);
             at.map(|at| at as u32 + 1)
         };
-        let far = text.replace("amplitude_x = \"25 mm\"", "amplitude_x = \"200 mm\"");
+        let far = text.replace("value = \"25 mm\"", "value = \"200 mm\"");
         let error = start_error(&far, &[]);
-        assert_eq!(error.position.map(|p| p.0), line_of(text, "[spcmm]"));
-        assert_eq!(error.line_text.as_deref(), Some("[spcmm]"));
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[closed_form]"));
+        assert_eq!(error.line_text.as_deref(), Some("[closed_form]"));
         let error = start_error(text, &[("spcmm.amplitude_x", "200 mm")]);
         assert_eq!(error.key.as_deref(), Some("spcmm.amplitude_x"));
         assert!(error.to_string().starts_with("mine.toml:"), "{error}");

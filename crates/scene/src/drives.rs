@@ -1,6 +1,7 @@
 //! Drive laws: one row per law, and the reader of `drive` and of the factor of a load, which follows the same laws. The motion is
 //! computed in `mechanism/drives`.
 
+use super::closed_form::read_follower;
 use super::document::{Node, Section};
 use super::formula::read_formula;
 use super::key::{FileKey, FileTable, MAX_SI, ValueType, Variants, key, many, number, positive};
@@ -10,10 +11,8 @@ use std::sync::LazyLock;
 
 /// Maximum frequency of a harmonic drive, Hz.
 pub(super) const FASTEST_DRIVE: f64 = 1e4;
-/// Error message for the law spcmm on a coordinate that is not a slide.
-pub(super) const SLIDERS_ONLY: &str = "the law spcmm drives prismatic joints only";
-/// Word of the law that follows the closed form of the machine.
-const CLOSED_FORM: &str = "spcmm";
+/// Word of the law that follows a function of the machine's closed form.
+const FUNCTION: &str = "function";
 /// Maximum number of terms in a sum of harmonics.
 const MOST_TERMS: usize = 100;
 
@@ -51,9 +50,9 @@ pub struct DriveLaw {
 /// All drive laws. On a hinge, lengths become angles, and speeds angular speeds.
 pub static DRIVE_LAWS: [DriveLaw; 8] = [
     DriveLaw {
-        word: CLOSED_FORM,
-        help: "slider of the paper's machine; places the joint itself",
-        keys: &[key("slider", ValueType::Whole(1, 3), "1", "which slider: 1, 2 or 3")],
+        word: FUNCTION,
+        help: "a function of `[closed_form]`",
+        keys: &[key("function", ValueType::Text, "\"lift\"", "its name")],
     },
     DriveLaw {
         word: "constant",
@@ -159,8 +158,8 @@ static FACTOR_TERMS: LazyLock<FileTable> = LazyLock::new(|| {
 
 /// Table of the `factor` of a load: the laws of drives, for pure numbers.
 pub(super) static FACTOR: LazyLock<FileTable> = LazyLock::new(|| {
-    let words: &[&str] = DRIVE.words().iter().copied().filter(|word| *word != CLOSED_FORM).collect::<Vec<_>>().leak();
-    let kept = |key: &&FileKey| key.of != [CLOSED_FORM] && key.name != "unit";
+    let words: &[&str] = DRIVE.words().iter().copied().filter(|word| *word != FUNCTION).collect::<Vec<_>>().leak();
+    let kept = |key: &&FileKey| key.of != [FUNCTION] && key.name != "unit";
     let row = |key: &FileKey| match key.takes {
         ValueType::Word(_) => FileKey { takes: ValueType::Word(words), ..*key },
         _ => pure(key),
@@ -191,14 +190,14 @@ fn pure(key: &FileKey) -> FileKey {
 }
 
 /// Reads the drive of a coordinate, which is an angle if `turns`, or a factor, if the row of `node` has that table.
-pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<Drive, SceneError> {
+pub(super) fn read_drive(node: &Node<'_>, turns: bool) -> Result<Drive, SceneError> {
     let mut node = node.clone();
     node.document.on_hinge = turns;
     let section = node.section()?;
     let law = section.require("law")?;
     let number = |name: &str| section.number(name);
     Ok(match law.choice()? {
-        CLOSED_FORM => read_slider(&section, &law, scene)?,
+        FUNCTION => Drive::Function(read_follower(&section, coordinate(&section))?),
         "constant" => Drive::Constant { position: number("position")?, velocity: number("velocity")? },
         "harmonic" => Drive::Harmonic { mean: number("mean")?, terms: vec![read_term(&section)?] },
         "harmonics" => Drive::Harmonic { mean: number("mean")?, terms: read_terms(&section)? },
@@ -226,20 +225,6 @@ fn coordinate(section: &Section<'_>) -> Dimension {
         _ if section.rows.name == FACTOR.name => Dimension::None,
         true => Dimension::Angle,
         false => Dimension::Length,
-    }
-}
-
-fn read_slider(section: &Section<'_>, law: &Node<'_>, scene: &Scene) -> Result<Drive, SceneError> {
-    if section.document.on_hinge {
-        return Err(law.error(SLIDERS_ONLY));
-    }
-    if scene.machine.spcmm.is_none() {
-        return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
-    }
-    let slider = section.require("slider")?;
-    match slider.scalar()?.parse::<u8>() {
-        Ok(number @ 1..=3) => Ok(Drive::ClosedForm(number as usize - 1)),
-        _ => Err(slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")),
     }
 }
 

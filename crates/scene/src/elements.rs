@@ -354,7 +354,7 @@ impl Place<'_, '_> {
 
     fn law(&self, name: &str) -> Result<Option<Drive>, SceneError> {
         let node = self.section.get(name);
-        node.map(|node| read_drive(&node, self.on_hinge(), self.scene)).transpose()
+        node.map(|node| read_drive(&node, self.on_hinge())).transpose()
     }
 
     /// Name of the body of attachment `place` (0 or 1); `None` for the world.
@@ -407,11 +407,13 @@ impl Place<'_, '_> {
         })
     }
 
-    /// Rejects the scene's closed form as the law of an element.
-    fn refuse_closed_form(&self, law: Option<&Drive>, name: &str, what: &str) -> Result<(), SceneError> {
-        match law.and_then(Drive::closed_form) {
-            Some(_) => self.fault(name, &format!("a {what} follows a law of its own, not that of the scene's sliders")),
-            None => Ok(()),
+    /// Rejects a function of the scene's closed form as the law of an element.
+    fn refuse_function(&self, law: Option<&Drive>, name: &str, what: &str) -> Result<(), SceneError> {
+        match law {
+            Some(Drive::Function(_)) => {
+                self.fault(name, &format!("a {what} follows a law of its own, no function of [closed_form]"))
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -547,7 +549,7 @@ fn read_motor(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         (false, Some(_)) => {
             return place.fault("target", "has no effect: stiffness and damping, which pull towards it, are 0");
         }
-        _ => place.refuse_closed_form(motor.target.as_ref(), "target", "motor")?,
+        _ => place.refuse_function(motor.target.as_ref(), "target", "motor")?,
     }
     Ok(ElementKind::Motor(motor))
 }
@@ -576,7 +578,7 @@ fn read_tyre(place: &Place<'_, '_>) -> Result<ElementKind, SceneError> {
         ground: place.law("ground")?,
     };
     place.must_act(tyre.stiffness != 0.0, "stiffness")?;
-    place.refuse_closed_form(tyre.ground.as_ref(), "ground", "ground")?;
+    place.refuse_function(tyre.ground.as_ref(), "ground", "ground")?;
     Ok(ElementKind::Tyre(tyre))
 }
 

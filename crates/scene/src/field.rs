@@ -105,18 +105,4 @@ macro_rules! word_field {
     };
 }
 
-/// A field of an optional part of a scene's machine: `optional_field!(spcmm.frequency)`.
-macro_rules! optional_field {
-    ($part:ident.$name:ident) => {
-        Field {
-            get: |scene: &Scene| scene.machine.$part.as_ref().map_or(Value::Unset, |it| it.$name.to_value()),
-            set: |scene, value| {
-                if let Some(it) = &mut scene.machine.$part {
-                    it.$name = FieldValue::of_value(value);
-                }
-            },
-        }
-    };
-}
-
-pub(super) use {field, optional_field, word_field};
+pub(super) use {field, word_field};

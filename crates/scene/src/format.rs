@@ -3,6 +3,7 @@
 
 use std::sync::LazyLock;
 
+use super::closed_form::CLOSED_FORM;
 use super::drives::DRIVE;
 use super::elements::ELEMENTS;
 use super::key::{FileKey, FileTable, ListLimit, ValueType, Variants, key, many, number, positive, vector};
@@ -20,9 +21,8 @@ const MOST_OWN: usize = 1000;
 const SLOWEST_TO_REAL: (f64, f64) = (1e-4, 1.0);
 /// Maximum number of included files.
 const MOST_FILES: usize = 100;
-/// Largest length of a shape, and of the paper's machine, m.
+/// Largest length of a shape, m.
 const LARGEST: f64 = 1000.0;
-const LARGEST_SPCMM: f64 = 100.0;
 
 const WORLD: &str = "the world's";
 const PARENT: &str = "the parent's: the world's where there is no `parent`";
@@ -74,10 +74,10 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
     .map(|key| key.absent("the defaults"));
     let others = [
         key(
-            "spcmm",
-            ValueType::Table(&SPCMM),
-            "{ mean_x = \"203 mm\", gamma = \"15 deg\", hinge_radius = \"52 mm\", driving_rod = \"28 mm\", driven_rod = \"200 mm\" }",
-            SPCMM.help,
+            "closed_form",
+            ValueType::Table(&CLOSED_FORM),
+            "{ frequency = \"1 Hz\", functions = [{ name = \"lift\", formula = \"20 mm * sin(2*pi*t/1 s)\" }] }",
+            CLOSED_FORM.help,
         ),
         key(
             "include",
@@ -241,26 +241,6 @@ static OUTPUT: FileTable = FileTable::new(
     ],
 );
 
-static SPCMM: LazyLock<FileTable> = LazyLock::new(|| {
-    let length = |name, help| {
-        let takes = positive(D::Length, LARGEST_SPCMM);
-        key(name, takes, "\"52 mm\"", help).fixed()
-    };
-    let own = [
-        key("mean_x", number(D::Length), "\"203 mm\"", "mean of the platform's x").fixed(),
-        key("gamma", number(D::Angle), "\"15 deg\"", "the platform's constant angle").fixed(),
-        length("hinge_radius", "from the platform's middle to a hinge, b"),
-        length("driving_rod", "from a slider to its socket, L1"),
-        length("driven_rod", "from ball to hinge, L2"),
-    ];
-    FileTable::new(
-        "spcmm",
-        "[spcmm]",
-        "the paper's machine: the motion that its sliders follow, and the dimensions to which the file's bodies are built",
-        joined(&[&parameters("spcmm"), &own]),
-    )
-});
-
 static JOINT_CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
     let name = [key("name", ValueType::Joint, "\"J2\"", "which one")];
     FileTable::new(
@@ -312,15 +292,15 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
     FileTable::new("body", "[[body]]", "a rigid body", joined(&[&keys]))
 });
 
-static SHAPE: LazyLock<FileTable> = LazyLock::new(|| of_shape("shape", "a shape", &[]));
-
-static FIXED_SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
-    let own = [key("at_slider_plane", ValueType::Flag, "true", "whether it is moved along X by `spcmm.slider_plane`")
-        .absent("false")];
-    of_shape("fixed_shape", "[[fixed_shape]]", &own).also(&SHAPE)
+static SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
+    let help = "a shape of a body: what it looks like, and weighs where the body has a `density`";
+    of_shape("shape", "a shape", help)
 });
 
-fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTable {
+static FIXED_SHAPE: LazyLock<FileTable> =
+    LazyLock::new(|| of_shape("fixed_shape", "[[fixed_shape]]", "a shape that stands still").also(&SHAPE));
+
+fn of_shape(name: &'static str, head: &'static str, help: &'static str) -> FileTable {
     const LONG: &[&str] = &["capsule", "cylinder", "cone"];
     let point = |name, of, help| {
         let takes = vector(D::Length);
@@ -371,12 +351,7 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         .zero()
         .frame(BODY_FRAME),
     ];
-    let keys = joined(&[&own, more]);
-    let help = match more.is_empty() {
-        true => "a shape of a body: what it looks like, and weighs where the body has a `density`",
-        false => "a shape that stands still",
-    };
-    FileTable::new(name, head, help, keys).by(Variants::Word("form", "{}"))
+    FileTable::new(name, head, help, own.to_vec().leak()).by(Variants::Word("form", "{}"))
 }
 
 static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
@@ -401,7 +376,6 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "along which it slides or about which it turns, by the right-hand rule",
         )
         .of(TURNS)
-        .absent("required, except with the law `spcmm`")
         .frame(PARENT),
         key(
             "child_axis",
@@ -631,9 +605,11 @@ static PARAMETER: FileTable = FileTable::new(
         key("unit", ValueType::Text, "\"mm\"", "unit in which it is shown")
             .absent("that of `value`; required where that is an expression"),
         key("range", ValueType::Range, "[\"10 mm\", \"40 mm\"]", "least and greatest value").absent("any value"),
+        key("slider", ValueType::Range, "[\"15 mm\", \"30 mm\"]", "ends of its slider").absent("`range`"),
         key("whole", ValueType::Flag, "true", "whether it is a whole number").absent("false"),
         key("key", ValueType::Text, "\"chain.links\"", "its key for `--set`").absent("`parameter.` and its name"),
         key("help", ValueType::Text, "\"How far it goes.\"", "what it is").absent("none"),
+        key("equation", ValueType::Text, "\"Paper eq. (59)\"", "the equation that it enters").absent("none"),
     ],
 );
 

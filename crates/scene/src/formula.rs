@@ -54,7 +54,7 @@ pub(super) fn read_formula(
     Ok((program, scale))
 }
 
-fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
+pub(super) fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
     let span = node.value.span();
     let inner = span.start + 1;
     // A string with escapes or triple quotes is marked as a whole, because its offsets differ from the source.

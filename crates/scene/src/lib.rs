@@ -31,6 +31,7 @@
 mod access;
 mod assets;
 mod check;
+mod closed_form;
 mod document;
 mod drives;
 mod elements;
@@ -84,7 +85,7 @@ pub use visible::{visible, visible_line};
 
 use jointplay_physics::machine::{
     Attachment, BallJoint, Body, Drive, Formulation, Freedom, Geometry, Harmonic, Joint, JointKind, JointStart,
-    Machine, Mat3, Output, Preset, Quat, Role, Shape, Spcmm, StartRule, Vec3,
+    Machine, Mat3, Output, Preset, Quat, Role, Shape, StartRule, Vec3,
 };
 use jointplay_physics::units::{Dimension, format_quantity, parse_quantity, si_unit, unit_names};
 

@@ -21,14 +21,14 @@ pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Paramete
         slider: (-1.0, 1.0),
         logarithmic: false,
     };
-    row_of_file([key, key, "A number of the scene file."], kind, Value::Unset)
+    row_of_file([key, key, "A number of the scene file.", "Wherever the scene file uses it"], kind, Value::Unset)
 }
 
-/// Row with this key, label and help. Rows live as long as the program, like those of the table; equal ones are shared, so that a
+/// Row with this key, label, help and equation. Rows live as long as the program, like those of the table; equal ones are shared, so that a
 /// change of value adds none.
-pub(super) fn row_of_file([key, label, help]: [&str; 3], kind: Kind, default: Value) -> &'static Parameter {
+pub(super) fn row_of_file([key, label, help, equation]: [&str; 4], kind: Kind, default: Value) -> &'static Parameter {
     static ROWS: LazyLock<Mutex<BTreeMap<String, &'static Parameter>>> = LazyLock::new(Mutex::default);
-    let identity = format!("{key} {label} {help} {kind:?} {default:?}");
+    let identity = format!("{key} {label} {help} {equation} {kind:?} {default:?}");
     let mut rows = ROWS.lock().unwrap_or_else(PoisonError::into_inner);
     rows.entry(identity).or_insert_with(|| {
         let text = |text: &str| -> &'static str { Box::leak(text.into()) };
@@ -42,7 +42,7 @@ pub(super) fn row_of_file([key, label, help]: [&str; 3], kind: Kind, default: Va
             scope: Scope::Own,
             at_reset: true,
             help: text(help),
-            equation: "Wherever the scene file uses it",
+            equation: text(equation),
         }))
     })
 }

@@ -40,6 +40,22 @@ fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
     Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
 }
 
+/// Reads the name of `what`, a parameter or a function, as it stands in expressions.
+pub(super) fn read_identifier<'d>(node: &Node<'d>, what: &str) -> Result<&'d str, SceneError> {
+    let name = node.text()?;
+    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let reserved = ["i", "pi", "e", "t"].contains(&name)
+        || all_units().any(|(unit, ..)| unit == name)
+        || !name.starts_with(|c: char| letters(c) && !c.is_ascii_digit());
+    if reserved || name.len() > 40 || !name.chars().all(letters) {
+        return Err(node.error(format!(
+            "cannot name {what}, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, pi, e, \
+             t or a unit"
+        )));
+    }
+    Ok(name)
+}
+
 /// Reads a `[[parameter]]` of a file with the keys `file`: its row, and whether it is adjustable.
 fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Parameter, bool), SceneError> {
     let title = node.title("parameter");
@@ -47,17 +63,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let section = node.section_as(title.clone())?;
     let name_node = section.require("name")?;
     let full = name_node.name()?;
-    let name = name_node.text()?;
-    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let reserved = ["i", "pi", "e", "t"].contains(&name)
-        || all_units().any(|(unit, ..)| unit == name)
-        || name.starts_with(|c: char| c.is_ascii_digit());
-    if reserved || !name.chars().all(letters) {
-        return Err(name_node.error(
-            "cannot name a parameter, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, \
-             pi, e, t or a unit",
-        ));
-    }
+    let name = read_identifier(&name_node, "a parameter")?;
     let own_node = section.require("value")?;
     let passed = document.include.and_then(|include| include.values.get(name));
     let value_node = passed.unwrap_or(&own_node);
@@ -90,32 +96,25 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     }
     let value_node = value_node.retitled(key.clone());
     let value = value_node.quantity(dimension)?;
+    let pair = |key: &str| section.get(key).map(|node| read_range(&node, dimension)).transpose();
     let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
     let label = words("label")?.unwrap_or(&full);
     let help = words("help")?.unwrap_or("A parameter of this scene.");
-    let range = match section.get("range") {
-        None => None,
-        Some(node) => {
-            let [least, most] = node.quantities::<2>(dimension)?;
-            if least >= most {
-                return Err(node.error("the first value must be below the second"));
-            }
-            Some((least, most))
-        }
-    };
+    let equation = words("equation")?.unwrap_or("Wherever the scene file uses it");
+    let range = pair("range")?;
     let default = parse_quantity(text, dimension).ok();
     let around = match default.unwrap_or_default() {
         0.0 => (-1.0, 1.0),
         default => ((2.0 * default).min(0.0), (2.0 * default).max(0.0)),
     };
     let (min, max) = range.unwrap_or((-LARGEST, LARGEST));
-    let slider = range.unwrap_or(around);
+    let slider = pair("slider")?.or(range).unwrap_or(around);
     let kind = match whole {
         true => Kind::Count { min: min as u64, max: max as u64 },
         false => Kind::Number { dimension, min, max, display: unit, slider, logarithmic: false },
     };
     let given = default.map_or(Value::Unset, |default| kind.value_of(default));
-    let row = row_of_file([&key, &visible_line(label), &visible_line(help)], kind, given);
+    let row = row_of_file([&key, &visible_line(label), &visible_line(help), &visible_line(equation)], kind, given);
     let checked = if whole { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
     checked.map_err(|error| {
         let place = passed.map(|_| {
@@ -128,6 +127,15 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     document.reading.own(&full, value, dimension);
     // An expression without a range is an ordinary number, not an adjustable parameter.
     Ok((row, default.is_some() || range.is_some()))
+}
+
+/// Reads a range: two quantities of this dimension, the lesser first.
+fn read_range(node: &Node<'_>, dimension: Dimension) -> Result<(f64, f64), SceneError> {
+    let [least, most] = node.quantities::<2>(dimension)?;
+    if least >= most {
+        return Err(node.error("the first value must be below the second"));
+    }
+    Ok((least, most))
 }
 
 /// Reads the key by which a parameter is changed: names with dots between them, the first of which is no key of the `file`.

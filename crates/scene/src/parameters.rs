@@ -51,8 +51,6 @@ pub enum Scope {
     Every,
     /// In every scene, and as `joint.<name>.<last part>` for one joint.
     Contact,
-    /// Only in scenes with the paper's inverse kinematics.
-    Spcmm,
     /// Only in the scene whose file defines it.
     Own,
 }
@@ -63,7 +61,6 @@ impl Scope {
         match self {
             Self::Every => "every scene",
             Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
-            Self::Spcmm => "scenes with the paper's inverse kinematics",
             Self::Own => "scenes whose file gives it",
         }
     }

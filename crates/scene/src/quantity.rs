@@ -55,6 +55,14 @@ impl Quantity {
         matches!(self.powers, Ok([0, 0, 0, 0]))
     }
 
+    /// Whether it has a dimension.
+    ///
+    /// # Errors
+    /// An invalid operation led to it.
+    pub(super) fn dimension(&self) -> Result<(), DimensionError> {
+        self.powers.map(|_| ())
+    }
+
     /// Exponents of kg, m, s and rad; `None` after an invalid operation.
     pub fn powers(&self) -> Option<[i8; 4]> {
         self.powers.ok()
@@ -66,14 +74,20 @@ impl Quantity {
     /// # Errors
     /// Wrong dimension, an invalid operation, or a value that is not finite.
     pub fn of(self, dimension: Dimension, exact: bool) -> Result<f64, DimensionError> {
-        let found = self.powers?;
+        self.powers?;
         if !self.value.is_finite() {
             return Err(DimensionError::NotFinite);
         }
-        let wanted = powers(dimension);
+        self.has(dimension, exact)?;
+        Ok(self.value + 0.0)
+    }
+
+    /// Whether it has this dimension, by the rules of [`Self::of`]; its value may be infinite or not a number.
+    pub(super) fn has(self, dimension: Dimension, exact: bool) -> Result<(), DimensionError> {
+        let (found, wanted) = (self.powers?, powers(dimension));
         let angle = !exact && wanted[..3] != [0; 3] || wanted[3] == found[3] || self.value == 0.0;
         if found[..3] == wanted[..3] && angle {
-            return Ok(self.value + 0.0);
+            return Ok(());
         }
         Err(DimensionError::Foreign { value: self.value, powers: found, wanted: dimension })
     }

@@ -1,6 +1,7 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
 use super::assets::AssetResolver;
+use super::closed_form::read_closed_form;
 use super::document::{Document, Node, Section, lists};
 use super::elements::{ELEMENTS, read_element};
 use super::error::{no_ball_joint, no_body};
@@ -123,7 +124,7 @@ impl Scene {
         scene.source.places = places
             .iter()
             .map(|(key, node)| (key.clone(), node.place()))
-            .chain(top.get("spcmm").map(|node| ("spcmm".to_owned(), node.place())))
+            .chain(top.get("closed_form").map(|node| ("closed_form".to_owned(), node.place())))
             .collect();
         read_mechanism(&files, &patterns, &mut scene, &mut places)?;
         scene.source.numbers = Arc::new(document.reading.numbers());
@@ -152,9 +153,9 @@ impl Scene {
 /// An invalid place, or one for a machine whose closed form has its place.
 fn read_whole<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, SceneError> {
     let placement = read_placement(top)?;
-    if placement.is_some() && top.get("spcmm").is_some() {
+    if placement.is_some() && top.get("closed_form").is_some() {
         for key in ["position", "rotation"] {
-            top.refuse(key, "the closed form of [spcmm] has its own place")?;
+            top.refuse(key, "the functions of [closed_form] are those of the machine where it is")?;
         }
     }
     Ok(placement.map(|placement| Instance { group: Group::Scene, placement, outer: None }))
@@ -164,8 +165,7 @@ fn read_whole<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, SceneError>
 /// bodies, or the preset, which gives way to other settings. Other parameters of the table are changed in the machine.
 pub(super) fn is_of_text(key: &str) -> bool {
     let in_table = |(_, part): (&str, &str)| find(&format!("contact.{part}")).is_some();
-    ["solver.preset", "spcmm.slider_plane"].contains(&key)
-        || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !file_only(key)
+    key == "solver.preset" || find(key).is_none() && !joint_part(key).is_some_and(in_table) && !file_only(key)
 }
 
 /// Whether a key exists in scene files but can never be changed from outside.
@@ -190,20 +190,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         Some(node) => node.name()?.into_owned(),
         None => visible_line(stem.unwrap_or("scene")).into_owned(),
     };
-    let spcmm = match top.get("spcmm") {
-        None => None,
-        Some(node) => {
-            let section = node.section()?;
-            Some(Spcmm {
-                mean_x: section.number("mean_x")?,
-                gamma: section.number("gamma")?,
-                hinge_radius: section.number("hinge_radius")?,
-                driving_rod: section.number("driving_rod")?,
-                driven_rod: section.number("driven_rod")?,
-                ..Spcmm::default()
-            })
-        }
-    };
+    let closed_form = top.get("closed_form").map(|node| read_closed_form(&node.section()?)).transpose()?;
     let mut view = ViewSettings {
         down: SignedAxis::MinusZ,
         floor: None,
@@ -231,7 +218,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         title: visible_line(text("title")?.unwrap_or(&name)).into_owned(),
         description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
-        machine: Machine { spcmm, ..Machine::default() },
+        machine: Machine { closed_form, ..Machine::default() },
         view,
         overrides: Vec::new(),
         source: Source { file: document.file.map(str::to_owned), text: document.text.to_owned(), ..Source::default() },
@@ -308,16 +295,8 @@ fn read_mechanism<'d>(
     let mut joint_names = Names::default();
     let mut joints: Vec<JointText<'d>> = Vec::new();
     for node in list("joint")? {
-        let joint = read_joint(&node, scene, &file_order, &file_places)?;
+        let joint = read_joint(&node, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
-        let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.closed_form();
-        if let Some(coordinate) = slider(&joint)
-            && let Some(other) = joints.iter().find(|other| slider(other) == Some(coordinate))
-        {
-            let message =
-                format!("slider {} already drives joint `{}`; allowed 1, 2, 3, each once", coordinate + 1, other.name);
-            return Err(joint.section.error("drive", message));
-        }
         joints.push(joint);
     }
     let (closing, joints): (Vec<_>, Vec<_>) = joints.into_iter().partition(|text| text.closes_loop);
@@ -347,7 +326,7 @@ fn read_mechanism<'d>(
         scene.machine.ball_joints.push(joint);
     }
     for node in list("fixed_shape")? {
-        let shape = read_shape(&node, true, scene.machine.spcmm.as_ref())?;
+        let shape = read_shape(&node, true)?;
         scene.machine.fixed_shapes.push(shape);
     }
     read_joint_contacts(top, scene, places)?;

@@ -54,7 +54,7 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
         return Err(name_node.error(why));
     }
     let shapes = match section.get("shapes") {
-        Some(node) => node.entries()?.iter().map(|shape| read_shape(shape, false, None)).collect::<Result<_, _>>()?,
+        Some(node) => node.entries()?.iter().map(|shape| read_shape(shape, false)).collect::<Result<_, _>>()?,
         None => Vec::new(),
     };
     if let Some(node) = section.get("density") {
@@ -141,19 +141,15 @@ fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
     Ok(inertia)
 }
 
-/// Reads a shape; a `fixed` one may follow the slider plane of `spcmm`.
-pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) -> Result<Shape, SceneError> {
+/// Reads a shape of a body, or a `fixed` one.
+pub(super) fn read_shape(node: &Node<'_>, fixed: bool) -> Result<Shape, SceneError> {
     let section = node.section()?;
     let role = section.get("role").map(|node| node.word()).transpose()?;
     let colour = section.get("colour").as_ref().map(read_colour);
     let colour = colour.transpose()?;
     let form_node = section.require("form")?;
     let form: Form = form_node.word()?;
-    let shift = match (fixed, spcmm) {
-        (true, spcmm) => read_shift(&section, spcmm)?,
-        _ => Vec3::zeros(),
-    };
-    let point = |name| Ok::<_, SceneError>(section.vector(name)? + shift);
+    let point = |name| section.vector(name);
     let size = |name| section.number(name);
     let geometry = match form {
         Form::Box => {
@@ -167,11 +163,8 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) ->
         Form::Sphere => Geometry::Sphere { centre: point("centre")?, radius: size("radius")? },
         Form::Plate => {
             let node = section.require("corners")?;
-            let corners = node
-                .entries()?
-                .iter()
-                .map(|corner| Ok(corner.vector()? + shift))
-                .collect::<Result<Vec<_>, SceneError>>()?;
+            let corners =
+                node.entries()?.iter().map(|corner| Ok(corner.vector()?)).collect::<Result<Vec<_>, SceneError>>()?;
             let triangles = fill(&corners).map_err(|fault| node.error(fault.to_string()))?;
             Geometry::Plate { corners, triangles, thickness: size("thickness")? }
         }
@@ -186,7 +179,7 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) ->
                 _ => Geometry::Cone { from, to, radius },
             }
         }
-        Form::Mesh => read_mesh(&section, shift)?,
+        Form::Mesh => read_mesh(&section)?,
     };
     let mut shape = Shape { geometry, role, colour };
     // Shapes of a body move with it.
@@ -197,7 +190,7 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool, spcmm: Option<&Spcmm>) ->
 }
 
 /// Reads a mesh from a file beside the scene.
-fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError> {
+fn read_mesh(section: &Section<'_>) -> Result<Geometry, SceneError> {
     let file = section.require("file")?;
     let name = file.text()?;
     let document = &file.document;
@@ -221,7 +214,7 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
     Ok(Geometry::Mesh {
         mesh,
         unit,
-        position: section.vector("position")? + shift,
+        position: section.vector("position")?,
         rotation: read_rotation(section.get("rotation"))?,
     })
 }
@@ -268,18 +261,6 @@ fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
             "not a colour; allowed: `#` and six hexadecimal digits, red, green and blue, for example \
                     \"#c2255c\"",
         )),
-    }
-}
-
-/// Offset of a fixed shape that follows the slider plane of `spcmm`, m.
-fn read_shift(section: &Section<'_>, spcmm: Option<&Spcmm>) -> Result<Vec3, SceneError> {
-    let Some(node) = section.get("at_slider_plane") else {
-        return Ok(Vec3::zeros());
-    };
-    match (node.flag()?, spcmm) {
-        (true, Some(spcmm)) => Ok(Vec3::new(spcmm.slider_plane, 0.0, 0.0)),
-        (true, None) => Err(node.error("there is no slider plane without a section [spcmm]")),
-        (false, _) => Ok(Vec3::zeros()),
     }
 }
 

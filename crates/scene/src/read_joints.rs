@@ -1,7 +1,7 @@
 //! Readers of tree joints, loop-closing joints and ball joints; sorting of bodies into a forest.
 
 use super::document::{Node, Section};
-use super::drives::{SLIDERS_ONLY, read_drive};
+use super::drives::read_drive;
 use super::error::no_body;
 use super::instance::Instance;
 use super::placement::{read_attachment, read_rotation};
@@ -33,7 +33,6 @@ pub(super) struct BallJointText<'d> {
 /// Reads a `[[joint]]`; `bodies` are the names in file order, `places` the index of each.
 pub(super) fn read_joint<'d>(
     node: &Node<'d>,
-    scene: &Scene,
     bodies: &[String],
     places: &BTreeMap<&str, usize>,
 ) -> Result<JointText<'d>, SceneError> {
@@ -78,9 +77,9 @@ pub(super) fn read_joint<'d>(
     match kind {
         JointKind::Free => read_free(&section, &mut joint)?,
         JointKind::Fixed => {}
-        JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
+        JointKind::Prismatic | JointKind::Revolute => read_moving(&section, &mut joint)?,
         JointKind::Cylindrical | JointKind::Universal => {
-            read_two_degrees(&section, scene, &mut joint)?;
+            read_two_degrees(&section, &mut joint)?;
         }
     }
     if let Some(instance) = node.document.instance {
@@ -152,20 +151,10 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
 }
 
 /// Reads a slide or a hinge: axis, and either a drive or start values.
-fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
+fn read_moving(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
-        let drive = read_drive(&node, joint.kind == JointKind::Revolute, scene)?;
-        let slider = drive.closed_form();
-        joint.drive = Some(drive);
-        if let (Some(coordinate), Some(spcmm)) = (slider, scene.machine.spcmm.as_ref()) {
-            for key in ["axis", "parent_point", "parent", "rotation"] {
-                section.refuse(key, "the law spcmm places this joint: in the slider plane, along its own axis")?;
-            }
-            joint.axis = [Vec3::z(), -Vec3::z(), Vec3::y()][coordinate];
-            joint.parent_point = Vec3::new(spcmm.slider_plane, 0.0, 0.0);
-            return Ok(());
-        }
+        joint.drive = Some(read_drive(&node, joint.kind == JointKind::Revolute)?);
     } else if let Some(node) = section.get("start") {
         let mut start = node.section()?;
         start.document.on_hinge = joint.kind == JointKind::Revolute;
@@ -176,7 +165,7 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
 }
 
 /// Reads a cylindrical or universal joint.
-fn read_two_degrees(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
+fn read_two_degrees(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
     let universal = joint.kind == JointKind::Universal;
     joint.axis = section.require("axis")?.direction()?;
     if universal {
@@ -202,11 +191,7 @@ fn read_two_degrees(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> 
     for (part, ((freedom, rate), driven)) in coordinates.enumerate() {
         let word = freedom.word();
         if let Some(node) = drive.as_ref().and_then(|drive| drive.get(word)) {
-            let own = read_drive(&node, freedom.turns(), scene)?;
-            if own.closed_form().is_some() {
-                return Err(node.error(SLIDERS_ONLY));
-            }
-            *driven = Some(own);
+            *driven = Some(read_drive(&node, freedom.turns())?);
             for key in [word, rate] {
                 let why = "the drive of this coordinate says where it starts";
                 start.as_ref().map_or(Ok(()), |start| start.refuse(key, why))?;

@@ -41,6 +41,8 @@ pub(super) struct Reading<'d> {
     /// User-defined parameters, by their full names: after the name of an included file that defines them.
     own: RefCell<BTreeMap<String, Quantity>>,
     numbers: RefCell<BTreeMap<String, FileNumber>>,
+    /// Functions of the scene's closed form read so far, with their values at t = 0.
+    functions: RefCell<Vec<(String, Quantity)>>,
     /// SI sizes of [`all_units`].
     units: OnceCell<Vec<Quantity>>,
 }
@@ -114,20 +116,50 @@ impl<'d> Reading<'d> {
         dimension: Dimension,
         instance: Option<&Instance<'_>>,
     ) -> Result<(Program, bool), ReadingError> {
+        let (program, value, has_units) = self.compiled(text, &[], instance)?;
+        if has_units {
+            value.of(dimension, false)?;
+        }
+        Ok((program, has_units))
+    }
+
+    /// The same for a function of the scene's closed form, or an expression of its functions, which are variables after t. The
+    /// quantity is the value at t = 0, which need not be finite.
+    ///
+    /// # Errors
+    /// Invalid syntax, unit or dimension.
+    pub fn function(&self, text: &str) -> Result<(Program, Quantity), ReadingError> {
+        let (program, value, _) = self.compiled(text, &self.functions.borrow(), None)?;
+        value.dimension()?;
+        Ok((program, value))
+    }
+
+    /// Compiles `text` as a function of t and `functions`; the program, its value at t = 0, and whether it has units.
+    fn compiled(
+        &self,
+        text: &str,
+        functions: &[(String, Quantity)],
+        instance: Option<&Instance<'_>>,
+    ) -> Result<(Program, Quantity, bool), ReadingError> {
         let own = self.own.borrow();
-        let (mut names, mut values) = named(&own, instance);
-        names.insert(0, "t");
-        values.insert(0, Quantity::new(0.0, Dimension::Time));
+        let of_time = [("t", Quantity::new(0.0, Dimension::Time))];
+        let functions = functions.iter().map(|(name, value)| (name.as_str(), *value));
+        let (mut names, mut values): (Vec<&str>, Vec<Quantity>) = of_time.into_iter().chain(functions).unzip();
+        let kept = names.len();
+        let (own_names, own_values) = named(&own, instance);
+        names.extend(own_names);
+        values.extend(own_values);
         let first_unit = values.len();
         values.extend(self.units());
         let variable = |name: &str| names.iter().position(|of| *of == name);
-        let numbers: Vec<f64> = values[1..].iter().map(Quantity::value).collect();
+        let numbers: Vec<f64> = values[kept..].iter().map(Quantity::value).collect();
         let bare = Program::parse(text, variable, &names);
         let has_unit = |program: &Program| (1..first_unit).any(|own| program.uses(own) && !values[own].is_pure());
         if let Ok(program) = &bare
             && !has_unit(program)
         {
-            return Ok((program.bound(&numbers), false));
+            let start: Vec<f64> = values.iter().map(Quantity::value).collect();
+            return Ok((program.bound(kept, &numbers), Quantity::constant(program.eval(&start)), false));
         }
         let spelt = plain(text);
         let unit = |rest: &str| {
@@ -135,10 +167,7 @@ impl<'d> Reading<'d> {
             Some((length, first_unit + place))
         };
         match Program::parse_with_units(&spelt, variable, &names, unit) {
-            Ok(program) => {
-                program.eval(&values).of(dimension, false)?;
-                Ok((program.bound(&numbers), true))
-            }
+            Ok(program) => Ok((program.bound(kept, &numbers), program.eval(&values), true)),
             // The error of the parse without units is more specific.
             Err(wrong) => Err(bare.err().unwrap_or(wrong).into()),
         }
@@ -156,6 +185,21 @@ impl<'d> Reading<'d> {
     pub fn own(&self, name: &str, value: f64, dimension: Dimension) {
         let value = Quantity::new(value, dimension);
         self.own.borrow_mut().insert(name.to_owned(), value);
+    }
+
+    /// Whether `name` is that of a parameter of the scene or of a function.
+    pub fn names(&self, name: &str) -> bool {
+        self.own.borrow().contains_key(name) || self.functions.borrow().iter().any(|(own, _)| own == name)
+    }
+
+    /// Defines a function of the scene's closed form for later expressions.
+    pub fn add_function(&self, name: &str, value: Quantity) {
+        self.functions.borrow_mut().push((name.to_owned(), value));
+    }
+
+    /// Functions of the scene's closed form read so far, in order.
+    pub fn functions(&self) -> Vec<(String, Quantity)> {
+        self.functions.borrow().clone()
     }
 
     pub fn record(&self, key: &str, number: FileNumber) {

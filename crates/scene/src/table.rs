@@ -1,6 +1,6 @@
 //! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
-use super::field::{Access, Field, FieldValue, SWITCH, field, optional_field, word_field, word_of};
+use super::field::{Access, Field, FieldValue, SWITCH, field, word_field, word_of};
 use super::{Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value};
 use jointplay_physics::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use jointplay_physics::integrate::Method;
@@ -41,18 +41,6 @@ const fn contact(
     row(key, Access::Contact(field), label, "Contact", kind, default, Scope::Contact, help, equation)
 }
 
-const fn drive(
-    key: &'static str,
-    field: Field<Scene>,
-    label: &'static str,
-    kind: Kind,
-    default: Value,
-    help: &'static str,
-    equation: &'static str,
-) -> Parameter {
-    at_reset(row(key, Access::Scene(field), label, "Drive", kind, default, Scope::Spcmm, help, equation))
-}
-
 const fn at_reset(mut parameter: Parameter) -> Parameter {
     parameter.at_reset = true;
     parameter
@@ -87,7 +75,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 29] = [
+static TABLE: [Parameter; 25] = [
     contact(
         "contact.clearance",
         field!(clearance),
@@ -247,45 +235,6 @@ static TABLE: [Parameter; 29] = [
         "Gravity along Z",
         -9.81,
         "World Z component of gravity: -9.81 m/s^2 where Z points up. A file that gives any component has 0 for the others.",
-    ),
-    drive(
-        "spcmm.slider_plane",
-        optional_field!(spcmm.slider_plane),
-        "Slider plane",
-        number(D::Length, -1.0, 1.0, "mm", (0.0, 0.1)),
-        Value::Number(0.032),
-        "a1: distance along +X from the origin to the plane in which the sliders move. The paper does not print it; \
-         32 mm keeps the trajectory feasible all period long. Much larger values bring the rods near a singular \
-         position, where reactions grow without bound.",
-        "Paper eqs. (37) to (39), in x - (a1 + L1)",
-    ),
-    drive(
-        "spcmm.amplitude_x",
-        optional_field!(spcmm.amplitude_x),
-        "Amplitude of x",
-        number(D::Length, 0.0, 1.0, "mm", (0.0, 0.05)),
-        Value::Number(0.025),
-        "Amplitude of the platform's commanded travel along X. With 0 and no beta amplitude the sliders rest.",
-        "Paper eq. (59)",
-    ),
-    drive(
-        "spcmm.amplitude_beta",
-        optional_field!(spcmm.amplitude_beta),
-        "Amplitude of beta",
-        number(D::Angle, 0.0, 1.0, "rad", (0.0, 0.1)),
-        Value::Number(0.025),
-        "Amplitude of the platform's commanded swing in beta.",
-        "Paper eq. (59)",
-    ),
-    drive(
-        "spcmm.frequency",
-        optional_field!(spcmm.frequency),
-        "Drive frequency",
-        number(D::Frequency, 0.0, 50.0, "Hz", (0.0, 5.0)),
-        Value::Number(0.5),
-        "Repetitions of the trajectory per second; 0.5 Hz is the paper's period of 2 s. Accelerations grow \
-         with its square. With 0 the sliders rest.",
-        "Paper eq. (59)",
     ),
     at_reset(row(
         "formulation",

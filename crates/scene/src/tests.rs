@@ -6,19 +6,15 @@ use super::*;
 use jointplay_physics::integrate::StepControl;
 use jointplay_physics::machine::ElementKind;
 
-/// World poses of all bodies at the file's start; slider coordinates of the spcmm law as derived by `physics`.
+/// World poses of all bodies at the file's start, without drives.
 fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
-    // Roots of the paper's eq. (39) at t = 0 for a1 = 32 mm.
-    let sliders = [0.136_493_548_0, 0.240_922_773_5, 0.186_472_405_6];
     let mut poses: Vec<(Vec3, Quat)> = Vec::new();
     for joint in &scene.machine.joints {
         let (origin, frame) = joint.parent.map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
-        let slider = joint.drive.as_ref().and_then(Drive::closed_form);
-        let q = match (slider, joint.start) {
-            (Some(coordinate), _) => sliders[coordinate],
-            (_, JointStart::Scalar { position, .. }) => position,
-            (_, JointStart::Pair { .. }) => panic!("no built-in scene has one"),
-            (_, JointStart::Pose { position, rotation, .. }) => {
+        let q = match joint.start {
+            JointStart::Scalar { position, .. } => position,
+            JointStart::Pair { .. } => panic!("no built-in scene has one"),
+            JointStart::Pose { position, rotation, .. } => {
                 poses.push((position, rotation));
                 continue;
             }
@@ -49,7 +45,6 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
         let point = |end: Attachment| end.body.map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point);
         for joint in &scene.machine.ball_joints {
             let e = point(joint.ball) - point(joint.socket);
-            // The slider coordinates are given to ten digits.
             assert!(e.norm() < 1e-9, "{name}: {} starts {:e} m off its socket's centre", joint.name, e.norm());
         }
     }
@@ -161,7 +156,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
 
 #[test]
 fn a_key_of_the_file_alone_says_so() {
-    for key in ["spcmm.gamma", "output.body", "name", "title"] {
+    for key in ["closed_form.frequency", "output.body", "name", "title"] {
         let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
         assert!(error.message.starts_with("only in the scene file"), "{error}");
     }
@@ -257,7 +252,6 @@ fn the_slider_plane_moves_sliders_and_rails() {
     assert_eq!(scene.machine.joints[0].parent_point, Vec3::new(0.040, 0.0, 0.0));
     let Geometry::Box { centre, .. } = scene.machine.fixed_shapes[0].geometry else { panic!("a rail is a box") };
     assert!((centre.x - 0.018).abs() < 1e-15);
-    assert_eq!(scene.machine.spcmm.map(|spcmm| spcmm.slider_plane), Some(0.040));
 }
 
 #[test]

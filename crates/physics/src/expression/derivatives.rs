@@ -14,6 +14,7 @@ impl Number for Jet {
         let g = x.unary(operation);
         let (g1, g2) = match operation {
             Unary::Negate => return -self,
+            Unary::Sqrt => return self.sqrt(),
             Unary::Sin => (libm::cos(x), -g),
             Unary::Cos => (-libm::sin(x), -g),
             Unary::Tan => (1.0 + g * g, 2.0 * g * (1.0 + g * g)),
@@ -31,7 +32,6 @@ impl Number for Jet {
             Unary::Tanh => (1.0 - g * g, -2.0 * g * (1.0 - g * g)),
             Unary::Exp => (g, g),
             Unary::Ln => (1.0 / x, -1.0 / (x * x)),
-            Unary::Sqrt => (0.5 / g, -0.25 / (g * x)),
             Unary::SmoothStep => {
                 let (_, g1, g2) = smooth_step(x);
                 (g1, g2)
@@ -47,6 +47,8 @@ impl Number for Jet {
             Binary::Add => self + other,
             Binary::Subtract => self - other,
             Binary::Multiply => self * other,
+            // With fewer roundings.
+            Binary::Divide if self == Self::constant(1.0) => other.recip(),
             Binary::Divide => self / other,
             Binary::Power => power(self, other),
             Binary::Atan2 => {

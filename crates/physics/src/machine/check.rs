@@ -2,9 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::{
-    BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointSpring, Machine, Spcmm, Spring, Warning,
-};
+use super::{BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointSpring, Machine, Spring, Warning};
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::StepControl;
 use crate::units::{Dimension, format_quantity, unit_names};
@@ -76,15 +74,13 @@ pub enum MachineFault {
         /// Name of the joint or element.
         what: String,
     },
-    /// A closed form that the machine does not have, or that drives no such coordinate.
-    #[error(
-        "{what} follows coordinate {coordinate} of a closed form (counted from 0), which this machine does not have"
-    )]
-    NoClosedForm {
+    /// A function that the machine's closed form does not have, or a force element that follows one.
+    #[error("{what} follows function {function} of a closed form (counted from 0), which it does not have")]
+    NoFunction {
         /// Name of the joint or element.
         what: String,
-        /// Coordinate.
-        coordinate: usize,
+        /// Index of the function.
+        function: usize,
     },
     /// Contact parameters contradict one another.
     #[error("{joint}: {fault}")]
@@ -158,16 +154,16 @@ impl Machine {
             if finite && rising { Ok(()) } else { Err(MachineFault::Points { what: what.to_owned() }) }
         };
         // Elements follow laws of their own.
-        let check = |what: &str, drive: &Drive, forms: usize| match drive {
+        let check = |what: &str, drive: &Drive, functions: usize| match drive {
             Drive::Table { points, .. } => rises(what, points),
-            Drive::ClosedForm(coordinate) if *coordinate >= forms => {
-                Err(MachineFault::NoClosedForm { what: what.to_owned(), coordinate: *coordinate })
+            Drive::Function(function) if *function >= functions => {
+                Err(MachineFault::NoFunction { what: what.to_owned(), function: *function })
             }
             _ => Ok(()),
         };
-        let forms = if self.spcmm.is_some() { Spcmm::SLIDERS } else { 0 };
+        let functions = self.closed_form.as_ref().map_or(0, |form| form.functions.len());
         for joint in &self.joints {
-            joint.drives().try_for_each(|(_, drive)| check(&joint.name, drive, forms))?;
+            joint.drives().try_for_each(|(_, drive)| check(&joint.name, drive, functions))?;
         }
         for element in &self.elements {
             element.law().map_or(Ok(()), |law| check(&element.name, law, 0))?;
@@ -481,8 +477,8 @@ mod tests {
         for points in [&[][..], &[[0.0, 1.0]], &[[1.0, 1.0], [1.0, 2.0]], &[[0.0, 1.0], [1.0, f64::NAN]]] {
             assert!(matches!(fault(table(points)), Some(MachineFault::Points { .. })), "{points:?}");
         }
-        let none = fault(drive(Drive::ClosedForm(2)));
-        assert!(matches!(none, Some(MachineFault::NoClosedForm { coordinate: 2, .. })), "{none:?}");
+        let none = fault(drive(Drive::Function(2)));
+        assert!(matches!(none, Some(MachineFault::NoFunction { function: 2, .. })), "{none:?}");
         let curve = fault(|machine| {
             let [from, to] = [Attachment::world(Vec3::zeros()), Attachment::on(0, Vec3::zeros())];
             let (elastic, side) = (Elastic::Curve(Vec::new()), SpringSide::Both);

@@ -6,8 +6,8 @@ use crate::expression::Program;
 /// lengths are angles (rad) and speeds angular speeds (rad/s); of a factor, they are pure numbers and numbers per second.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
-    /// Coordinate of the machine's closed form, by index from 0.
-    ClosedForm(usize),
+    /// Function of the machine's closed form, by index from 0.
+    Function(usize),
     /// `position` + `velocity` t.
     Constant {
         /// Position at t = 0, m.
@@ -71,14 +71,4 @@ pub struct Harmonic {
     pub frequency: f64,
     /// Phase, rad.
     pub phase: f64,
-}
-
-impl Drive {
-    /// Coordinate of the machine's closed form that this drive follows, by index from 0, if any.
-    pub fn closed_form(&self) -> Option<usize> {
-        match self {
-            Self::ClosedForm(coordinate) => Some(*coordinate),
-            _ => None,
-        }
-    }
 }

@@ -2,6 +2,7 @@
 
 mod body;
 mod check;
+mod closed_form;
 mod conditions;
 mod doubts;
 mod drive;
@@ -16,6 +17,7 @@ mod solid;
 
 pub use body::*;
 pub use check::{ContactConflict, ContactFault, LEAST_IMPACT_STEPS, MachineFault};
+pub use closed_form::{ClosedForm, Function, Path};
 pub use conditions::Conditions;
 pub use doubts::*;
 pub use drive::*;
@@ -50,7 +52,7 @@ pub struct Machine {
     /// Stepper settings.
     pub solver: Solver,
     /// Closed-form motion that drives may follow.
-    pub spcmm: Option<Spcmm>,
+    pub closed_form: Option<ClosedForm>,
     /// Contents of the pose columns.
     pub output: Output,
     /// Interpretation of the start values.
@@ -77,7 +79,7 @@ impl Default for Machine {
             contact: contact::Parameters::default(),
             formulation: Formulation::Tree,
             solver: Solver::default(),
-            spcmm: None,
+            closed_form: None,
             output: Output { body: 0, probe: None },
             start: StartRule::default(),
             bodies: Vec::new(),
@@ -115,34 +117,6 @@ impl Machine {
         let of = |joint| Joint::drives(joint).map(move |(freedom, _)| (joint, freedom));
         self.joints.iter().flat_map(of)
     }
-}
-
-/// The paper's mechanism: dimensions and trajectory for its slider laws. SI units.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spcmm {
-    /// a1, distance along +X from O_A to the slider plane, m.
-    pub slider_plane: f64,
-    /// Amplitude of x, m (59).
-    pub amplitude_x: f64,
-    /// Amplitude of beta, rad (59).
-    pub amplitude_beta: f64,
-    /// Drive frequency, Hz (59): 0.5 Hz is the paper's period of 2 s.
-    pub frequency: f64,
-    /// Mean of x, m (59).
-    pub mean_x: f64,
-    /// gamma, rad (59).
-    pub gamma: f64,
-    /// b, hinge radius on the platform, m.
-    pub hinge_radius: f64,
-    /// L1, driving rod, m.
-    pub driving_rod: f64,
-    /// L2, driven rod, m.
-    pub driven_rod: f64,
-}
-
-impl Spcmm {
-    /// Number of sliders, the coordinates that the closed form drives.
-    pub const SLIDERS: usize = 3;
 }
 
 /// Contents of the pose columns.

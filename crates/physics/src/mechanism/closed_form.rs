@@ -1,38 +1,241 @@
-//! Motion known in closed form, as functions of time alone: driven coordinates and, where no joint has play, the pose of the
-//! output body.
-
-use std::fmt::Debug;
+//! Evaluation of a motion in closed form, with exact first and second derivatives.
 
 use super::MechanismError;
 use crate::jet::Jet;
-use crate::machine::{Mat3, Vec3};
+use crate::machine::{ClosedForm, Mat3, Path, Vec3};
 
-/// Maximum number of coordinates driven by one closed form.
-pub const MOST_DRIVEN: usize = 3;
-
-/// The motion at one instant.
+/// Motion of the output body's frame in closed form at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct ClosedMotion {
-    /// Driven coordinates, m or rad.
-    pub driven: [Jet; MOST_DRIVEN],
-    /// Origin of the output body, m.
+    /// Its origin, world axes, m.
     pub position: [Jet; 3],
-    /// Rotation of the output body.
+    /// Its rotation.
     pub rotation: Mat3,
     /// Its angular velocity, rad/s.
     pub angular_velocity: Vec3,
-    /// Its angular acceleration, rad/s^2.
-    pub angular_acceleration: Vec3,
 }
 
-/// Closed-form laws of the drives, with the resulting motion of the output body.
-pub trait ClosedForm: Debug + Send + Sync {
-    /// The motion at `t`.
-    fn at(&self, t: f64) -> ClosedMotion;
+/// A motion that the machine cannot follow at some instant.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{what} at t = {time:.4} s: {function} = {value:.4e} in SI units, and must be above 0")]
+pub struct Unreachable {
+    /// What is wrong.
+    pub what: String,
+    /// Name of the function that shows it.
+    pub function: String,
+    /// Instant at which its value is lowest, s.
+    pub time: f64,
+    /// Its value there, SI.
+    pub value: f64,
+}
 
-    /// Checks that the mechanism can follow the motion at every instant.
+impl ClosedForm {
+    /// Number of values of [`Self::evaluate`].
+    pub(super) fn length(&self) -> usize {
+        1 + self.functions.len()
+    }
+
+    /// The time and the functions at `t`, in the order of the programs' variables.
+    pub(super) fn evaluate(&self, t: f64, values: &mut [Jet]) {
+        values[0] = Jet::new(self.pace * t, self.pace, 0.0);
+        for (i, function) in self.functions.iter().enumerate() {
+            values[i + 1] = function.program.eval(values);
+        }
+    }
+
+    /// The same, in a vector of its own.
+    pub(super) fn at(&self, t: f64) -> Vec<Jet> {
+        let mut values = vec![Jet::default(); self.length()];
+        self.evaluate(t, &mut values);
+        values
+    }
+
+    /// Period of the `followed` functions, s; infinite if none of them moves.
+    pub(super) fn period(&self, followed: &[usize]) -> f64 {
+        // No divisor of the period, at which a function could be at rest each time.
+        const INSTANTS: u32 = 7;
+        let period = self.repetition();
+        let moves = |instant| {
+            let values = self.at(period * f64::from(instant) / f64::from(INSTANTS));
+            followed.iter().map(|i| values[i + 1]).any(|value| value.rate != 0.0 || value.acceleration != 0.0)
+        };
+        if period.is_finite() && (0..INSTANTS).any(moves) { period } else { f64::INFINITY }
+    }
+
+    /// Time after which the functions repeat, s; infinite if they stand still.
+    fn repetition(&self) -> f64 {
+        1.0 / (self.frequency * self.pace)
+    }
+
+    /// Samples one period, or the start if the functions stand still, and reports the function that is the lowest below what it must be.
     ///
     /// # Errors
-    /// The mechanism cannot follow it.
-    fn check(&self) -> Result<(), MechanismError>;
+    /// A function is not above 0 that must be.
+    pub(super) fn check(&self) -> Result<(), MechanismError> {
+        const SAMPLES: u32 = 4000;
+        let period = Some(self.repetition()).filter(|period| period.is_finite()).unwrap_or(0.0);
+        let mut values = self.at(0.0);
+        let mut worst: Option<Unreachable> = None;
+        for n in 0..=SAMPLES {
+            let time = period * f64::from(n) / f64::from(SAMPLES);
+            self.evaluate(time, &mut values);
+            for (function, Jet { value, .. }) in self.functions.iter().zip(&values[1..]) {
+                // Not a number, too, is not above 0.
+                if let Some(what) = &function.positive
+                    && !(*value > 0.0)
+                    && worst.as_ref().is_none_or(|worst| !(*value >= worst.value))
+                {
+                    worst =
+                        Some(Unreachable { what: what.clone(), function: function.name.clone(), time, value: *value });
+                }
+            }
+        }
+        worst.map_or(Ok(()), |worst| Err(worst.into()))
+    }
+}
+
+impl Path {
+    /// The motion for these `values` of [`ClosedForm::evaluate`].
+    pub(super) fn at(&self, values: &[Jet]) -> ClosedMotion {
+        let mut rotation = Mat3::identity();
+        let mut angular_velocity = Vec3::zeros();
+        for (axis, angle) in &self.turns {
+            let angle = angle.eval(values);
+            angular_velocity += rotation * axis * angle.rate;
+            let (sine, cosine) = libm::sincos(angle.value);
+            let along = axis * axis.transpose();
+            rotation *= along + (Mat3::identity() - along) * cosine + axis.cross_matrix() * sine;
+        }
+        ClosedMotion {
+            position: self.position.each_ref().map(|program| program.eval(values)),
+            rotation,
+            angular_velocity,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::simulate::Simulation;
+
+    fn paper(changes: &[(&str, String)]) -> ClosedForm {
+        let changes: Vec<(String, String)> =
+            changes.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+        Scene::load("spcmm", &changes).expect("built in").machine.closed_form.expect("has one")
+    }
+
+    fn place(form: &ClosedForm, name: &str) -> usize {
+        form.functions.iter().position(|function| function.name == name).expect("is a function")
+    }
+
+    fn sliders(form: &ClosedForm, t: f64) -> [Jet; 3] {
+        let values = form.at(t);
+        ["f1", "f2", "f3"].map(|name| values[1 + place(form, name)])
+    }
+
+    #[test]
+    fn sliders_of_the_paper_have_the_values_of_the_contract() {
+        let form = paper(&[]);
+        let expected = [
+            (0.1364935480, -0.11575599, -0.13201567),
+            (0.2409227735, -0.04964883, -0.0671871),
+            (0.1864724056, -0.07282449, -0.08487076),
+        ];
+        for (f, (value, rate, acceleration)) in sliders(&form, 0.0).iter().zip(expected) {
+            assert!((f.value - value).abs() < 1e-10, "{f:?}");
+            assert!((f.rate - rate).abs() < 1e-8, "{f:?}");
+            assert!((f.acceleration - acceleration).abs() < 1e-8, "{f:?}");
+        }
+        // The reference trajectories' first row; 0.143 m tan(pi / 12).
+        let motion = form.path.as_ref().expect("known").at(&form.at(0.0));
+        assert!((motion.position[2].value + 0.0383167345177).abs() < 1e-12);
+        for (f, value) in sliders(&form, 0.5).iter().zip([0.0902403840, 0.2210909323, 0.1575618239]) {
+            assert!((f.value - value).abs() < 1e-10, "{f:?}");
+        }
+    }
+
+    #[test]
+    fn roots_stay_real_in_the_range_that_the_contract_gives() {
+        for (socket_plane, reachable) in [(0.041518, true), (0.041516, false), (0.364482, true), (0.364484, false)] {
+            let form = paper(&[("spcmm.slider_plane", format!("{} m", socket_plane - 0.028))]);
+            assert_eq!(form.check().is_ok(), reachable, "x_s = {socket_plane}");
+        }
+    }
+
+    #[test]
+    fn the_function_that_is_lowest_below_0_is_named() {
+        let Err(MechanismError::Unreachable(error)) = paper(&[("spcmm.slider_plane", "0 m".to_owned())]).check() else {
+            panic!("the rod is long enough");
+        };
+        assert_eq!((error.function.as_str(), error.what.as_str()), ("root1", "slider 1: rod too short"));
+        assert!(error.value < 0.0, "{error}");
+    }
+
+    #[test]
+    fn a_motion_at_another_pace_is_the_same_motion() {
+        let (form, t) = (paper(&[]), 0.3);
+        let slow = ClosedForm { pace: 0.25, ..form.clone() };
+        let sliders_of = |form: &ClosedForm| ["f1", "f2", "f3"].map(|name| place(form, name));
+        assert_eq!((form.period(&sliders_of(&form)), slow.period(&sliders_of(&form))), (2.0, 8.0));
+        for (a, b) in sliders(&form, t).iter().zip(sliders(&slow, 4.0 * t)) {
+            assert!((a.value - b.value).abs() < 1e-15 && (a.rate - 4.0 * b.rate).abs() < 1e-14, "{a:?} {b:?}");
+            assert!((a.acceleration - 16.0 * b.acceleration).abs() < 1e-13, "{a:?} {b:?}");
+        }
+        let still = paper(&["spcmm.amplitude_x", "spcmm.amplitude_beta"].map(|key| (key, "0".to_owned())));
+        assert_eq!(still.period(&sliders_of(&still)), f64::INFINITY);
+    }
+
+    /// A crank of 30 mm that turns at 2 Hz and pushes a block through a rod of `length`: x = r cos + sqrt(L^2 - r^2 sin^2).
+    fn slider_crank(length: &str) -> Scene {
+        let text = format!(
+            r#"
+            start = "ideal"
+            parameter = [{{ name = "r", value = "30 mm" }}, {{ name = "l", value = "{length}" }}]
+            contact = {{ clearance = 0 }}
+            output = {{ body = "block", probe = "10 5 0 mm" }}
+            body = [
+                {{ name = "crank", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
+                {{ name = "rod", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
+                {{ name = "block", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
+            ]
+            joint = [
+                {{ name = "A", kind = "revolute", child = "crank", axis = [0, 1, 0], drive = {{ law = "function", function = "turn" }} }},
+                {{ name = "B", kind = "revolute", parent = "crank", parent_point = ["r", 0, 0], child = "rod", axis = [0, 1, 0] }},
+                {{ name = "C", kind = "prismatic", child = "block", axis = [1, 0, 0], start = {{ position = "r + l" }} }},
+            ]
+            ball_joint = [{{ name = "S", socket = {{ body = "block" }}, ball = {{ body = "rod", at = ["l", 0, 0] }} }}]
+            [closed_form]
+            frequency = "2 Hz"
+            x = "r*cos(turn) + sqrt(left)"
+            y = "0 mm"
+            z = "0 mm"
+            functions = [
+                {{ name = "turn", formula = "2*pi*2 Hz*t" }},
+                {{ name = "left", formula = "l*l - (r*sin(turn))^2", positive = "the rod is too short" }},
+            ]
+            "#
+        );
+        Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn a_scene_of_its_own_follows_its_path() {
+        let mut simulation = Simulation::new(&slider_crank("100 mm").machine).expect("starts");
+        let mut frame = crate::simulate::Frame::default();
+        let mut travel = (f64::INFINITY, 0.0_f64);
+        for k in 1..=50 {
+            let time = 0.01 * f64::from(k);
+            simulation.advance_to(time).expect("runs");
+            simulation.sample(time, &mut frame);
+            let off = frame.probe_error.expect("is known").norm();
+            assert!(off < 1e-12, "{off:e} at {time}");
+            let x = frame.bodies[2].position.x;
+            travel = (travel.0.min(x), travel.1.max(x));
+        }
+        assert!((travel.0 - 0.07).abs() < 1e-4 && (travel.1 - 0.13).abs() < 1e-4, "{travel:?}");
+        let short = Simulation::new(&slider_crank("25 mm").machine).expect_err("cannot turn").to_string();
+        assert!(short.starts_with("the rod is too short at t = 0.1250 s: left = -2.7500e-4"), "{short}");
+    }
 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use super::assembly::Settled;
 use super::constraints::Constraints;
-use super::drives::trajectory_of;
+use super::drives::{Trajectory, trajectory_of};
 use super::lu::Lu;
 use super::model::{Body, Model, Motion};
 use super::settled::{settle, without_play};
@@ -96,16 +96,16 @@ pub(super) fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f6
 /// `machine` with the values that every law has at t = 0.
 pub(super) fn at_start(machine: &Machine) -> Machine {
     let mut still = machine.clone();
-    let forms = super::model::closed_form_of(machine);
-    let forms = forms.map(|form| form.at(0.0).driven);
+    let functions = machine.closed_form.as_ref().map_or(Vec::new(), |form| form.at(0.0));
     let hold = |drive: &mut Drive, turns: bool| {
         let trajectory = trajectory_of(drive, turns);
-        let own = trajectory.law().map(|law| law.at(0.0).value);
-        let closed = || Some(forms?[drive.closed_form()?].value);
-        let position = own.or_else(closed).unwrap_or_default();
+        let position = match &trajectory {
+            Trajectory::Function(function) => functions[function + 1].value,
+            Trajectory::Own(law) => law.at(0.0).value,
+        };
         *drive = Drive::Constant { position, velocity: 0.0 };
     };
-    still.spcmm = None;
+    still.closed_form = None;
     for joint in &mut still.joints {
         let freedoms = joint.kind.freedoms();
         let drives = [&mut joint.drive, &mut joint.second_drive];

@@ -1,10 +1,9 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
-use super::closed_form::ClosedMotion;
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
-use crate::machine::{Mat3, Quat, Vec3};
+use crate::machine::{ClosedForm, Mat3, Quat, Vec3};
 
 /// Motion of a body's centroid frame. For the world everything is zero.
 #[derive(Clone, Copy, Debug)]
@@ -248,8 +247,8 @@ pub struct Driven {
     earlier: (Option<f64>, Vec<Jet>, Vec<Kinematics>),
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
-    /// Closed-form motion, if the scene has one.
-    pub closed: Option<ClosedMotion>,
+    /// Values of the closed form; empty if there is none.
+    pub functions: Vec<Jet>,
     /// Bodies that depend on time alone, parents before children.
     bodies: Vec<usize>,
 }
@@ -263,7 +262,7 @@ impl Driven {
             time: None,
             earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()]),
             coordinates,
-            closed: None,
+            functions: vec![Jet::default(); model.closed_form.as_ref().map_or(0, ClosedForm::length)],
             bodies,
         }
     }
@@ -294,9 +293,11 @@ impl Driven {
             }
         }
         self.time = Some(t);
-        self.closed = model.closed_form.as_ref().map(|form| form.at(t));
+        if let Some(form) = &model.closed_form {
+            form.evaluate(t, &mut self.functions);
+        }
         for i in 0..self.coordinates.len() {
-            self.coordinates[i] = model.drive(i, t, self.closed.as_ref());
+            self.coordinates[i] = model.drive(i, t, &self.functions);
         }
         for &b in &self.bodies {
             self.move_body(model, b, motion);
@@ -326,7 +327,7 @@ impl Driven {
         // Only part of the coordinates now belong to this instant.
         self.time = None;
         for &i in &path.drives {
-            self.coordinates[i] = model.drive(i, t, None);
+            self.coordinates[i] = model.drive(i, t, &[]);
         }
         for &b in &path.driven {
             self.move_body(model, b, motion);

@@ -32,7 +32,6 @@ mod power;
 mod reachable;
 mod rows;
 mod settled;
-mod spcmm;
 mod spline;
 mod start;
 mod stiff;
@@ -44,7 +43,7 @@ pub use crate::jet::Jet;
 use assembly::Settled;
 pub use assembly::{Assembly, Placement};
 pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
-pub use closed_form::ClosedMotion;
+pub use closed_form::{ClosedMotion, Unreachable};
 pub use contacts::{Contacts, Ramp};
 pub use discrete_gradient::StepStart;
 pub use drives::periods_of;
@@ -55,7 +54,6 @@ pub use held::{HeldError, HeldMachine, drive_positions};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};
-pub use spcmm::Unreachable;
 pub use summary::Summary;
 pub use systems::Evaluator;
 
@@ -79,7 +77,7 @@ pub enum MechanismError {
     /// A machine with inconsistent parts.
     #[error("{0}")]
     Machine(#[from] MachineFault),
-    /// A rod cannot reach its slider somewhere along the trajectory.
+    /// The machine cannot follow its closed form somewhere, as where a rod is too short.
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
     /// A loop-closing joint that is open although the start values are to be used as given.
@@ -519,14 +517,14 @@ impl Mechanism {
         self.equations.motion()
     }
 
-    /// Whether the scene follows a closed form.
+    /// Whether the path of the output body is known in closed form.
     pub fn has_closed_form(&self) -> bool {
-        self.model.closed_form.is_some()
+        self.model.path().is_some()
     }
 
-    /// The motion in closed form at the latest instant, if the scene follows one.
-    pub fn closed_motion(&self) -> Option<&ClosedMotion> {
-        self.equations.driven().closed.as_ref()
+    /// Motion of the output body in closed form at the latest instant, if known.
+    pub fn closed_motion(&self) -> Option<ClosedMotion> {
+        Some(self.model.path()?.1.at(&self.equations.driven().functions))
     }
 
     /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` for a joint with clearance.

@@ -3,12 +3,12 @@
 use std::sync::{Arc, OnceLock};
 
 use super::assembly::{Assembled, Settled};
-use super::closed_form::{ClosedForm, ClosedMotion};
 use super::drives::{Law, Trajectory, trajectory_of};
 use super::factor::{NONE, Pattern};
-use super::spcmm::SliderTrajectory;
 use crate::jet::Jet;
-use crate::machine::{Attachment, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Quat, StartRule, Vec3};
+use crate::machine::{
+    Attachment, ClosedForm, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Path, Quat, StartRule, Vec3,
+};
 
 /// Index of a body: the scene's bodies, then massless links; one past the last is the world.
 pub type BodyIndex = usize;
@@ -165,7 +165,7 @@ pub struct Model {
     pub joints: Vec<BallJoint>,
     pub ideal_joints: Vec<usize>,
     pub drives: Vec<DriveLaw>,
-    pub closed_form: Option<Arc<dyn ClosedForm>>,
+    pub closed_form: Option<ClosedForm>,
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as specified in the scene.
     pub start_state: Vec<f64>,
@@ -308,7 +308,7 @@ impl Model {
             joints: Vec::new(),
             ideal_joints: Vec::new(),
             drives,
-            closed_form: closed_form_of(machine),
+            closed_form: machine.closed_form.clone(),
             start: machine.start,
             start_state: Vec::new(),
             scale: Vec::new(),
@@ -466,10 +466,16 @@ impl Model {
         self.bodies.len()
     }
 
-    /// Driven coordinate `drive` at `t`.
-    pub fn drive(&self, drive: usize, t: f64, closed: Option<&ClosedMotion>) -> Jet {
+    /// The path of the output body, if it is known in closed form.
+    pub fn path(&self) -> Option<(&ClosedForm, &Path)> {
+        let form = self.closed_form.as_ref()?;
+        Some((form, form.path.as_ref()?))
+    }
+
+    /// Driven coordinate `drive` at `t`, for the `values` of the closed form at that time.
+    pub fn drive(&self, drive: usize, t: f64, values: &[Jet]) -> Jet {
         match &self.drives[drive].trajectory {
-            Trajectory::ClosedForm(coordinate) => closed.map_or_else(Jet::default, |motion| motion.driven[*coordinate]),
+            Trajectory::Function(function) => values[function + 1],
             Trajectory::Own(law) => law.at(t),
         }
     }
@@ -513,12 +519,6 @@ fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) 
         carries: true,
         diagonal: true,
     }
-}
-
-/// Closed form of `machine`, if any.
-pub(super) fn closed_form_of(machine: &Machine) -> Option<Arc<dyn ClosedForm>> {
-    let spcmm = machine.spcmm.as_ref()?;
-    Some(Arc::new(SliderTrajectory::new(spcmm)))
 }
 
 fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {

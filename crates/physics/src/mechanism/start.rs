@@ -1,7 +1,7 @@
 //! Start of a mechanism: assembly from the scene's values, displacement of the bodies, and rank of the constraints.
 
 use super::assembly::{Assembled, Assembly, Placement};
-use super::closed_form::ClosedForm;
+use super::closed_form::ClosedMotion;
 use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
 use super::model::{self, Model, Motion};
@@ -44,9 +44,9 @@ impl Mechanism {
         let mut tree = if closes { Tree::new(model) } else { Tree::without_masses(model) };
         let settled = model.settled.as_ref().map(|settled| &settled.state);
         let mut y = settled.unwrap_or(&model.start_state).clone();
-        let closed_form = model.closed_form.as_deref().filter(|_| assembled);
-        if let Some(form) = closed_form {
-            place_output_body(model, form, &mut y);
+        let ideal = model.path().filter(|_| assembled).map(|(form, path)| path.at(&form.at(T)));
+        if let Some(ideal) = &ideal {
+            place_output_body(model, ideal, &mut y);
             tree.update_kinematics(model, T, &y);
             turn_hinges(model, &tree.motion, &mut y);
         }
@@ -84,7 +84,7 @@ impl Mechanism {
         let mut assembly = Assembly {
             widest: widest.max_by(|a, b| a.1.total_cmp(&b.1)),
             most_turned: turned.max_by(|a, b| a.1.total_cmp(&b.1)),
-            closed_form: closed_form.is_some(),
+            closed_form: ideal.is_some(),
             ..Assembly::default()
         };
         if closes {
@@ -130,7 +130,7 @@ impl Mechanism {
             return Err(self.no_closure(constraints, tree, &guess, y));
         }
         // In a singular pose of a closed form, the drives do not determine the velocities, with or without clearance.
-        if model.closed_form.is_some() && rank_around(model, constraints, tree, y).is_none() {
+        if model.path().is_some() && rank_around(model, constraints, tree, y).is_none() {
             return Err(MechanismError::Singular);
         }
         self.check_sides(constraints, tree, &guess, y)
@@ -231,7 +231,7 @@ impl Mechanism {
         constraints.treat_as_dependent(constraints.rows());
         let rank = rank_around(model, &mut constraints, tree, y);
         rank.map(Some).ok_or_else(|| {
-            if model.closed_form.is_some() {
+            if model.path().is_some() {
                 return MechanismError::Singular;
             }
             factor_at(model, &mut constraints, tree, T, y);
@@ -323,8 +323,7 @@ fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placemen
 }
 
 /// Places the free output body as in the ideal mechanism at t = 0, close to the assembled pose.
-fn place_output_body(model: &Model, form: &dyn ClosedForm, y: &mut [f64]) {
-    let ideal = form.at(0.0);
+fn place_output_body(model: &Model, ideal: &ClosedMotion, y: &mut [f64]) {
     let body = &model.bodies[model.output_body];
     if let Motion::Free { q, v } = body.motion {
         let to_centroid = -(ideal.rotation * body.origin);

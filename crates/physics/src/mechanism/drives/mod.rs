@@ -48,8 +48,8 @@ pub trait Law: Debug + Send + Sync {
 /// Source of a driven coordinate's motion.
 #[derive(Clone, Debug)]
 pub enum Trajectory {
-    /// This coordinate of the scene's closed form.
-    ClosedForm(usize),
+    /// This function of the machine's closed form.
+    Function(usize),
     /// A law of its own.
     Own(Arc<dyn Law>),
 }
@@ -62,7 +62,7 @@ const PARTS: f64 = 50.0;
 /// Trajectory of a coordinate with this `drive`; an angle if it `turns`.
 pub(super) fn trajectory_of(drive: &Drive, turns: bool) -> Trajectory {
     Trajectory::Own(match drive {
-        Drive::ClosedForm(coordinate) => return Trajectory::ClosedForm(*coordinate),
+        Drive::Function(function) => return Trajectory::Function(*function),
         Drive::Constant { position, velocity } => Arc::new(Line { position: *position, velocity: *velocity, turns }),
         Drive::Harmonic { mean, terms } => Arc::new(Harmonics::new(*mean, terms)),
         Drive::Ramp { from, to, start, duration } => {
@@ -96,7 +96,7 @@ impl Trajectory {
     /// Its own law, if it has one.
     pub fn law(&self) -> Option<&Arc<dyn Law>> {
         match self {
-            Self::ClosedForm(_) => None,
+            Self::Function(_) => None,
             Self::Own(law) => Some(law),
         }
     }
@@ -107,14 +107,14 @@ impl Trajectory {
     }
 }
 
-/// Period of the closed form of `machine`, s.
+/// Period of the functions of the closed form of `machine` that drives follow, s; infinite if none moves.
 fn closed_period(machine: &Machine) -> f64 {
-    machine.spcmm.map_or(f64::INFINITY, |spcmm| period_if(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency))
-}
-
-/// Period of an oscillation with these amplitudes, s; infinite if all are 0.
-fn period_if(amplitudes: &[f64], frequency: f64) -> f64 {
-    if amplitudes.iter().any(|amplitude| *amplitude != 0.0) { 1.0 / frequency } else { f64::INFINITY }
+    let followed = machine.joints.iter().flat_map(Joint::drives).filter_map(|(_, drive)| match drive {
+        Drive::Function(function) => Some(*function),
+        _ => None,
+    });
+    let followed: Vec<usize> = followed.collect();
+    machine.closed_form.as_ref().map_or(f64::INFINITY, |form| form.period(&followed))
 }
 
 /// Latest end of a step from `t` for a motion that lasts from `start` to `end`.

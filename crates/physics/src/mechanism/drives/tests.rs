@@ -22,7 +22,7 @@ fn law(drive: &str) -> Arc<dyn Law> {
     let (freedom, drive) = joint.drives().next().expect("driven");
     match trajectory_of(drive, freedom.turns()) {
         Trajectory::Own(law) => law,
-        Trajectory::ClosedForm(_) => panic!("a law of its own"),
+        Trajectory::Function(_) => panic!("a law of its own"),
     }
 }
 
