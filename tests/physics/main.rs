@@ -29,6 +29,7 @@ mod loads;
 mod loop_joints;
 mod machines;
 mod many_joints;
+mod massless;
 mod order;
 mod pays_only;
 mod planar_loops;

@@ -34,6 +34,8 @@ impl Scene {
                 let keys = ["solver.method", "formulation"].into_iter().chain(counts.map(|own| own.key));
                 (title.to_owned(), keys.map(str::to_owned).collect())
             }
+            MechanismError::NeedsMass { .. } => ("formulation".to_owned(), vec!["formulation".to_owned()]),
+            MechanismError::Undetermined { joint } => one(joint, &[]),
             MechanismError::NoRest { .. } => ("start".to_owned(), vec!["start".to_owned()]),
             MechanismError::TooLargeForRest { .. } => {
                 let keys = std::iter::once("start").chain(counts.map(|own| own.key));

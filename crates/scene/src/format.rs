@@ -255,7 +255,13 @@ static JOINT_CONTACT: LazyLock<FileTable> = LazyLock::new(|| {
 static BODY: LazyLock<FileTable> = LazyLock::new(|| {
     let keys = [
         key("name", ValueType::Name, "\"rod\"", "its name, not `world`"),
-        key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "its mass").or("density"),
+        key(
+            "mass",
+            ValueType::Number(D::Mass, (0.0, MAX_MASS)),
+            "\"0.384 kg\"",
+            "its mass; 0 for a body that only connects two joints, whose inertia is then 0, too",
+        )
+        .or("density"),
         key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid").zero().frame("the body's"),
         key(
             "inertia",

@@ -297,16 +297,15 @@ fn read_mechanism<'d>(
     for node in list("joint")? {
         let joint = read_joint(&node, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
+        if joint.section.document.include.is_none() {
+            scene.source.places.insert(format!("joint.{}", joint.name), joint.section.place());
+        }
         joints.push(joint);
     }
     let (closing, joints): (Vec<_>, Vec<_>) = joints.into_iter().partition(|text| text.closes_loop);
     (scene.machine.bodies, scene.machine.joints) = sort_forest(bodies, joints, &body_sections)?;
     let by_name = indices_by_name(&scene.machine.bodies);
-    for JointText { section, joint, .. } in closing {
-        if section.document.include.is_none() {
-            let title = format!("joint.{}", joint.name);
-            scene.source.places.insert(title, section.place());
-        }
+    for JointText { joint, .. } in closing {
         let sorted = |body: usize| by_name[&file_order[body]];
         scene.machine.closing_joints.push(Joint {
             parent: joint.parent.map(sorted),
@@ -329,6 +328,11 @@ fn read_mechanism<'d>(
         let shape = read_shape(&node, true)?;
         scene.machine.fixed_shapes.push(shape);
     }
+    scene.machine.check_massless().map_err(|(index, why)| {
+        let node = body_sections[file_places[scene.machine.bodies[index].name.as_str()]].require("mass");
+        let message = format!("only a body between joints may have no mass: {why}; allowed above 0 kg");
+        node.map_or_else(|error| error, |node| node.error(message))
+    })?;
     read_joint_contacts(top, scene, places)?;
     let joints = scene.machine.kinematic_joints().zip(0..);
     let joints = joints.map(|(joint, index)| (joint.name.clone(), index));

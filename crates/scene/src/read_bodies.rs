@@ -60,11 +60,12 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
     if let Some(node) = section.get("density") {
         return Ok((read_solid(&section, &node, name, shapes)?, section));
     }
+    let mass = section.number("mass")?;
     let body = Body {
         name,
-        mass: section.number("mass")?,
+        mass,
         centre: section.vector("centre")?,
-        inertia: read_inertia(&section)?,
+        inertia: read_inertia(&section, mass)?,
         shapes,
         density: None,
     };
@@ -112,11 +113,15 @@ fn read_solid(section: &Section<'_>, node: &Node<'_>, name: String, shapes: Vec<
 
 /// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not principal,
 /// `products` = the integrals of xy, xz, yz over the mass.
-fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
+fn read_inertia(section: &Section<'_>, mass: f64) -> Result<Mat3, SceneError> {
     let node = section.require("inertia")?;
     let [xx, yy, zz] = node.numbers()?;
     let [xy, xz, yz] = section.vector("products")?.into();
     let inertia = Mat3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz);
+    if mass == 0.0 {
+        let fault = "a body of mass 0 kg only connects joints and has no inertia: allowed 0";
+        return if inertia.amax() == 0.0 { Ok(inertia) } else { Err(node.error(fault)) };
+    }
     if inertia.amax() > MAX_INERTIA {
         return Err(node.error("out of range; allowed above 0 up to 1e12 kg m^2"));
     }

@@ -10,11 +10,11 @@ use crate::words::words;
 pub struct Body {
     /// Unique name.
     pub name: String,
-    /// Mass, kg.
+    /// Mass, kg; 0 for a body that only connects joints, see [`super::MasslessFault`].
     pub mass: f64,
     /// Centroid in the body frame, m.
     pub centre: Vec3,
-    /// Inertia about the centroid, body axes, kg m^2; symmetric positive definite.
+    /// Inertia about the centroid, body axes, kg m^2; symmetric positive definite, or 0 with the mass.
     pub inertia: Mat3,
     /// Shapes to draw, body frame.
     pub shapes: Vec<Shape>,

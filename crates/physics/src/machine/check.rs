@@ -2,7 +2,9 @@
 
 use std::cmp::Ordering;
 
-use super::{BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointSpring, Machine, Spring, Warning};
+use super::{
+    BallJoint, Doubt, Drive, Elastic, ElementKind, JointCoordinate, JointKind, JointSpring, Machine, Spring, Warning,
+};
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::StepControl;
 use crate::units::{Dimension, format_quantity, unit_names};
@@ -68,6 +70,14 @@ pub enum MachineFault {
         /// Name of the body.
         body: String,
     },
+    /// A body without mass that would make the mass matrix singular in every pose.
+    #[error("body {body} has mass 0 kg, which only a body between joints may have: {why}")]
+    Massless {
+        /// Name of the body.
+        body: String,
+        /// The reason.
+        why: MasslessFault,
+    },
     /// Points of a curve or of a table of positions that do not rise.
     #[error("{what}: a curve needs at least two finite points with increasing first coordinates")]
     Points {
@@ -92,7 +102,45 @@ pub enum MachineFault {
     },
 }
 
+/// Why a body needs a mass. One without mass and inertia that carries another body on a slide or a hinge only connects their
+/// joints, as the cross of a universal joint does: the mass matrix has the mass of all bodies beyond a joint on its diagonal.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MasslessFault {
+    /// It has an inertia.
+    #[error("its inertia must be 0, too")]
+    Inertia,
+    /// Nothing bounds its motion.
+    #[error("it is carried by a free joint")]
+    Free,
+    /// No mass moves with it.
+    #[error("it carries no body")]
+    Leaf,
+    /// A force on it would act on no mass before it reaches the joints.
+    #[error("ball joint {0} is on it")]
+    BallJoint(String),
+}
+
 impl Machine {
+    /// The first body without mass that the machine cannot have, by index.
+    ///
+    /// # Errors
+    /// That body, and why.
+    pub fn check_massless(&self) -> Result<(), (usize, MasslessFault)> {
+        let mut massless = self.bodies.iter().zip(&self.joints).enumerate().filter(|(_, (body, _))| body.mass == 0.0);
+        let ends = |joint: &BallJoint| [joint.socket.body, joint.ball.body];
+        massless.try_for_each(|(index, (body, joint))| {
+            let ball = self.ball_joints.iter().find(|ball| ends(ball).contains(&Some(index)));
+            let why = match ball {
+                _ if body.inertia.amax() != 0.0 => MasslessFault::Inertia,
+                _ if joint.kind == JointKind::Free => MasslessFault::Free,
+                _ if self.joints.iter().all(|joint| joint.parent != Some(index)) => MasslessFault::Leaf,
+                Some(ball) => MasslessFault::BallJoint(ball.name.clone()),
+                None => return Ok(()),
+            };
+            Err((index, why))
+        })
+    }
+
     /// Checks that the parts fit together, as those of every scene file do.
     ///
     /// # Errors
@@ -113,13 +161,15 @@ impl Machine {
             let skew = (body.inertia - body.inertia.transpose()).amax();
             let symmetric = skew <= ROUNDING * body.inertia.amax();
             let definite = symmetric && body.inertia.symmetric_eigenvalues().min() > 0.0;
-            if !(body.mass > 0.0 && body.mass.is_finite() && definite) {
+            if body.mass != 0.0 && !(body.mass > 0.0 && body.mass.is_finite() && definite) {
                 return Err(MachineFault::Inertia { body: body.name.clone() });
             }
         }
         if let Some(extra) = self.joints.get(bodies) {
             return exists(&extra.name, Some(bodies));
         }
+        self.check_massless()
+            .map_err(|(index, why)| MachineFault::Massless { body: self.bodies[index].name.clone(), why })?;
         let late = self.joints.iter().find(|joint| joint.parent.is_some_and(|parent| parent >= joint.child));
         late.map_or(Ok(()), |joint| Err(MachineFault::Order { body: joint.child }))?;
         for joint in &self.closing_joints {

@@ -71,7 +71,7 @@ impl Machine {
             let forms = body.shapes.iter().map(|shape| &shape.geometry);
             let forms = forms.filter(|form| !matches!(form, Geometry::Mesh { .. }));
             *reach = forms.map(|form| Solid::of(form).reach()).fold(*reach, f64::max);
-            if body.density.is_none() {
+            if body.density.is_none() && body.mass > 0.0 {
                 let gyration = (0.5 * body.inertia.trace() / body.mass).sqrt();
                 *reach = reach.max(body.centre.norm() + gyration);
             }

@@ -16,7 +16,7 @@ mod settings;
 mod solid;
 
 pub use body::*;
-pub use check::{ContactConflict, ContactFault, LEAST_IMPACT_STEPS, MachineFault};
+pub use check::{ContactConflict, ContactFault, LEAST_IMPACT_STEPS, MachineFault, MasslessFault};
 pub use closed_form::{ClosedForm, Function, Path};
 pub use conditions::Conditions;
 pub use doubts::*;

@@ -24,6 +24,7 @@ mod held;
 mod kinematics;
 mod lagrange;
 mod lu;
+mod massless;
 mod model;
 mod norm_sum;
 mod pairs;
@@ -130,6 +131,24 @@ pub enum MechanismError {
          move the start of the trajectory away from it"
     )]
     Singular,
+    /// A formulation that divides by the mass of every body.
+    #[error(
+        "body {body} has mass 0 kg, and formulation = \"lagrange\" divides by the mass of every body: choose formulation = \"tree\""
+    )]
+    NeedsMass {
+        /// Name of the first body without mass.
+        body: String,
+    },
+    /// A singular mass matrix because of bodies without mass.
+    #[error(
+        "joint {joint}: at the start values it moves all mass in the same way as other joints do, as two hinges with one axis, \
+         because a body between them has mass 0 kg; its acceleration is not determined: start in another pose, change an axis, or \
+         give that body a mass"
+    )]
+    Undetermined {
+        /// Name of the joint nearest to the world whose coordinate depends on the others.
+        joint: String,
+    },
     /// Too many coordinates for a method with a dense matrix.
     #[error(
         "this scene has {velocities} velocity coordinates; the implicit methods take at most {most}: \
@@ -341,6 +360,7 @@ impl Mechanism {
             form.check()?;
         }
         bounds::check(machine, &model)?;
+        massless::check(machine, &model)?;
         model.settled = match machine.start {
             StartRule::AsGiven | StartRule::Ideal => {
                 guess.map(|guess| Settled { state: guess.to_vec(), assembly: Assembly::default() })

@@ -346,6 +346,24 @@ impl Tree {
     }
 }
 
+/// Smallest part of a diagonal element of the mass matrix that elimination may leave: less is rounding.
+const LEAST_INDEPENDENT: f64 = 1e-12;
+
+impl Tree {
+    /// The velocity coordinate farthest from the root of a tree whose unit rate moves all mass as rates of the coordinates beyond it do, after
+    /// [`Self::assemble`]: with H = L^T D L, D is 0 there and the element of H is not.
+    pub fn dependent_coordinate(&self, model: &Model) -> Option<usize> {
+        model.blocks.iter().zip(&self.mass_offset).find_map(|(block, &offset)| {
+            let pivot = |k: usize| 1.0 / self.inverse_diagonal[block.v + k];
+            let factor = |j: usize, k: usize| self.mass[offset + j * block.n + k];
+            let eliminated = |k: usize| (k + 1..block.n).map(|j| factor(j, k) * factor(j, k) * pivot(j)).sum::<f64>();
+            let depends = |&k: &usize| !(pivot(k) > LEAST_INDEPENDENT * (pivot(k) + eliminated(k)));
+            let last = block.lone.is_none().then(|| (0..block.n).rev().find(depends)).flatten();
+            last.map(|k| block.v + k)
+        })
+    }
+}
+
 /// Moves body `b` relative to its parent.
 #[inline(always)]
 fn move_body(model: &Model, b: BodyIndex, y: &[f64], driven: &[Jet], motion: &mut [Kinematics]) {

@@ -71,7 +71,7 @@ impl Run<'_> {
         }
         let coefficients = self.mechanism.contacts.coefficients(j);
         let mass: f64 = self.machine.bodies.iter().map(|body| body.mass).sum();
-        let least = self.machine.bodies.iter().map(|body| body.mass);
+        let least = self.machine.bodies.iter().map(|body| body.mass).filter(|mass| *mass > 0.0);
         let pushed = self.mechanism.element_reports(self.state.now.t + h);
         let push: f64 = pushed.map(|element| element.force.norm()).sum();
         let least = least.fold(f64::INFINITY, f64::min);

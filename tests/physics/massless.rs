@@ -1,0 +1,202 @@
+//! Bodies without mass between joints: joints of several degrees in series, against joints of one piece and closed forms.
+
+use crate::common::frame_now;
+use crate::common::matrix::every_way;
+use crate::elements::at;
+use crate::joint_elements::started;
+use crate::two_degrees::{G, train};
+use jointplay::machine::{MachineFault, MasslessFault, Vec3};
+use jointplay::mechanism::MechanismError;
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
+
+fn link(name: &str) -> String {
+    format!("[[body]]\nname = \"{name}\"\nmass = 0\ninertia = [0, 0, 0]\n")
+}
+
+/// The train of `two_degrees` with slide and hinge in place of its cylindrical, two hinges in place of its universal joint.
+fn in_series(gravity: f64) -> String {
+    let text = train(gravity);
+    let (before, joints) = text.split_once("[[joint]]\nname = \"c\"").expect("a cylindrical joint");
+    let (ring, rod) = joints.split_once("[[joint]]\nname = \"u\"").expect("a universal joint");
+    let line = |of: &str, key: &str| of.lines().find(|line| line.starts_with(key)).expect("a key").to_owned();
+    let axes = |of: &str| (line(of, "axis"), line(of, "parent_point"), line(of, "child_point"), line(of, "rotation"));
+    let (along, at, child, turned) = axes(ring);
+    let slide = format!(
+        "[[joint]]\nname = \"c1\"\nkind = \"prismatic\"\nparent = \"base\"\nchild = \"sleeve\"\n{along}\n{at}\n\
+         start = {{ position = \"5 mm\", velocity = \"0.2 m/s\" }}\n\
+         [[joint]]\nname = \"c2\"\nkind = \"revolute\"\nparent = \"sleeve\"\nchild = \"ring\"\n{along}\n{child}\n{turned}\n\
+         start = {{ position = \"20 deg\", velocity = \"6 rad/s\" }}\n"
+    );
+    let (first, at, child, turned) = axes(rod);
+    let hinges = format!(
+        "[[joint]]\nname = \"u1\"\nkind = \"revolute\"\nparent = \"ring\"\nchild = \"cross\"\n{first}\n{at}\n\
+         start = {{ position = \"25 deg\", velocity = \"3 rad/s\" }}\n\
+         [[joint]]\nname = \"u2\"\nkind = \"revolute\"\nparent = \"cross\"\nchild = \"rod\"\naxis = [0, 0, 1]\n{child}\n{turned}\n\
+         start = {{ position = \"-40 deg\", velocity = \"-5 rad/s\" }}\n"
+    );
+    format!("{before}{}{}{slide}{hinges}", link("sleeve"), link("cross"))
+}
+
+/// The same as `body` of `other`, to a fraction `bound` of lengths of 1 m, turns of 1 rad, 1 s.
+fn agree(frame: &Frame, other: &Frame, bodies: &[(usize, usize)], bound: f64, what: &str) {
+    for &(one, two) in bodies {
+        let (a, b) = (&frame.bodies[one], &other.bodies[two]);
+        let off = [
+            (a.position - b.position).norm(),
+            (a.rotation - b.rotation).amax(),
+            (a.velocity - b.velocity).norm() / 10.0,
+            (a.angular_velocity - b.angular_velocity).norm() / 10.0,
+        ];
+        assert!(off.iter().all(|off| *off < bound), "{what}: body {one}: {off:?}");
+    }
+}
+
+#[test]
+fn slide_and_hinge_are_a_cylindrical_and_two_hinges_a_universal_joint() {
+    // The bodies of the scene are sorted by their joints.
+    let text = in_series(-G);
+    let scene = Scene::parse(&text, None, &[]).unwrap();
+    let index = |name: &str| scene.machine.bodies.iter().position(|body| body.name == name).unwrap();
+    let pairs = [(0, index("base")), (1, index("ring")), (2, index("rod"))];
+    for way in every_way().filter(|way| way.formulation == "tree") {
+        let mut whole = started(&train(-G), &way.close());
+        let mut series = started(&text, &way.close());
+        let (summary, other) = (whole.mechanism().summary(), series.mechanism().summary());
+        assert_eq!((summary.degrees_of_freedom, summary.velocity_coordinates), (10, other.velocity_coordinates));
+        // At the start all but rounding, later what the method allows.
+        agree(&frame_now(&mut whole), &frame_now(&mut series), &pairs, 1e-13, "at the start");
+        for (a, b) in pairs {
+            let (own, other) = (frame_now(&mut whole), frame_now(&mut series));
+            let off = (own.bodies[a].acceleration - other.bodies[b].acceleration).norm();
+            assert!(off < 1e-9, "{way}: {off:e}");
+        }
+        agree(&at(&mut whole, 0.2), &at(&mut series, 0.2), &pairs, 10.0 * way.bound(), &way.to_string());
+    }
+}
+
+/// A top on a ball joint, or on three hinges in one point.
+fn top(joints: &str, bodies: &str) -> String {
+    format!(
+        "[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-11\n[contact]\nclearance = \"0 mm\"\n{bodies}\
+         [[body]]\nname = \"top\"\nmass = \"0.4 kg\"\ncentre = \"0 0 60 mm\"\ninertia = \"3e-4 4e-4 2e-4 kg m^2\"\n{joints}"
+    )
+}
+
+fn hinges(second: &str) -> String {
+    let bodies = link("outer") + &link("inner");
+    let joints = format!(
+        "[[joint]]\nname = \"x\"\nkind = \"revolute\"\nchild = \"outer\"\naxis = [1, 0, 0]\nstart = {{ position = 0, velocity = \"2 rad/s\" }}\n\
+         [[joint]]\nname = \"y\"\nkind = \"revolute\"\nparent = \"outer\"\nchild = \"inner\"\naxis = [0, 1, 0]\nstart = {{ position = \"{second}\" }}\n\
+         [[joint]]\nname = \"z\"\nkind = \"revolute\"\nparent = \"inner\"\nchild = \"top\"\naxis = [0, 0, 1]\nstart = {{ position = 0, velocity = \"30 rad/s\" }}\n"
+    );
+    top(&joints, &bodies)
+}
+
+#[test]
+fn three_hinges_in_one_point_are_a_ball_joint_until_two_of_their_axes_coincide() {
+    // Hinge x turns about the world's x, hinge z about the top's axis, which is turned about y by half a radian.
+    let (sine, cosine) = (0.5_f64.sin(), 0.5_f64.cos());
+    let ball = format!(
+        "[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"top\"\n\
+         start = {{ position = [0, 0, 0], rotation = {{ axis = [0, 1, 0], angle = \"0.5 rad\" }}, \
+         angular_velocity = \"{} 0 {} rad/s\" }}\n\
+         [[ball_joint]]\nname = \"ball\"\nsocket = {{ body = \"world\" }}\nball = {{ body = \"top\" }}\n",
+        2.0 + 30.0 * sine,
+        30.0 * cosine
+    );
+    let mut whole = started(&top(&ball, ""), &[]);
+    let mut series = started(&hinges("0.5 rad"), &[]);
+    let mut energy = None;
+    for step in 0..=10 {
+        let t = 0.03 * f64::from(step);
+        let (one, other) = (at(&mut whole, t), at(&mut series, t));
+        agree(&one, &other, &[(0, 2)], 1e-7, &format!("{t} s"));
+        let now = other.kinetic + other.potential;
+        let lost = now - *energy.get_or_insert(now);
+        assert!(lost.abs() < 1e-8, "{lost:e} J");
+    }
+    let fault = |text: &str| {
+        let scene = Scene::parse(text, Some("top.toml"), &[]).unwrap();
+        let error = Simulation::new(&scene.machine).expect_err("singular");
+        scene.locate(&error).to_string()
+    };
+    let said = fault(&hinges("90 deg"));
+    assert!(said.contains("joint.x: joint x: at the start values it moves all mass in the same way"), "{said}");
+    assert!(said.contains("| [[joint]]"), "{said}");
+    let parallel = hinges("0.5 rad").replace("axis = [0, 1, 0]", "axis = [1, 0, 0]");
+    assert!(fault(&parallel).contains("joint x: at the start values"), "{}", fault(&parallel));
+}
+
+/// Two slides and a hinge carry a plate in its plane: without forces its centroid moves on a line, and it turns steadily.
+#[test]
+fn two_slides_and_a_hinge_move_a_plate_in_its_plane() {
+    let joint = |name: &str, kind: &str, parent: &str, child: &str, axis: &str, start: &str| {
+        format!(
+            "[[joint]]\nname = \"{name}\"\nkind = \"{kind}\"\n{parent}child = \"{child}\"\naxis = {axis}\nstart = {{ {start} }}\n"
+        )
+    };
+    let text = format!(
+        "[gravity]\nz = \"-9.81 m/s^2\"\n[solver]\ntolerance = 1e-10\n{}{}\
+         [[body]]\nname = \"plate\"\nmass = \"2 kg\"\ncentre = \"100 0 0 mm\"\ninertia = \"0.01 0.01 0.02 kg m^2\"\n{}{}{}",
+        link("rail"),
+        link("carriage"),
+        joint("x", "prismatic", "", "rail", "[1, 0, 0]", "position = 0, velocity = \"0.3 m/s\""),
+        joint("y", "prismatic", "parent = \"rail\"\n", "carriage", "[0, 1, 0]", "position = \"20 mm\""),
+        joint(
+            "turn",
+            "revolute",
+            "parent = \"carriage\"\n",
+            "plate",
+            "[0, 0, 1]",
+            "position = 0, velocity = \"5 rad/s\""
+        ),
+    );
+    let mut simulation = started(&text, &[]);
+    let t = 0.7;
+    let frame = at(&mut simulation, t);
+    let plate = &frame.bodies[2];
+    let centre = plate.position + plate.rotation * Vec3::new(0.1, 0.0, 0.0);
+    // The centroid starts at (0.1, 0.02, 0) with (0.3, 5 x 0.1, 0).
+    let expected = Vec3::new(0.1 + 0.3 * t, 0.02 + 0.5 * t, 0.0);
+    assert!((centre - expected).norm() < 1e-8, "{centre}");
+    let angle = plate.rotation[(1, 0)].atan2(plate.rotation[(0, 0)]);
+    assert!((angle - 5.0 * t + std::f64::consts::TAU).abs() < 1e-8, "{angle}");
+}
+
+#[test]
+fn a_body_that_needs_its_mass_is_refused_with_its_line() {
+    let refused = |text: &str| Scene::parse(text, Some("top.toml"), &[]).expect_err("refused").to_string();
+    let good = hinges("0.5 rad");
+    let carried_by_none = good.replace("parent = \"inner\"", "parent = \"outer\"");
+    let loose = "[[ball_joint]]\nname = \"b\"\nsocket = { body = \"world\" }\nball = { body = \"inner\" }\n";
+    let free = good.replace(
+        "kind = \"revolute\"\nchild = \"outer\"\naxis = [1, 0, 0]\nstart = { position = 0, velocity = \"2 rad/s\" }",
+        "kind = \"free\"\nchild = \"outer\"\nstart = { position = [0, 0, 0] }",
+    );
+    for (text, expected) in [
+        (carried_by_none, "body.inner.mass = 0: only a body between joints may have no mass: it carries no body"),
+        (
+            format!("{good}{loose}"),
+            "body.inner.mass = 0: only a body between joints may have no mass: ball joint b is on it",
+        ),
+        (free, "body.outer.mass = 0: only a body between joints may have no mass: it is carried by a free joint"),
+        (
+            good.replacen("inertia = [0, 0, 0]", "inertia = \"1e-6 1e-6 1e-6 kg m^2\"", 1),
+            "a body of mass 0 kg only connects joints and has no inertia: allowed 0",
+        ),
+        (good.replacen("mass = 0", "mass = \"1 kg\"", 1), "allowed above 0; units"),
+    ] {
+        let said = refused(&text);
+        assert!(said.contains(expected) && said.starts_with("top.toml:"), "{said}\n  should say `{expected}`");
+    }
+    let change = ("formulation".to_owned(), "lagrange".to_owned());
+    let scene = Scene::parse(&good, Some("top.toml"), &[change]).unwrap();
+    let said = scene.locate(&Simulation::new(&scene.machine).expect_err("refused")).to_string();
+    assert!(said.contains("formulation = lagrange: body outer has mass 0 kg"), "{said}");
+    let mut machine = scene.machine;
+    machine.bodies[0].inertia.m11 = 1.0;
+    let fault =
+        MechanismError::Machine(MachineFault::Massless { body: "outer".to_owned(), why: MasslessFault::Inertia });
+    assert_eq!(Simulation::new(&machine).expect_err("refused").0, fault);
+}
