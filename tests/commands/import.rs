@@ -12,7 +12,7 @@ use crate::program::{folder, jointplay};
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/commands/import");
 
 /// The scene of the description `text`, and what was said.
-fn imported(text: &str) -> (Scene, String) {
+pub fn imported(text: &str) -> (Scene, String) {
     let folder = folder();
     fs::write(folder.path().join("robot"), text).unwrap();
     let outcome = jointplay(folder.path(), "import robot").expect(0);
@@ -20,17 +20,17 @@ fn imported(text: &str) -> (Scene, String) {
 }
 
 /// The message for a description that is refused.
-fn refused(text: &str) -> String {
+pub fn refused(text: &str) -> String {
     let folder = folder();
     fs::write(folder.path().join("robot"), text).unwrap();
     jointplay(folder.path(), "import robot").expect(2).stderr
 }
 
-fn mujoco(inside: &str) -> String {
+pub fn mujoco(inside: &str) -> String {
     format!("<mujoco>\n<worldbody>\n{inside}\n</worldbody>\n</mujoco>")
 }
 
-fn start(scene: &Scene) -> Frame {
+pub fn start(scene: &Scene) -> Frame {
     let mut simulation = Simulation::new(&scene.machine).unwrap();
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
@@ -241,7 +241,10 @@ fn a_description_that_would_be_another_machine_is_refused_with_its_line() {
         (mujoco(""), "no body has a joint"),
         (body("<joint/>"), "robot:3: body b: a moving body needs a mass above 0 kg"),
         (body(&format!("<joint type=\"screw\"/>{ball}")), "type = \"screw\": allowed: hinge, slide, ball, free"),
-        (body(&format!("<joint/><joint axis=\"1 0 0\"/><joint axis=\"0 1 0\"/>{ball}")), "none that a scene has"),
+        (
+            body(&format!("<joint type=\"slide\"/><joint type=\"ball\"/>{ball}")),
+            "robot:3: body b: a ball or free joint is the only joint of its body in a scene",
+        ),
         (body("<joint/><geom type=\"box\" size=\"1 1\"/>"), "a box needs number 3 above 0"),
         (body("<joint/><geom type=\"mesh\" mesh=\"m\"/>"), "there is no mesh m"),
         (body(&format!("<joint/>{ball}<frame/>")), "frame: is not read: write the bodies that it stands for"),

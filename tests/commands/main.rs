@@ -8,6 +8,8 @@ mod chart;
 mod cluster;
 mod command_line;
 mod import;
+mod import_joints;
+mod import_masses;
 mod ledger_files;
 mod links;
 mod map;

@@ -21,6 +21,12 @@ impl Place {
         Self { position: Vec3::zeros(), rotation: Quat::identity() }
     }
 
+    /// The outer frame in this one.
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.inverse();
+        Self { position: -(rotation * self.position), rotation }
+    }
+
     /// A point in the outer frame.
     pub fn point(&self, inner: Vec3) -> Vec3 {
         self.position + self.rotation * inner
@@ -88,6 +94,16 @@ pub struct Body {
     pub inertial: Inertial,
     /// What it looks like.
     pub shapes: Vec<Shape>,
+    /// Line of the description.
+    pub line: u32,
+}
+
+impl Body {
+    /// A body without mass and shapes.
+    pub fn new(name: &str, line: u32) -> Self {
+        let inertial = Inertial { mass: 0.0, centre: Vec3::zeros(), inertia: Mat3::zeros() };
+        Self { name: name.to_owned(), inertial, shapes: Vec::new(), line }
+    }
 }
 
 /// How a joint moves; axes in the child's axes.
@@ -124,6 +140,8 @@ pub struct Joint {
     pub anchor: Vec3,
     /// Springs and dampers of its coordinates.
     pub springs: Vec<Spring>,
+    /// Line of the description.
+    pub line: u32,
 }
 
 /// A spring with a damper on a coordinate.
@@ -141,15 +159,19 @@ pub struct Spring {
     pub rest: f64,
 }
 
-/// A ball joint that closes a loop.
+/// A joint that closes a loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Closure {
     /// Name in the description.
     pub name: String,
-    /// Bodies of socket and ball; `None` for the world.
+    /// Both bodies; `None` for the world.
     pub bodies: [Option<usize>; 2],
-    /// The common point on each, m.
-    pub points: [Vec3; 2],
+    /// The common frame on each; a ball joint has only its origin in common.
+    pub frames: [Place; 2],
+    /// Whether it leaves no motion, in place of a ball joint between a socket on the first body and a ball on the second.
+    pub is_fixed: bool,
+    /// Line of the description.
+    pub line: u32,
 }
 
 /// A robot description.
@@ -163,7 +185,7 @@ pub struct Description {
     pub bodies: Vec<Body>,
     /// One for each body, a parent's before its child's.
     pub joints: Vec<Joint>,
-    /// Ball joints that close loops.
+    /// Joints that close loops.
     pub closures: Vec<Closure>,
     /// Shapes that do not move.
     pub fixed: Vec<Shape>,
@@ -182,6 +204,13 @@ impl Description {
         let (first, count) = self.left.entry(what.into()).or_insert((line, 0));
         *first = line.min(*first);
         *count += 1;
+    }
+
+    /// Whether a body needs no mass, because it lies between joints with one coordinate or two.
+    pub fn only_connects(&self, body: usize) -> bool {
+        let bounds = |joint: &Joint| !matches!(joint.kind, Kind::Ball | Kind::Free);
+        let mut carried = self.joints.iter().filter(|joint| joint.parent == Some(body)).peekable();
+        bounds(&self.joints[body]) && carried.peek().is_some() && carried.all(bounds)
     }
 
     /// What is not taken, in the order of the file.

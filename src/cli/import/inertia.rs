@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::machine::{self, Geometry, Mat3, Vec3};
+use crate::units::format_quantity;
 
 /// Mass and its distribution, in the axes of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +15,9 @@ pub struct Inertial {
     /// Inertia about the centroid, kg m^2.
     pub inertia: Mat3,
 }
+
+/// Relative slack in the triangle inequality, as in a scene.
+const TRIANGLE_SLACK: f64 = 1e-9;
 
 /// A solid with its centre at the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +66,31 @@ impl Inertial {
     pub fn of_solid(solid: Solid, mass: f64, centre: Vec3, rotation: Mat3) -> Self {
         let own = Mat3::from_diagonal(&(mass * solid.measures().1));
         Self { mass, centre, inertia: rotation * own * rotation.transpose() }
+    }
+
+    /// A solid of `density`, kg/m^3, or a shell of so many kg/m^2.
+    pub fn of_density(solid: &machine::Solid, density: f64) -> Self {
+        Self { mass: density * solid.volume, centre: solid.centre, inertia: solid.inertia() * density }
+    }
+
+    /// Why no part of a body has this mass and inertia, if so. A point mass has an inertia of 0.
+    pub fn fault(&self) -> Option<String> {
+        if self.mass < 0.0 {
+            return Some(format!("the mass is {} kg; allowed from 0 kg", self.mass));
+        }
+        let mut principal: Vec<f64> = self.inertia.symmetric_eigenvalues().iter().copied().collect();
+        principal.sort_by(f64::total_cmp);
+        let [small, middle, large] =
+            [principal[0], principal[1], principal[2]].map(|moment| format_quantity(moment, "kg m^2"));
+        if principal[0] < -TRIANGLE_SLACK * principal[2].abs() {
+            return Some(format!("no body has this inertia: its smallest principal moment is {small}; allowed from 0"));
+        }
+        let excess = principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE_SLACK);
+        excess.then(|| {
+            format!(
+                "no body has this inertia: its largest principal moment, {large}, exceeds the sum of the other two, {small} and {middle}"
+            )
+        })
     }
 
     /// Both together; `other` in the same axes.

@@ -2,6 +2,7 @@
 
 mod description;
 mod inertia;
+mod mesh;
 mod mjcf;
 mod urdf;
 mod write;
@@ -13,7 +14,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::args::ImportArguments;
 use super::{Failure, print, warn};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneError};
 use description::Description;
 use xml::Source;
 
@@ -36,28 +37,43 @@ pub fn import(arguments: &ImportArguments) -> Result<(), Failure> {
         return Err(Failure::usage(format!("{name}: too large; allowed at most {} MiB", LARGEST >> 20)));
     }
     let text = std::fs::read_to_string(path).map_err(failed)?;
-    let mut description = read(&name, &text)?;
-    description.keep_existing_meshes(path.parent().unwrap_or(Path::new("")));
-    let text = write::scene(&description, &name)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut description = read(&name, folder, &text)?;
+    description.keep_existing_meshes(folder);
+    let scene = write::scene(&description, &name)?;
     // The scene is read before anybody else reads it.
-    Scene::parse_given(&text, None, &Default::default(), path.parent(), &[])
-        .map_err(|error| Failure::usage(format!("{name}: what was read makes no scene: {error}")))?;
+    Scene::parse_given(&scene.text, None, &Default::default(), Some(folder), &[])
+        .map_err(|error| Failure::usage(in_description(&name, &scene, error)))?;
     for left in description.left_out() {
         warn(&format!("{name}: {left}"));
     }
-    print(&text)
+    print(&scene.text)
+}
+
+/// An error of the scene that was written, with the line of the description `name` from which it comes if there is one.
+fn in_description(name: &str, scene: &write::Written, error: SceneError) -> String {
+    let written = error.position.filter(|_| error.file.is_none()).and_then(|(line, _)| scene.origin(line));
+    let Some(line) = written else {
+        return format!("{name}: what was read makes no scene: {error}");
+    };
+    SceneError { file: Some(format!("{name}:{line}")), position: None, line_text: None, ..error }.to_string()
 }
 
 fn too_deep(source: &Source, node: Node) -> Failure {
     source.error(node, &format!("more than {DEEPEST} parts in a row"))
 }
 
-fn read(name: &str, text: &str) -> Result<Description, Failure> {
-    let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
+fn read(name: &str, folder: &Path, text: &str) -> Result<Description, Failure> {
+    // A document type is harmless; its entities could multiply the text.
+    if let Some(at) = text.find("<!ENTITY") {
+        let line = text[..at].matches('\n').count() + 1;
+        return Err(Failure::usage(format!("{name}:{line}: entities are not read: write their text in their places")));
+    }
+    let options = ParsingOptions { allow_dtd: true, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options)
         .map_err(|error| Failure::usage(format!("{name}: is not an XML file: {error}")))?;
     let root = document.root_element();
-    let source = Source { file: name, document: &document };
+    let source = Source { file: name, folder, document: &document };
     let is_macro = |node: &Node| node.tag_name().namespace().is_some_and(|space| space.ends_with("/xacro"));
     if let Some(node) = root.descendants().find(is_macro) {
         return Err(source.error(node, "a macro of xacro: expand the file first, xacro FILE > robot.urdf"));

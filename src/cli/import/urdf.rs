@@ -51,13 +51,17 @@ pub fn read(source: &Source, robot: Node) -> Result<Description, Failure> {
                     );
                 }
             }
-            "material" => {
-                let colour = child(node, "color").map(|c| source.numbers::<4>(c, "rgba")).transpose()?.flatten();
-                if let Some(([r, g, b, _], name)) = colour.zip(node.attribute("name")) {
-                    tree.colours.insert(name, [r, g, b]);
-                }
-            }
+            "material" => {}
             other => tree.found.leave_out(source.line(node), format!("<{other}>")),
+        }
+    }
+    // A material may be defined anywhere and is known by its name everywhere; the outermost definition counts.
+    let mut materials: Vec<Node> = robot.descendants().filter(|node| node.has_tag_name("material")).collect();
+    materials.sort_by_key(|node| node.parent() != Some(robot));
+    for node in materials {
+        let colour = child(node, "color").map(|c| source.numbers::<4>(c, "rgba")).transpose()?.flatten();
+        if let Some(([r, g, b, _], name)) = colour.zip(node.attribute("name")) {
+            tree.colours.entry(name).or_insert([r, g, b]);
         }
     }
     for (child, joint) in &carried {
@@ -112,8 +116,7 @@ impl<'n> Tree<'_, 'n, '_> {
                 continue;
             };
             let index = self.found.bodies.len();
-            let empty = Inertial { mass: 0.0, centre: Vec3::zeros(), inertia: Mat3::zeros() };
-            self.found.bodies.push(Body { name: child_link.to_owned(), inertial: empty, shapes: Vec::new() });
+            self.found.bodies.push(Body::new(child_link, self.source.line(self.links[child_link])));
             let springs = self.damper(joint, kind)?;
             self.found.joints.push(Joint {
                 name: self.source.require(joint, "name")?.to_owned(),
@@ -123,10 +126,12 @@ impl<'n> Tree<'_, 'n, '_> {
                 place: at,
                 anchor: Vec3::zeros(),
                 springs,
+                line: self.source.line(joint),
             });
             self.walk(child_link, Some(index), &Place::identity(), depth + 1)?;
-            if !(self.found.bodies[index].inertial.mass > 0.0) {
-                let message = "a moving link needs an <inertial> with a mass above 0 kg";
+            if !(self.found.bodies[index].inertial.mass > 0.0) && !self.found.only_connects(index) {
+                let message = "a moving link needs an <inertial> with a mass above 0 kg, unless it connects a hinge or slide with \
+                               another";
                 return Err(self.source.error(self.links[child_link], message));
             }
         }
@@ -179,9 +184,6 @@ impl<'n> Tree<'_, 'n, '_> {
         let mass_node = part("mass")?;
         self.source.require(mass_node, "value")?;
         let mass = self.source.number(mass_node, "value")?.unwrap_or_default();
-        if mass < 0.0 {
-            return Err(self.source.error_in(mass_node, "value", "a mass is not below 0 kg"));
-        }
         let tensor = part("inertia")?;
         let mut found = [0.0; 6];
         for (value, key) in found.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
@@ -190,7 +192,8 @@ impl<'n> Tree<'_, 'n, '_> {
         }
         let [xx, yy, zz, xy, xz, yz] = found;
         let inertia = Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        Ok(place.inertial(Inertial { mass, centre: Vec3::zeros(), inertia }))
+        let own = Inertial { mass, centre: Vec3::zeros(), inertia };
+        own.fault().map_or(Ok(place.inertial(own)), |fault| Err(self.source.error(node, &fault)))
     }
 
     fn shape(&mut self, visual: Node, place: &Place) -> Result<Option<Shape>, Failure> {

@@ -42,11 +42,27 @@ impl Names {
     }
 }
 
+/// A scene file and where its parts come from.
+pub struct Written {
+    /// The scene file.
+    pub text: String,
+    /// Bytes of it from which on parts come from these lines of the description.
+    origins: Vec<(usize, u32)>,
+}
+
+impl Written {
+    /// Line of the description from which a line of the scene comes, both from 1.
+    pub fn origin(&self, line: u32) -> Option<u32> {
+        let before = |at: usize| u32::try_from(self.text[..at].matches('\n').count()).unwrap_or(u32::MAX);
+        self.origins.iter().rev().find(|(at, _)| before(*at) < line).map(|(_, origin)| *origin)
+    }
+}
+
 /// The scene file of a description that was read from the file `file`.
 ///
 /// # Errors
 /// More parts than a scene has.
-pub fn scene(description: &Description, file: &str) -> Result<String, Failure> {
+pub fn scene(description: &Description, file: &str) -> Result<Written, Failure> {
     let mut bodies = Names::default();
     let names: Vec<String> = description.bodies.iter().map(|body| bodies.next(&body.name)).collect();
     let mut joints = Names::default();
@@ -54,10 +70,15 @@ pub fn scene(description: &Description, file: &str) -> Result<String, Failure> {
     let body = |index: Option<usize>| index.map_or("world", |index| &names[index]);
     let mut out = String::new();
     let mut text = String::new();
+    let mut origins = Vec::new();
     // Writing to a String cannot fail.
     for (body, name) in description.bodies.iter().zip(&names) {
         let inertial = &body.inertial;
         let i = inertial.inertia;
+        origins.push((text.len(), body.line));
+        if inertial.mass == 0.0 {
+            let _ = write!(text, "\n# A body without mass only connects joints.");
+        }
         let _ = writeln!(text, "\n[[body]]\nname = \"{name}\"\nmass = \"{} kg\"", inertial.mass);
         let _ = writeln!(text, "centre = {}", vector(inertial.centre, "m"));
         let _ = writeln!(text, "inertia = {}", components(i.diagonal(), "kg m^2"));
@@ -67,21 +88,31 @@ pub fn scene(description: &Description, file: &str) -> Result<String, Failure> {
             let _ = writeln!(text, "products = {}", components(products, "kg m^2"));
         }
         if !body.shapes.is_empty() {
-            let shapes: Vec<String> =
-                body.shapes.iter().map(|one| format!("    {{ {} }},\n", shape(one).join(", "))).collect();
-            let _ = writeln!(text, "shapes = [\n{}]", shapes.concat());
+            text.push_str("shapes = [\n");
+            for one in &body.shapes {
+                origins.push((text.len(), one.line));
+                let _ = writeln!(text, "    {{ {} }},", shape(one).join(", "));
+            }
+            text.push_str("]\n");
         }
     }
     for joint in &description.joints {
         let parent = joint.parent.map(|parent| &names[parent][..]);
+        origins.push((text.len(), joint.line));
         write_joint(&mut text, joint, parent, &names[joint.child], &poses[joint.child], &mut joints);
     }
     for closure in &description.closures {
         let name = joints.next(&closure.name);
-        let ends = [0, 1].map(|end| (body(closure.bodies[end]), closure.points[end]));
-        write_ball_joint(&mut text, &name, ends);
+        let ends = [0, 1].map(|end| (body(closure.bodies[end]), closure.frames[end]));
+        origins.push((text.len(), closure.line));
+        if closure.is_fixed {
+            write_weld(&mut text, &name, ends);
+        } else {
+            write_ball_joint(&mut text, &name, ends.map(|(body, frame)| (body, frame.position)));
+        }
     }
     for one in &description.fixed {
+        origins.push((text.len(), one.line));
         let _ = writeln!(text, "\n[[fixed_shape]]\n{}", shape(one).join("\n"));
     }
     let _ = writeln!(
@@ -101,14 +132,15 @@ pub fn scene(description: &Description, file: &str) -> Result<String, Failure> {
     for (axis, value) in ["x", "y", "z"].iter().zip(description.gravity.iter()) {
         let _ = writeln!(out, "{axis} = \"{value} m/s^2\"");
     }
-    let balls = description.joints.iter().any(|joint| joint.kind == Kind::Ball) || !description.closures.is_empty();
-    if balls {
+    let carries = description.joints.iter().any(|joint| joint.kind == Kind::Ball);
+    if carries || description.closures.iter().any(|closure| !closure.is_fixed) {
         let _ = writeln!(
             out,
             "\n[contact]\n# A description has no play. A clearance above 0 gives it to all ball joints.\nclearance = \"0 mm\""
         );
     }
-    Ok(out + &text)
+    let origins = origins.into_iter().map(|(at, line)| (out.len() + at, line)).collect();
+    Ok(Written { text: out + &text, origins })
 }
 
 fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &str, pose: &Place, names: &mut Names) {
@@ -159,6 +191,19 @@ fn write_joint(text: &mut String, joint: &Joint, parent: Option<&str>, child: &s
 fn write_ball_joint(text: &mut String, name: &str, [socket, ball]: [(&str, Vec3); 2]) {
     let end = |(body, at): (&str, Vec3)| format!("{{ body = \"{body}\", at = {} }}", vector(at, "m"));
     let _ = writeln!(text, "\n[[ball_joint]]\nname = \"{name}\"\nsocket = {}\nball = {}", end(socket), end(ball));
+}
+
+/// A joint without motion; the world can only be its parent.
+fn write_weld(text: &mut String, name: &str, [one, other]: [(&str, Place); 2]) {
+    let [(parent, of_parent), (child, of_child)] = if other.0 == "world" { [other, one] } else { [one, other] };
+    let _ = writeln!(text, "\n[[joint]]\nname = \"{name}\"\nkind = \"fixed\"");
+    if parent != "world" {
+        let _ = writeln!(text, "parent = \"{parent}\"");
+    }
+    let _ = writeln!(text, "child = \"{child}\"\nparent_point = {}", vector(of_parent.position, "m"));
+    let _ = writeln!(text, "child_point = {}", vector(of_child.position, "m"));
+    let rotation = turned("rotation", &(of_parent.rotation * of_child.rotation.inverse()));
+    let _ = writeln!(text, "{rotation}{}closes_loop = true", if rotation.is_empty() { "" } else { "\n" });
 }
 
 fn write_spring(text: &mut String, spring: &Spring, joint: &str, name: &str) {

@@ -1,5 +1,7 @@
 //! Elements of an XML file, with errors that name file, line, element and attribute.
 
+use std::path::Path;
+
 use roxmltree::{Document, Node};
 
 use crate::cli::Failure;
@@ -8,6 +10,8 @@ use crate::cli::Failure;
 pub struct Source<'a> {
     /// Its name, for messages.
     pub file: &'a str,
+    /// Its folder.
+    pub folder: &'a Path,
     /// Its content.
     pub document: &'a Document<'a>,
 }

@@ -103,18 +103,39 @@ impl Solid {
     /// Interior of a closed mesh: tetrahedra with a common vertex and signed volumes.
     fn inside(mesh: &Mesh) -> Self {
         let origin = mesh.middle();
+        Self::of_tetrahedra(mesh.tetrahedra(origin)).moved(Vec3::from(origin.map(f64::from)))
+    }
+
+    /// The same, displaced by `by`, m.
+    pub fn moved(self, by: Vec3) -> Self {
+        Self { centre: self.centre + by, ..self }
+    }
+
+    /// Tetrahedra between the origin and each of these triangles, m, with signed volumes: for the triangles of a closed surface, seen
+    /// counter-clockwise from outside, what it encloses, by the divergence theorem.
+    pub fn of_tetrahedra(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
+        Self::of_simplices(triangles.map(|[a, b, c]| (a.dot(&b.cross(&c)) / 6.0, [a, b, c])), 4.0)
+    }
+
+    /// A shell along these triangles, m; `volume` is its area, m^2, and the moments are per area.
+    pub fn of_surface(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
+        Self::of_simplices(triangles.map(|[a, b, c]| (0.5 * (b - a).cross(&(c - a)).norm(), [a, b, c])), 3.0)
+    }
+
+    /// Simplices of signed sizes with `corners` corners, of which a fourth is the origin. Over a simplex, the mean of r is s / n and that
+    /// of r r' is (sum of v v' + s s') / (n (n + 1)), with s the sum of its n corners v.
+    fn of_simplices(parts: impl Iterator<Item = (f64, [Vec3; 3])>, corners: f64) -> Self {
         let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
-        for [a, b, c] in mesh.tetrahedra(origin) {
-            let part = a.dot(&b.cross(&c)) / 6.0;
+        for (part, [a, b, c]) in parts {
             let sum = a + b + c;
             let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
             volume += part;
-            first += sum * (part / 4.0);
-            second += (squares + sum * sum.transpose()) * (part / 20.0);
+            first += sum * (part / corners);
+            second += (squares + sum * sum.transpose()) * (part / (corners * (corners + 1.0)));
         }
         let centre = if volume > 0.0 { first / volume } else { first };
         second -= centre * centre.transpose() * volume;
-        Self::new(volume, Vec3::from(origin.map(f64::from)) + centre, second)
+        Self::new(volume, centre, second)
     }
 
     /// Extruded polygon, given by its triangulation.

@@ -1,17 +1,21 @@
 //! `<geom>`: shape and mass.
 
+use std::sync::Arc;
+
 use roxmltree::Node;
 
 use super::super::description::{Form, Place, Shape, mesh_unit};
 use super::super::inertia::{Inertial, Solid};
-use super::{MAIN, Model, to_z};
+use super::super::mesh::{self, Filling};
+use super::{MAIN, Model, quaternion};
 use crate::cli::Failure;
-use crate::machine::Vec3;
+use crate::machine::{self, Quat, Vec3};
+use crate::words::Words;
 
 /// Density of a geom without one of its own, kg/m^3.
 const DENSITY: f64 = 1000.0;
 /// Attributes of a geom that are read, or noted elsewhere, or act on contacts alone.
-const GEOM: [&str; 18] = [
+const GEOM: [&str; 19] = [
     "type",
     "size",
     "fromto",
@@ -20,6 +24,7 @@ const GEOM: [&str; 18] = [
     "rgba",
     "material",
     "mesh",
+    "shellinertia",
     "contype",
     "conaffinity",
     "condim",
@@ -45,7 +50,11 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         if ["contype", "conaffinity"].iter().any(|key| self.attribute(node, class, key) != Some("0")) {
             self.found.leave_out(line, "contact between geoms: bodies do not touch each other");
         }
-        let mut place = self.place(node, class)?;
+        let place = self.place(node, class)?;
+        if self.attribute(node, class, "shellinertia") == Some("true") {
+            let message = "shellinertia = \"true\" is not read: give its body an <inertial>, or the geom mass = \"0\"";
+            return Err(self.source.error(node, message));
+        }
         let kind = self.attribute(node, class, "type").unwrap_or("sphere");
         let sizes = self.attribute(node, class, "size").map(|text| self.source.parse(node, "size", text, [1, 3]));
         let sizes = sizes.transpose()?.unwrap_or_default();
@@ -53,15 +62,9 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             let size = sizes.get(at).copied().filter(|size| *size > 0.0);
             size.ok_or_else(|| self.source.error(node, &format!("size: a {kind} needs number {} above 0", at + 1)))
         };
-        let mut half = None;
-        if let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? {
-            let (from, to) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
-            let along = (to - from).try_normalize(1e-12);
-            let along = along.ok_or_else(|| self.source.error(node, "fromto: both points are the same"))?;
-            // MuJoCo's z axis points from the second point to the first.
-            place = Place { position: 0.5 * (from + to), rotation: to_z(-along) };
-            half = Some(0.5 * (to - from).norm());
-        }
+        let between = self.between(node, class)?;
+        let place = between.map_or(place, |(place, _)| place);
+        let half = between.map(|(_, half)| half);
         let length = |at: usize| half.map_or_else(|| size(at), Ok);
         let colour = self.attribute(node, class, "rgba");
         let material = || self.attribute(node, class, "material").and_then(|name| self.colours.get(name).copied());
@@ -90,7 +93,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                     (None, Some(Solid::Ellipsoid(axes)))
                 }
             }
-            "mesh" => (self.mesh(node, class, line)?, None),
+            "mesh" => (self.mesh_form(node, class)?, None),
             "plane" | "hfield" => {
                 self.found.leave_out(line, format!("geom of type {kind}"));
                 return Ok((None, None));
@@ -111,37 +114,74 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 Some(Inertial::of_solid(solid, mass, place.position, turn))
             }
             (true, None) => {
-                let message =
-                    "the mass of a mesh is not computed: give its body an <inertial>, or the geom mass = \"0\"";
-                return Err(self.source.error(node, message));
+                let solid = self.mesh_solid(node, class)?;
+                Some(place.inertial(Inertial::of_density(&solid, mass.map_or(density, |mass| mass / solid.volume))))
             }
         };
         let form = form.filter(|_| !transparent);
         Ok((form.map(|form| Shape { form, place, colour, line }), mass))
     }
 
-    fn mesh(&mut self, node: Node<'n, 'i>, class: &str, line: u32) -> Result<Option<Form>, Failure> {
+    /// The mesh asset of a geom and its scale.
+    fn mesh_asset(&self, node: Node<'n, 'i>, class: &str) -> Result<(Node<'n, 'i>, [f64; 3]), Failure> {
         let name = self.attribute(node, class, "mesh");
         let name = name.ok_or_else(|| self.source.error(node, "the attribute `mesh` is missing"))?;
         let asset =
             *self.meshes.get(name).ok_or_else(|| self.source.error(node, &format!("there is no mesh {name}")))?;
-        let scale = self.numbers::<3>(asset, MAIN, "scale")?.unwrap_or([1.0; 3]);
+        Ok((asset, self.numbers(asset, MAIN, "scale")?.unwrap_or([1.0; 3])))
+    }
+
+    /// The file of a mesh asset below the folder of the description.
+    fn mesh_file(&self, asset: Node<'n, 'i>) -> Option<String> {
+        let file = asset.attribute("file")?;
+        let folder = self.mesh_folder.trim_end_matches('/').trim_start_matches("./");
+        Some(if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") })
+    }
+
+    /// What a mesh looks like, if a scene can show it.
+    fn mesh_form(&mut self, node: Node<'n, 'i>, class: &str) -> Result<Option<Form>, Failure> {
+        let (asset, scale) = self.mesh_asset(node, class)?;
         let moved = ["refpos", "refquat"].into_iter().find(|key| asset.attribute(*key).is_some());
-        let unit = match (asset.attribute("file"), moved) {
+        let form = match (self.mesh_file(asset), moved) {
             (None, _) => Err("which has no file".to_owned()),
             (_, Some(key)) => Err(format!("which has {key}")),
-            _ => mesh_unit(scale).map_err(str::to_owned),
+            (Some(file), None) => mesh_unit(scale).map(|unit| Form::Mesh(file, unit)).map_err(str::to_owned),
         };
-        let unit = match unit {
-            Ok(unit) => unit,
-            Err(fault) => {
-                self.found.leave_out(line, format!("mesh {name}, {fault}"));
-                return Ok(None);
-            }
+        form.map(Some).or_else(|fault| {
+            let name = self.attribute(node, class, "mesh").unwrap_or_default();
+            self.found.leave_out(self.source.line(node), format!("picture of mesh {name}, {fault}"));
+            Ok(None)
+        })
+    }
+
+    /// What a mesh encloses, in the axes of its geom.
+    fn mesh_solid(&mut self, node: Node<'n, 'i>, class: &str) -> Result<machine::Solid, Failure> {
+        let (asset, scale) = self.mesh_asset(node, class)?;
+        let filling = match self.attribute(asset, MAIN, "inertia") {
+            None => self.filling,
+            Some(word) => Filling::of_word(word).ok_or_else(|| {
+                self.source.error(asset, &format!("inertia = \"{word}\": allowed: {}", Filling::WORDS.join(", ")))
+            })?,
         };
-        let folder = self.mesh_folder.trim_end_matches('/').trim_start_matches("./");
-        let file = asset.attribute("file").unwrap_or_default();
-        let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
-        Ok(Some(Form::Mesh(file, unit)))
+        let position = self.numbers(asset, MAIN, "refpos")?.map_or_else(Vec3::zeros, Vec3::from);
+        let rotation = match self.numbers(asset, MAIN, "refquat")? {
+            Some(parts) => quaternion(parts).ok_or_else(|| self.source.error(asset, "refquat is 0"))?,
+            None => Quat::identity(),
+        };
+        let origin = Place { position, rotation }.inverse();
+        let scale = Vec3::from(scale);
+        let remedy = "give its body an <inertial>, or the geom mass = \"0\"";
+        let failed =
+            |what: String| self.source.error(node, &format!("mesh without a computable mass: {what}; {remedy}"));
+        let file = self.mesh_file(asset).ok_or_else(|| failed("it has no file".to_owned()))?;
+        let mesh = match self.read.get(&file) {
+            Some(mesh) => mesh.clone(),
+            None => Arc::new(mesh::read(self.source.folder, &file).map_err(failed)?),
+        };
+        let solid =
+            mesh::solid(&mesh, |point| scale.component_mul(&origin.point(point)), scale.product() < 0.0, filling);
+        let solid = solid.map_err(|fault| failed(format!("{file}: {fault}")))?;
+        self.read.insert(file, mesh);
+        Ok(solid)
     }
 }

@@ -2,29 +2,28 @@
 
 mod equality;
 mod geom;
+mod joint;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use roxmltree::Node;
 
-use super::description::{Body, Description, Joint, Kind, Place, Shape, Spring};
+use super::description::{Description, Place, Shape};
 use super::inertia::Inertial;
+use super::mesh::Filling;
 use super::xml::{Source, child};
 use super::{DEEPEST, too_deep};
 use crate::cli::Failure;
-use crate::machine::{Mat3, Quat, Vec3};
-
-/// Cosine of the angle between two axes from which they count as parallel, and up to which as perpendicular.
-const PARALLEL: f64 = 1.0 - 1e-10;
-const PERPENDICULAR: f64 = 1e-6;
+use crate::machine::{Mat3, Mesh, Quat, Vec3};
 
 /// Defaults of elements by their tag, of one class.
 type Defaults<'n> = BTreeMap<&'n str, BTreeMap<&'n str, &'n str>>;
 
 /// A site.
 struct Site {
-    /// The moving body, `None` for the world, and the point there, m.
-    point: (Option<usize>, Vec3),
+    /// The moving body, `None` for the world, and its place there.
+    at: (Option<usize>, Place),
     line: u32,
     /// Whether a loop is closed there.
     connected: bool,
@@ -39,9 +38,12 @@ struct Model<'s, 'n, 'i> {
     sequence: &'n str,
     mesh_folder: &'n str,
     inertia_from_geoms: Option<bool>,
+    /// How meshes are filled that do not say it.
+    filling: Filling,
     classes: BTreeMap<&'n str, Defaults<'n>>,
-    /// Meshes by name.
+    /// Meshes by name, and those that have been read, by file.
     meshes: BTreeMap<String, Node<'n, 'i>>,
+    read: BTreeMap<String, Arc<Mesh>>,
     colours: BTreeMap<&'n str, &'n str>,
     /// Bodies by name: the moving body of which each is a part, `None` for the world, and its place there.
     bodies: BTreeMap<&'n str, (Option<usize>, Place)>,
@@ -49,22 +51,6 @@ struct Model<'s, 'n, 'i> {
     found: Description,
 }
 
-/// Attributes of a joint that are read, or noted elsewhere, or act on limits alone.
-const JOINT: [&str; 13] = [
-    "type",
-    "axis",
-    "range",
-    "limited",
-    "margin",
-    "solreflimit",
-    "solimplimit",
-    "stiffness",
-    "damping",
-    "springref",
-    "armature",
-    "frictionloss",
-    "ref",
-];
 /// Ways to say an orientation, of which one alone counts.
 const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 /// What is said of a site where nothing is connected.
@@ -75,7 +61,7 @@ const MAIN: &str = "main";
 /// Reads `<mujoco>`.
 ///
 /// # Errors
-/// A missing or invalid part, joints of a body that a scene has no joint for, or mass that only a mesh has.
+/// A missing or invalid part, joints of a body that a scene has no joint for, or a mesh without a mass that can be computed.
 pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Description, Failure> {
     let mut model = Model {
         source,
@@ -83,8 +69,10 @@ pub fn read<'n, 'i>(source: &Source<'_>, root: Node<'n, 'i>) -> Result<Descripti
         sequence: "xyz",
         mesh_folder: "",
         inertia_from_geoms: None,
+        filling: Filling::Legacy,
         classes: BTreeMap::new(),
         meshes: BTreeMap::new(),
+        read: BTreeMap::new(),
         colours: BTreeMap::new(),
         bodies: BTreeMap::new(),
         sites: BTreeMap::new(),
@@ -132,6 +120,8 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                     self.sequence = sequence;
                 }
                 ("meshdir" | "assetdir", folder) => self.mesh_folder = folder,
+                ("exactmeshinertia", "true") => self.filling = Filling::Exact,
+                ("exactmeshinertia", _) => {}
                 ("inertiafromgeom", "auto") => self.inertia_from_geoms = None,
                 ("inertiafromgeom", "true") => self.inertia_from_geoms = Some(true),
                 ("inertiafromgeom", "false") => self.inertia_from_geoms = Some(false),
@@ -265,19 +255,24 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         Ok(Place { position, rotation: self.rotation(node, class)? })
     }
 
+    /// The place between the two points of `fromto`, if an element has them, and half their distance, m.
+    fn between(&self, node: Node<'n, 'i>, class: &str) -> Result<Option<(Place, f64)>, Failure> {
+        let Some([a, b, c, d, e, f]) = self.numbers(node, class, "fromto")? else {
+            return Ok(None);
+        };
+        let (from, to) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
+        let along = (to - from).try_normalize(1e-12);
+        let along = along.ok_or_else(|| self.source.error(node, "fromto: both points are the same"))?;
+        // MuJoCo's z axis points from the second point to the first.
+        Ok(Some((Place { position: 0.5 * (from + to), rotation: to_z(-along) }, 0.5 * (to - from).norm())))
+    }
+
     fn rotation(&self, node: Node<'n, 'i>, class: &str) -> Result<Quat, Failure> {
         let direction = |v: Vec3, key: &str| {
             v.try_normalize(1e-12).ok_or_else(|| self.source.error(node, &format!("{key} has no direction")))
         };
-        if let Some([w, x, y, z]) = self.numbers(node, class, "quat")? {
-            let size = [w, x, y, z].iter().map(|part| part * part).sum::<f64>().sqrt();
-            if !(size > 0.0) {
-                return Err(self.source.error(node, "quat is 0"));
-            }
-            // The double cover does not matter.
-            let axis = Vec3::new(x, y, z);
-            let angle = 2.0 * libm::atan2(axis.norm(), w);
-            return Ok(axis.try_normalize(0.0).map_or_else(Quat::identity, |axis| turn(axis, angle)));
+        if let Some(parts) = self.numbers(node, class, "quat")? {
+            return quaternion(parts).ok_or_else(|| self.source.error(node, "quat is 0"));
         }
         if let Some([x, y, z, angle]) = self.numbers(node, class, "axisangle")? {
             return Ok(turn(direction(Vec3::new(x, y, z), "axisangle")?, self.angle * angle));
@@ -326,12 +321,7 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
         let joints: Vec<_> = node.children().filter(is_joint).collect();
         let (mut owner, mut at) = (carrier, *place);
         if !joints.is_empty() {
-            let index = self.found.bodies.len();
-            let name = node.attribute("name").map_or_else(|| format!("body{}", index + 1), str::to_owned);
-            let joint = self.joint(node, &joints, class, [carrier, Some(index)], place, &name)?;
-            self.found.joints.push(joint);
-            let inertial = Inertial { mass: 0.0, centre: Vec3::zeros(), inertia: Mat3::zeros() };
-            self.found.bodies.push(Body { name, inertial, shapes: Vec::new() });
+            let index = self.jointed(node, &joints, class, carrier, place)?;
             (owner, at) = (Some(index), Place::identity());
         }
         if let Some(name) = node.attribute("name") {
@@ -403,13 +393,11 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
             self.found.leave_out(line, UNUSED_SITE);
             return Ok(());
         };
-        let ends = self.numbers::<6>(node, class, "fromto")?;
-        let middle = ends.map(|[a, b, c, d, e, f]| 0.5 * Vec3::new(a + d, b + e, c + f));
-        let own = match middle {
-            Some(middle) => middle,
-            None => self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from),
+        let own = match self.between(node, class)? {
+            Some((own, _)) => own,
+            None => self.place(node, class)?,
         };
-        self.sites.insert(name, Site { point: (owner, place.point(own)), line, connected: false });
+        self.sites.insert(name, Site { at: (owner, place.then(&own)), line, connected: false });
         Ok(())
     }
 
@@ -424,120 +412,23 @@ impl<'n, 'i> Model<'_, 'n, 'i> {
                 Mat3::from_diagonal(&self.source.numbers(node, "diaginertia")?.map_or_else(Vec3::zeros, Vec3::from))
             }
         };
-        Ok(place.inertial(Inertial { mass, centre: Vec3::zeros(), inertia }))
-    }
-
-    /// The joint of a body with these joint elements.
-    fn joint(
-        &mut self,
-        body: Node<'n, 'i>,
-        nodes: &[Node<'n, 'i>],
-        class: &str,
-        [parent, child]: [Option<usize>; 2],
-        place: &Place,
-        body_name: &str,
-    ) -> Result<Joint, Failure> {
-        let mut parts = Vec::new();
-        for &node in nodes {
-            let kind = match node.tag_name().name() {
-                "freejoint" => "free",
-                _ => self.attribute(node, class, "type").unwrap_or("hinge"),
-            };
-            let axis = self.numbers(node, class, "axis")?.map_or_else(Vec3::z, Vec3::from);
-            let axis = axis.try_normalize(1e-12);
-            let axis = axis.ok_or_else(|| self.source.error(node, "axis has no direction"))?;
-            let anchor = self.numbers(node, class, "pos")?.map_or_else(Vec3::zeros, Vec3::from);
-            if !["hinge", "slide", "ball", "free"].contains(&kind) {
-                let message = format!("type = \"{kind}\": allowed: hinge, slide, ball, free");
-                return Err(self.source.error(node, &message));
-            }
-            self.leave_out_attributes(node, &JOINT);
-            for key in ["armature", "frictionloss", "ref"] {
-                if self.attribute(node, class, key).is_some_and(|value| value.trim() != "0") {
-                    self.found.leave_out(self.source.line(node), format!("{key} of <joint>"));
-                }
-            }
-            if self.attribute(node, class, "range").is_some() {
-                let what = "range of a joint: a [[stop]] needs its stiffness, too";
-                self.found.leave_out(self.source.line(node), what);
-            }
-            parts.push((node, kind, axis, anchor));
-        }
-        let parallel = |a: &Vec3, b: &Vec3| a.dot(b).abs() > PARALLEL;
-        let kind = match parts[..] {
-            [(_, "hinge", axis, _)] => Kind::Hinge(axis),
-            [(_, "slide", axis, _)] => Kind::Slide(axis),
-            [(_, "ball", ..)] => Kind::Ball,
-            [(_, "free", ..)] => Kind::Free,
-            [(_, a, axis, _), (_, b, other, _)]
-                if a != b && [a, b].iter().all(|k| ["hinge", "slide"].contains(k)) && parallel(&axis, &other) =>
-            {
-                Kind::Cylindrical(axis)
-            }
-            [(_, "hinge", axis, at), (_, "hinge", other, too)]
-                if axis.dot(&other).abs() < PERPENDICULAR && (at - too).norm() < 1e-9 =>
-            {
-                Kind::Universal(axis, other)
-            }
-            _ => {
-                let message = "its joints are together none that a scene has: one joint; a hinge and a slide along one axis; or two \
-                               perpendicular hinges in one point. Put a body between them";
-                return Err(self.source.error(body, message));
-            }
-        };
-        if let (Kind::Free, Some(_)) = (kind, parent) {
-            return Err(self.source.error(body, "only a body of the world moves freely"));
-        }
-        // The axis of a cylindrical joint is that of its first part; the second may point the other way.
-        let sign = |axis: Vec3| match kind {
-            Kind::Cylindrical(first) => first.dot(&axis).signum(),
-            _ => 1.0,
-        };
-        let signed: Vec<_> = parts.iter().map(|&(node, of, axis, _)| (node, of, sign(axis))).collect();
-        let springs = self.springs(&signed, class, kind)?;
-        // Of a cylindrical joint, the point on the axis of its hinge.
-        let anchor = parts.iter().find(|part| part.1 == "hinge").unwrap_or(&parts[0]).3;
-        let name = nodes[0].attribute("name").unwrap_or(body_name).to_owned();
-        let anchor = if kind == Kind::Free { Vec3::zeros() } else { anchor };
-        Ok(Joint { name, kind, parent, child: child.unwrap_or_default(), place: *place, anchor, springs })
-    }
-
-    /// Springs and dampers of joint elements, each with its type and the sign of its coordinate in the scene.
-    fn springs(
-        &mut self,
-        parts: &[(Node<'n, 'i>, &str, f64)],
-        class: &str,
-        kind: Kind,
-    ) -> Result<Vec<Spring>, Failure> {
-        let mut found = Vec::new();
-        for (at, &(node, of, sign)) in parts.iter().enumerate() {
-            let (stiffness, damping) = (self.number(node, class, "stiffness")?, self.number(node, class, "damping")?);
-            if stiffness == 0.0 && damping == 0.0 {
-                continue;
-            }
-            let turns = of == "hinge";
-            if !turns && of != "slide" {
-                self.found.leave_out(self.source.line(node), format!("stiffness and damping of a {of} joint"));
-                continue;
-            }
-            let coordinate = match (kind, turns, at) {
-                (Kind::Cylindrical(_), true, _) | (Kind::Universal(..), _, 0) => Some("angle"),
-                (Kind::Cylindrical(_), false, _) => Some("position"),
-                (Kind::Universal(..), ..) => Some("child_angle"),
-                _ => None,
-            };
-            // The scene's coordinate is 0 where MuJoCo's is `ref`.
-            let rest = self.number(node, class, "springref")? - self.number(node, class, "ref")?;
-            let rest = sign * rest * if turns { self.angle } else { 1.0 };
-            found.push(Spring { coordinate, turns, stiffness, damping, rest });
-        }
-        Ok(found)
+        let own = Inertial { mass, centre: Vec3::zeros(), inertia };
+        own.fault().map_or(Ok(place.inertial(own)), |fault| Err(self.source.error(node, &fault)))
     }
 }
 
 /// Whether an element has an orientation of its own.
 fn turned(node: Node) -> bool {
     ORIENTATIONS.iter().any(|key| node.attribute(*key).is_some())
+}
+
+/// The turn of a quaternion w, x, y, z of any length; `None` for 0.
+fn quaternion([w, x, y, z]: [f64; 4]) -> Option<Quat> {
+    // The double cover does not matter.
+    let axis = Vec3::new(x, y, z);
+    let angle = 2.0 * libm::atan2(axis.norm(), w);
+    let turned = axis.try_normalize(0.0).map_or_else(Quat::identity, |axis| turn(axis, angle));
+    (w != 0.0 || axis.norm() > 0.0).then_some(turned)
 }
 
 /// A turn about a unit axis, rad.

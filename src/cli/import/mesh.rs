@@ -1,0 +1,258 @@
+//! Mass of meshes, as MuJoCo computes it: <https://mujoco.readthedocs.io/en/stable/XMLreference.html#asset-mesh-inertia>.
+
+use std::collections::BTreeSet;
+use std::io::Read;
+use std::path::{Component, Path};
+
+use crate::machine::{Mesh, Solid, Vec3};
+use crate::scene::LARGEST_MESH;
+use crate::scene::mesh::Format;
+use crate::words::words;
+
+/// Largest number of pairs of a point and a face that are compared for a hull.
+const MOST_COMPARISONS: usize = 400_000_000;
+/// How far beyond a face of a hull a point may lie as if it were in its plane, in extents of the mesh: the rounding of files.
+const FLAT: f64 = 1e-9;
+
+/// What of a mesh has mass: the words of its attribute `inertia`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Filling {
+    /// Its convex hull.
+    Convex,
+    /// What it encloses.
+    Exact,
+    /// The pyramids between its triangles and their common centroid, those that the surface faces away from as well.
+    Legacy,
+    /// Its surface.
+    Shell,
+}
+
+words!(Filling {
+    Convex => "convex",
+    Exact => "exact",
+    Legacy => "legacy",
+    Shell => "shell",
+});
+
+/// Reads the mesh `file` of a description in `folder`.
+///
+/// # Errors
+/// A sentence about a file that is elsewhere, unreadable, too large or invalid.
+pub fn read(folder: &Path, file: &str) -> Result<Mesh, String> {
+    let below = Path::new(file).components().all(|part| matches!(part, Component::Normal(_)));
+    let format = Format::of(file).filter(|_| below);
+    let format = format.ok_or_else(|| {
+        format!("{file} is not STL, OBJ or glTF, or not in the folder of the description or below it")
+    })?;
+    let unreadable = |error: std::io::Error| format!("cannot read {file}: {error}");
+    let mut bytes = Vec::new();
+    let opened = std::fs::File::open(folder.join(file)).map_err(unreadable)?;
+    opened.take(LARGEST_MESH + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST_MESH {
+        return Err(format!("{file} is too large; allowed at most {} MiB", LARGEST_MESH >> 20));
+    }
+    let alone = |other: &str| Err(format!("{other} is another file").into());
+    format.read(&bytes, &alone).map_err(|fault| format!("{file}: {}", fault.why))
+}
+
+/// What of `mesh` has mass, with its vertices where `place` takes them, m; `mirrored` if that turns it inside out. The volume of a shell
+/// is its area, m^2.
+///
+/// # Errors
+/// A sentence about a mesh that is open, flat, or too large for a hull.
+pub fn solid(mesh: &Mesh, place: impl Fn(Vec3) -> Vec3, mirrored: bool, filling: Filling) -> Result<Solid, String> {
+    let vertices: Vec<Vec3> = mesh.vertices().iter().map(|vertex| place(Vec3::from(vertex.map(f64::from)))).collect();
+    let outward = |[a, b, c]: [u32; 3]| {
+        let corners = if mirrored { [a, c, b] } else { [a, b, c] };
+        corners.map(|corner| vertices[corner as usize])
+    };
+    let triangles: Vec<[Vec3; 3]> = match filling {
+        Filling::Convex => hull(&vertices)?.into_iter().map(|face| face.map(|corner| vertices[corner])).collect(),
+        _ => mesh.triangles().iter().map(|corners| outward(*corners)).collect(),
+    };
+    if let (Filling::Exact | Filling::Legacy, Some(ends)) = (filling, mesh.open_edge()) {
+        let [from, to] = ends.map(|[x, y, z]| format!("({x}, {y}, {z})"));
+        return Err(format!(
+            "it is not closed: its edge from {from} to {to} does not lie between two triangles that face the same way; close it, or \
+             choose inertia = \"convex\" or \"shell\""
+        ));
+    }
+    let surface = Solid::of_surface(triangles.iter().copied());
+    let about = |point: Vec3, unsigned: bool| {
+        let pyramids = triangles.iter().map(|corners| {
+            let [a, b, c] = corners.map(|corner| corner - point);
+            if unsigned && a.dot(&b.cross(&c)) < 0.0 { [a, c, b] } else { [a, b, c] }
+        });
+        Solid::of_tetrahedra(pyramids).moved(point)
+    };
+    let solid = match filling {
+        Filling::Shell => surface,
+        Filling::Convex | Filling::Exact => about(surface.centre, false),
+        // The centroid of the first pyramids is the tip of those that count.
+        Filling::Legacy => about(about(surface.centre, true).centre, true),
+    };
+    let regular = solid.volume > 0.0 && solid.inertia().symmetric_eigenvalues().min() > 0.0;
+    if regular { Ok(solid) } else { Err("it encloses no volume".to_owned()) }
+}
+
+/// Triangles of the convex hull of `points`, counter-clockwise seen from outside, as indices. Each point in turn replaces the faces that
+/// it lies beyond by the cone to their outline, so that the surface stays closed whatever rounding decides
+/// (O'Rourke, *Computational Geometry in C*, second edition, 1998, section 4.3).
+fn hull(points: &[Vec3]) -> Result<Vec<[usize; 3]>, String> {
+    let flat = || "its points lie in one plane".to_owned();
+    let farthest = |measure: &dyn Fn(&Vec3) -> f64| {
+        let all = points.iter().enumerate().map(|(index, point)| (measure(point), index));
+        all.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(size, _)| *size > 0.0).map(|(_, index)| index).ok_or_else(flat)
+    };
+    let a = points.first().ok_or_else(flat)?;
+    let one = farthest(&|p| (p - a).norm())?;
+    let a = points[one];
+    let two = farthest(&|p| (p - a).norm())?;
+    let (extent, along) = ((points[two] - a).norm(), (points[two] - a).normalize());
+    let three = farthest(&|p| (p - a).cross(&along).norm())?;
+    let normal = along.cross(&(points[three] - a)).try_normalize(0.0).ok_or_else(flat)?;
+    let four = farthest(&|p| (p - a).dot(&normal).abs())?;
+    let height = (points[four] - a).dot(&normal);
+    if height.abs() <= FLAT * extent {
+        return Err(flat());
+    }
+    let [i, j, k, top] = if height > 0.0 { [one, three, two, four] } else { [one, two, three, four] };
+    let face = |corners: [usize; 3]| {
+        let [a, b, c] = corners.map(|corner| points[corner]);
+        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(Vec3::zeros);
+        (corners, normal, normal.dot(&a))
+    };
+    let mut faces: Vec<_> = [[i, j, k], [i, top, j], [j, top, k], [k, top, i]].map(face).into();
+    let mut comparisons = 0;
+    for (index, point) in points.iter().enumerate() {
+        comparisons += faces.len();
+        if comparisons > MOST_COMPARISONS {
+            return Err("its hull is too costly; choose inertia = \"exact\"".to_owned());
+        }
+        let sees = |(_, normal, height): &([usize; 3], Vec3, f64)| normal.dot(point) - height > FLAT * extent;
+        if !faces.iter().any(sees) {
+            continue;
+        }
+        let (seen, hidden): (Vec<_>, Vec<_>) = faces.into_iter().partition(sees);
+        faces = hidden;
+        let edges: BTreeSet<[usize; 2]> =
+            seen.iter().flat_map(|([a, b, c], ..)| [[*a, *b], [*b, *c], [*c, *a]]).collect();
+        let outline = edges.iter().filter(|[from, to]| !edges.contains(&[*to, *from]));
+        faces.extend(outline.map(|[from, to]| face([*from, *to, index])));
+    }
+    Ok(faces.into_iter().map(|(corners, ..)| corners).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A prism over the polygon `corners`, in m: its mesh, in mm, is closed.
+    fn prism(corners: &[[f32; 2]], triangles: &[[u32; 3]], height: f32) -> Mesh {
+        let n = u32::try_from(corners.len()).unwrap();
+        let layer = |z: f32| corners.iter().map(move |[x, y]| [1e3 * x, 1e3 * y, 1e3 * z]);
+        let mut faces: Vec<[u32; 3]> =
+            triangles.iter().flat_map(|&[a, b, c]| [[a, c, b], [a + n, b + n, c + n]]).collect();
+        faces.extend((0..n).flat_map(|i| {
+            let next = (i + 1) % n;
+            [[i, next, next + n], [i, next + n, i + n]]
+        }));
+        Mesh::new(layer(0.0).chain(layer(height)).collect(), faces)
+    }
+
+    fn found(mesh: &Mesh, filling: Filling) -> Solid {
+        solid(mesh, |point| point * 1e-3, false, filling).unwrap()
+    }
+
+    fn is(solid: &Solid, volume: f64, centre: [f64; 3], inertia: [f64; 3]) {
+        assert!((solid.volume / volume - 1.0).abs() < 1e-6, "{} {volume}", solid.volume);
+        assert!((solid.centre - Vec3::from(centre)).amax() < 1e-6, "{}", solid.centre);
+        let off = solid.inertia().diagonal() - Vec3::from(inertia);
+        assert!(off.amax() < 1e-5 * Vec3::from(inertia).amax(), "{} {inertia:?}", solid.inertia());
+    }
+
+    #[test]
+    fn a_box_has_the_moments_of_a_box_whatever_the_filling_and_a_shell_those_of_six_plates() {
+        let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.3], [0.0, 0.3]];
+        let mesh = prism(&corners, &[[0, 1, 2], [0, 2, 3]], 0.5);
+        let (v, squares) = (0.2 * 0.3 * 0.5, [0.04, 0.09, 0.25]);
+        let own = [squares[1] + squares[2], squares[0] + squares[2], squares[0] + squares[1]].map(|sum| v * sum / 12.0);
+        for filling in [Filling::Convex, Filling::Exact, Filling::Legacy] {
+            is(&found(&mesh, filling), v, [0.1, 0.15, 0.25], own);
+        }
+        let shell = found(&mesh, Filling::Shell);
+        // Pairs of plates across each axis, half an edge from the centroid; along their own edges, the mean square is a twelfth.
+        let [a, b, c] = [0.2, 0.3, 0.5];
+        let (x, y, z) = (2.0 * b * c, 2.0 * a * c, 2.0 * a * b);
+        let mean = |x_: f64, y_: f64, z_: f64, edge: f64| edge * edge * (x * x_ + y * y_ + z * z_);
+        let xx = mean(0.25, 1.0 / 12.0, 1.0 / 12.0, a);
+        let yy = mean(1.0 / 12.0, 0.25, 1.0 / 12.0, b);
+        let zz = mean(1.0 / 12.0, 1.0 / 12.0, 0.25, c);
+        is(&shell, x + y + z, [0.1, 0.15, 0.25], [yy + zz, xx + zz, xx + yy]);
+    }
+
+    /// An L of three squares: its hull has half a square more.
+    #[test]
+    fn an_angle_is_filled_up_only_by_its_hull() {
+        let corners = [[0.0, 0.0], [0.2, 0.0], [0.2, 0.1], [0.1, 0.1], [0.1, 0.2], [0.0, 0.2]];
+        let mesh = prism(&corners, &[[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]], 0.1);
+        let exact = found(&mesh, Filling::Exact);
+        let square = |x: f64, y: f64| {
+            let size = Vec3::repeat(0.1);
+            let geometry = crate::machine::Geometry::Box { centre: Vec3::new(x, y, 0.05), size };
+            Solid::of(&geometry)
+        };
+        let parts = [square(0.05, 0.05), square(0.15, 0.05), square(0.05, 0.15)];
+        let centre = parts.iter().map(|part| part.centre).sum::<Vec3>() / 3.0;
+        let inertia = parts.iter().fold(crate::machine::Mat3::zeros(), |sum, part| {
+            let d = part.centre - centre;
+            sum + part.inertia() + 1e-3 * (crate::machine::Mat3::identity() * d.norm_squared() - d * d.transpose())
+        });
+        is(&exact, 3e-3, centre.into(), inertia.diagonal().into());
+        assert!((exact.inertia() - inertia).amax() < 1e-5 * inertia.amax());
+        let hull = found(&mesh, Filling::Convex);
+        assert!((hull.volume / 3.5e-3 - 1.0).abs() < 1e-6, "{}", hull.volume);
+        // Three squares and a triangle with its centroid a third of its edges from the inner corner.
+        let x = (3e-3 * centre.x + 0.5e-3 * (0.1 + 0.1 / 3.0)) / 3.5e-3;
+        assert!((hull.centre - Vec3::new(x, x, 0.05)).amax() < 1e-6, "{}", hull.centre);
+        assert!(found(&mesh, Filling::Legacy).volume >= exact.volume);
+        let mirrored =
+            solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, Filling::Exact).unwrap();
+        assert!((mirrored.volume / exact.volume - 1.0).abs() < 1e-12 && (mirrored.centre.x + centre.x).abs() < 1e-6);
+    }
+
+    /// Points of a ball and inside it, in an order without pattern; the hull of the inscribed polyhedron.
+    #[test]
+    fn the_hull_of_points_of_a_ball_is_almost_a_ball() {
+        let n: u32 = 2000;
+        let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+        let points: Vec<Vec3> = (0..n)
+            .map(|i| {
+                let k = f64::from(i * 761 % n);
+                let z = 1.0 - (2.0 * k + 1.0) / f64::from(n);
+                let across = (1.0 - z * z).sqrt();
+                let point = Vec3::new(across * (golden * k).cos(), across * (golden * k).sin(), z);
+                if i % 3 == 0 { 0.5 * point } else { point }
+            })
+            .collect();
+        let faces = hull(&points).unwrap();
+        let solid = Solid::of_tetrahedra(faces.iter().map(|face| face.map(|corner| points[corner])));
+        let ball = 4.0 / 3.0 * std::f64::consts::PI;
+        assert!(solid.volume < ball && solid.volume > 0.99 * ball, "{}", solid.volume);
+        // Euler: F = 2 V - 4, with a third of the points inside.
+        assert_eq!(faces.len(), 2 * (2 * n as usize / 3) - 4);
+        assert!(hull(&points.iter().map(|p| Vec3::new(p.x, p.y, 0.0)).collect::<Vec<_>>()).is_err());
+    }
+
+    #[test]
+    fn an_open_mesh_has_a_hull_and_a_surface_alone() {
+        let vertices = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0], [0.0, 1e3, 0.0], [0.0, 0.0, 1e3]];
+        let mesh = Mesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]]);
+        let hull = found(&mesh, Filling::Convex);
+        // A tetrahedron with three edges of 1 m: 1/6, and 3/80 of its volume for the square of a coordinate about the centroid.
+        is(&hull, 1.0 / 6.0, [0.25; 3], [2.0 / 6.0 * 3.0 / 80.0; 3]);
+        assert!((found(&mesh, Filling::Shell).volume - 1.5).abs() < 1e-6);
+        let fault = solid(&mesh, |point| point, false, Filling::Exact).unwrap_err();
+        assert!(fault.contains("it is not closed: its edge from"), "{fault}");
+    }
+}
