@@ -60,15 +60,14 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
     if let Some(node) = section.get("density") {
         return Ok((read_solid(&section, &node, name, shapes)?, section));
     }
-    let mass = section.number("mass")?;
-    let body = Body {
-        name,
-        mass,
-        centre: section.vector("centre")?,
-        inertia: read_inertia(&section, mass)?,
-        shapes,
-        density: None,
+    let mass_node = section.require("mass")?;
+    let only_connects = mass_node.within(Dimension::Mass, (0.0, 0.0)).is_ok() && has_no_inertia(&section)?;
+    let (mass, inertia) = if only_connects {
+        (0.0, Mat3::zeros())
+    } else {
+        (mass_node.within(Dimension::Mass, (ABOVE_ZERO, MAX_MASS))?, read_inertia(&section)?)
     };
+    let body = Body { name, mass, centre: section.vector("centre")?, inertia, shapes, density: None };
     Ok((body, section))
 }
 
@@ -111,17 +110,19 @@ fn read_solid(section: &Section<'_>, node: &Node<'_>, name: String, shapes: Vec<
     Ok(Body { name, mass, centre: solid.centre, inertia, shapes, density: Some(density) })
 }
 
+/// Whether a body without mass has no inertia, either, as one that only connects joints.
+fn has_no_inertia(section: &Section<'_>) -> Result<bool, SceneError> {
+    let moments: [f64; 3] = section.require("inertia")?.numbers()?;
+    Ok(moments == [0.0; 3] && section.vector("products")? == Vec3::zeros())
+}
+
 /// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not principal,
 /// `products` = the integrals of xy, xz, yz over the mass.
-fn read_inertia(section: &Section<'_>, mass: f64) -> Result<Mat3, SceneError> {
+fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
     let node = section.require("inertia")?;
     let [xx, yy, zz] = node.numbers()?;
     let [xy, xz, yz] = section.vector("products")?.into();
     let inertia = Mat3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz);
-    if mass == 0.0 {
-        let fault = "a body of mass 0 kg only connects joints and has no inertia: allowed 0";
-        return if inertia.amax() == 0.0 { Ok(inertia) } else { Err(node.error(fault)) };
-    }
     if inertia.amax() > MAX_INERTIA {
         return Err(node.error("out of range; allowed above 0 up to 1e12 kg m^2"));
     }

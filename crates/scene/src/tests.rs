@@ -474,7 +474,7 @@ fn wrong_numbers_and_expressions_say_what_is_wrong() {
     };
     for (key, value, wanted) in [
         ("parameter.stroke", "5 mm", "parameter.stroke = 5 mm: out of range; allowed 10 mm to 50 mm"),
-        ("body.rod.mass", "-1 kg", "body.rod.mass = -1 kg: out of range; allowed 0 kg to"),
+        ("body.rod.mass", "-1 kg", "body.rod.mass = -1 kg: out of range; allowed above 0"),
         ("body.rod.mass", "1", "body.rod.mass = 1: needs a unit"),
         ("body.rod.maas", "1 kg", "unknown key (did you mean `body.rod.mass`?)"),
         ("joint.slide.start.velocit", "1 m/s", "did you mean `joint.slide.start.velocity`?"),
