@@ -215,7 +215,13 @@ mod tests {
         // Three squares and a triangle with its centroid a third of its edges from the inner corner.
         let x = (3e-3 * centre.x + 0.5e-3 * (0.1 + 0.1 / 3.0)) / 3.5e-3;
         assert!((hull.centre - Vec3::new(x, x, 0.05)).amax() < 1e-6, "{}", hull.centre);
-        assert!(found(&mesh, Filling::Legacy).volume >= exact.volume);
+        // The centroid sees the whole surface from inside; that of a deep channel lies outside, so that pyramids overlap.
+        assert!((found(&mesh, Filling::Legacy).volume / exact.volume - 1.0).abs() < 1e-9);
+        let channel =
+            [[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.25, 0.3], [0.25, 0.05], [0.05, 0.05], [0.05, 0.3], [0.0, 0.3]];
+        let channel = prism(&channel, &[[0, 1, 4], [0, 4, 5], [1, 2, 4], [2, 3, 4], [0, 5, 6], [0, 6, 7]], 0.1);
+        assert!((found(&channel, Filling::Exact).volume / 4e-3 - 1.0).abs() < 1e-6);
+        assert!(found(&channel, Filling::Legacy).volume > 2.0 * 4e-3);
         let mirrored =
             solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, Filling::Exact).unwrap();
         assert!((mirrored.volume / exact.volume - 1.0).abs() < 1e-12 && (mirrored.centre.x + centre.x).abs() < 1e-6);
@@ -238,7 +244,7 @@ mod tests {
         let faces = hull(&points).unwrap();
         let solid = Solid::of_tetrahedra(faces.iter().map(|face| face.map(|corner| points[corner])));
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
-        assert!(solid.volume < ball && solid.volume > 0.99 * ball, "{}", solid.volume);
+        assert!(solid.volume < ball && solid.volume > 0.98 * ball, "{}", solid.volume);
         // Euler: F = 2 V - 4, with a third of the points inside.
         assert_eq!(faces.len(), 2 * (2 * n as usize / 3) - 4);
         assert!(hull(&points.iter().map(|p| Vec3::new(p.x, p.y, 0.0)).collect::<Vec<_>>()).is_err());
