@@ -145,13 +145,13 @@ impl Course {
                 if right.len() != 1 {
                     let values: Vec<String> = question.choices.iter().map(|c| known_values(&c.when, &names)).collect();
                     let values = values.join("; ");
-                    return Err(at(format!("{} choices are right: {right:?}: {values}", right.len())));
+                    return Err(at(format!("{} choices are correct, not one: {right:?}: {values}", right.len())));
                 }
             }
             if let Some(until) = &step.until {
                 let begin = self.lesson.steps[self.lesson.beginning(index)].link.time;
                 if !names.time(until).is_some_and(|until| Some(until) > begin) {
-                    return Err(at(format!("`{until}` is no instant after its beginning")));
+                    return Err(at(format!("`{until}` is not an instant after the beginning of the step")));
                 }
             }
         }

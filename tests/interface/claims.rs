@@ -1,5 +1,6 @@
-//! What the lessons say of the machine and of the window at an instant is so when they say it, in each of the ways in which they are
-//! shown. What they say of a whole run is measured by the lessons themselves: `jointplay lessons` and the unit tests check that.
+//! Every lesson is walked to its end in each of the ways in which it is shown. What it says of the machine and of the window at an
+//! instant is so when it says it. What it says of a whole run is measured by the lesson itself: `jointplay lessons` and the unit tests
+//! check that.
 
 use eframe::egui::{Key, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
@@ -7,7 +8,7 @@ use jointplay::app::{App, BUILT_IN_LESSONS};
 use jointplay::simulate::{ContactMode, Simulation};
 
 use crate::impacts::peaks_of_run;
-use crate::lessons::{PHONE, play, present, press, says, taught};
+use crate::lessons::{PHONE, WIDE, play, present, press, says, taught};
 
 /// How a lesson is shown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -144,8 +145,8 @@ fn stands_at_peak(shown: &Shown, number: u64, joint: usize) -> bool {
 }
 
 const CLAIMS: &[Claim] = &[
-    ("rattle", 1, Begins, "In the microscope the gap is drawn large", |s| s.microscope(0)),
-    ("rattle", 1, Begins, "The ball starts in the middle: it touches nothing", |s| {
+    ("rattle", 1, Begins, "The microscope shows the gap magnified", |s| s.microscope(0)),
+    ("rattle", 1, Begins, "The ball starts at the centre and touches nothing", |s| {
         s.joint(0).eccentricity.norm() < 1e-9 && s.all_free()
     }),
     ("rattle", 1, Begins, "Each of the three rods hangs by a ball in a socket", |s| s.joints().len() == 3),
@@ -153,16 +154,16 @@ const CLAIMS: &[Claim] = &[
     ("rattle", 2, Begins, "The gaps of all three joints are equal", |s| {
         s.joints().all(|joint| s.joint(joint).clearance == s.joint(0).clearance)
     }),
-    ("rattle", 2, Ends, "all three strike", |s| s.joints().all(|joint| s.touches(joint))),
+    ("rattle", 2, Ends, "All three strike after", |s| s.joints().all(|joint| s.touches(joint))),
     ("rattle", 3, Begins, "The ball of S1 has just touched its wall, and the force rises", |s| {
         s.touches(0) && s.joint(0).penetration_rate > 0.0
     }),
-    ("rattle", 3, Begins, "From here time runs 10 000 times slower than it is", |s| {
+    ("rattle", 3, Begins, "the machine runs 10 000 times slower than real time", |s| {
         s.app().player().pacer.scale() == 1e-4
     }),
-    ("rattle", 3, Begins, "watch the force", |s| s.plots(&["Normal force, N"])),
-    ("rattle", 3, Ends, "In that short time the wall turns the ball round", |s| s.is_free(0)),
-    ("rattle", 4, Begins, "The first impact is over now", |s| s.is_free(0)),
+    ("rattle", 3, Begins, "Watch the force", |s| s.plots(&["Normal force, N"])),
+    ("rattle", 3, Ends, "In that short time the wall reverses the motion of the ball", |s| s.is_free(0)),
+    ("rattle", 4, Begins, "The first impact is now over", |s| s.is_free(0)),
     ("rattle", 5, Begins, "Before its first impact the ball of S2 fell through the whole gap", |s| {
         s.microscope(1) && s.is_free(1)
     }),
@@ -170,54 +171,54 @@ const CLAIMS: &[Claim] = &[
     ("rattle", 6, Ends, "slides along it as the machine moves", |s| {
         s.joints().all(|joint| s.joint(joint).slip_speed > 0.0)
     }),
-    ("rattle", 6, Ends, "it stays on one side", |s| {
+    ("rattle", 6, Ends, "The play is still there, but all on one side", |s| {
         s.joints().all(|joint| s.joint(joint).eccentricity.norm() >= s.joint(joint).clearance)
     }),
-    ("first-impact", 1, Begins, "with every ball in the middle of its socket", |s| {
+    ("first-impact", 1, Begins, "with every ball at the centre of its socket", |s| {
         s.joints().all(|joint| s.joint(joint).eccentricity.norm() < 1e-9)
     }),
     ("first-impact", 1, Begins, "runs it to the peak of the first impact", |s| {
         s.after(&[Key::Period], |s| stands_at_peak(s, 1, 0))
     }),
     ("first-impact", 1, Ends, "the first impact of S1 begins at", |s| s.touches(0) && s.plots(&["Normal force, N"])),
-    ("first-impact", 2, Begins, "The slides move all the time", |s| {
+    ("first-impact", 2, Begins, "The slides move all the while", |s| {
         s.app().player().frame().bodies.iter().any(|body| body.velocity.norm() > 1e-3)
     }),
-    ("first-impact", 2, Ends, "Until the first touch no ball meets its wall", |s| {
+    ("first-impact", 2, Ends, "Before the first impact no ball touches its wall", |s| {
         s.all_free() && s.strikes(0, 0.11e-3)
     }),
     ("first-impact", 2, Ends, "The joints carry nothing", |s| s.plots(&["Normal force, N", "Acceleration, m/s²"])),
     ("first-impact", 4, Ends, "At 11 ms", |s| s.first_is_over()),
-    ("first-impact", 6, Ends, "to the last digit as before", |s| s.first_is_over()),
+    ("first-impact", 6, Ends, "the same to the last digit", |s| s.first_is_over()),
     ("first-impact", 7, Ends, "the first impact ends a free fall through the clearance", |s| {
         s.joints().any(|joint| s.touches(joint))
     }),
     ("clearance", 1, Begins, "The clearance of all three joints is 0.3 mm", |s| {
         s.joints().all(|joint| (s.joint(joint).clearance - 0.3e-3).abs() < 1e-9)
     }),
-    ("clearance", 2, Begins, "the clearance was just doubled, to 0.6 mm", |s| {
+    ("clearance", 2, Begins, "the clearance has just been doubled, to 0.6 mm", |s| {
         s.app().player().running().machine.contact.clearance == 0.6e-3 && s.joint(0).clearance == 0.6e-3
     }),
     ("clearance", 2, Begins, "S1 is in free flight", |s| s.is_free(0) && s.microscope(0)),
-    ("clearance", 2, Ends, "it just flies on, with farther to go", |s| s.joint(0).clearance == 0.6e-3),
+    ("clearance", 2, Ends, "it flies on and has farther to go", |s| s.joint(0).clearance == 0.6e-3),
     ("clearance", 3, Begins, "Now the machine starts with 0.6 mm of clearance", |s| {
         s.joint(1).clearance == 0.6e-3 && s.time() == 0.0
     }),
-    ("clearance", 4, Begins, "The same machine with twice the clearance goes on", |s| s.joint(1).clearance == 0.6e-3),
-    ("clearance", 5, Begins, "After the rattle every ball rests on its wall, off the middle of its socket", |s| {
+    ("clearance", 4, Begins, "Here the machine with twice the clearance continues", |s| s.joint(1).clearance == 0.6e-3),
+    ("clearance", 5, Begins, "After the rattle every ball rests on its wall, off the centre of its socket", |s| {
         s.all_rest()
     }),
-    ("clearance", 5, Begins, "the probe is not where the ideal machine would have it", |s| {
+    ("clearance", 5, Begins, "the probe is not where it would be in the ideal machine", |s| {
         let error = s.app().player().frame().probe_error.expect("a probe").norm();
         s.app().player().ideal().is_some() && error > 0.3e-3 && s.plots(&["Tip error by axis, mm"])
     }),
     ("clearance", 6, Begins, "A clearance of 0 makes the joints ideal", |s| {
         s.joints().all(|joint| s.joint(joint).state == ContactMode::Ideal)
     }),
-    ("clearance", 6, Ends, "each ball stays in the middle of its socket", |s| {
+    ("clearance", 6, Ends, "each ball stays at the centre of its socket", |s| {
         s.joints().all(|joint| s.joint(joint).eccentricity.norm() < 1e-9)
     }),
-    ("friction", 1, Begins, "Here the balls lie on their walls and slide along them", |s| {
+    ("friction", 1, Begins, "Here the balls rest on their walls and slide along them", |s| {
         s.all_rest() && s.joints().all(|joint| s.joint(joint).slip_speed > 0.0)
     }),
     ("friction", 1, Begins, "watch the second arrow at the ball", |s| {
@@ -232,22 +233,22 @@ const CLAIMS: &[Claim] = &[
     ("friction", 3, Begins, "The same machine from the start, without friction", |s| {
         s.time() == 0.0 && s.app().player().running().machine.contact.friction == 0.0
     }),
-    ("friction", 4, Begins, "Here nothing brakes the balls along their walls", |s| {
+    ("friction", 4, Begins, "Here nothing slows the balls along their walls", |s| {
         s.joints().all(|joint| s.joint(joint).friction_force.norm() == 0.0)
     }),
-    ("friction", 5, Begins, "Two things take energy", |s| s.plots(&["Energy balance, mJ"])),
-    ("friction", 6, Begins, "the instant at which friction is switched on", |s| {
+    ("friction", 5, Begins, "Two things dissipate energy", |s| s.plots(&["Energy balance, mJ"])),
+    ("friction", 6, Begins, "At this instant friction is switched on", |s| {
         s.app().player().running().machine.contact.friction == 0.15 && (s.time() - 60e-3).abs() < 1e-9
     }),
     ("friction", 6, Ends, "then the balls rest on their walls", |s| s.all_rest()),
-    ("slow-motion", 1, Begins, "At the time scale 1:1000", |s| {
+    ("slow-motion", 1, Begins, "At a time scale of 1:1000", |s| {
         s.app().player().pacer.scale() == 1e-3 && says(&s.harness, "1:1000")
     }),
-    ("slow-motion", 1, Begins, "The machine stands just before it", |s| s.is_free(1) && s.strikes(1, 0.05e-3)),
-    ("slow-motion", 1, Ends, "Play shows it to its end", |s| s.is_free(1)),
-    ("slow-motion", 2, Begins, "Once more from just before the touch", |s| s.is_free(1) && s.strikes(1, 0.05e-3)),
-    ("slow-motion", 3, Ends, "Coming in it is", |s| s.is_free(1) && s.plots(&["Normal force, N", "Indentation, µm"])),
-    ("slow-motion", 4, Begins, "goes on to the peak of the next impact", |s| {
+    ("slow-motion", 1, Begins, "The machine is paused just before it", |s| s.is_free(1) && s.strikes(1, 0.05e-3)),
+    ("slow-motion", 1, Ends, "Press Play to watch the whole impact", |s| s.is_free(1)),
+    ("slow-motion", 2, Begins, "Once more from just before the contact", |s| s.is_free(1) && s.strikes(1, 0.05e-3)),
+    ("slow-motion", 3, Ends, "on the way in and", |s| s.is_free(1) && s.plots(&["Normal force, N", "Indentation, µm"])),
+    ("slow-motion", 4, Begins, "runs the machine to the peak of the next impact", |s| {
         s.after(&[Key::Period], |s| s.time() > 15e-3 && s.touches(1))
     }),
     ("slow-motion", 4, Begins, "now a little faster", |s| s.app().player().pacer.scale() == 2e-3),
@@ -258,7 +259,7 @@ const CLAIMS: &[Claim] = &[
             && s.after(&[Key::Comma, Key::Comma, Key::Period], |s| stands_at_peak(s, 4, 1))
             && s.app().player().simulation().state_hash() == before
     }),
-    ("slow-motion", 6, Begins, "The machine stands before it", |s| {
+    ("slow-motion", 6, Begins, "It is about to strike again", |s| {
         s.is_free(2) && s.strikes(2, 0.1e-3) && s.microscope(2)
     }),
     ("slow-motion", 6, Ends, "It lasts 154 µs", |s| s.is_free(2)),
@@ -268,7 +269,7 @@ const CLAIMS: &[Claim] = &[
     ("ideal", 1, Begins, "The plot shows its three components", |s| {
         s.plots(&["Tip error by axis"]) && s.app().player().frame().probe_error.is_some()
     }),
-    ("ideal", 2, Begins, "At first the balls stand in the middle of their sockets: the error is 0", |s| {
+    ("ideal", 2, Begins, "At the start the balls are at the centres of their sockets, and the error is 0", |s| {
         s.all_free() && s.app().player().frame().probe_error.expect("a probe").norm() < 1e-9
     }),
     ("ideal", 3, Begins, "The probe sits below the platform", |s| {
@@ -280,12 +281,12 @@ const CLAIMS: &[Claim] = &[
         frame.joints.iter().all(|joint| (probe - joint.ball_centre).dot(&gravity) > 0.0)
     }),
     ("ideal", 4, Begins, "The balls rest on the walls of their sockets", |s| s.all_rest()),
-    ("ideal", 5, Begins, "The vertical of this machine is x; y and z are level", |s| {
+    ("ideal", 5, Begins, "In this machine x points downwards; y and z are horizontal", |s| {
         let gravity = s.app().player().running().machine.gravity;
         gravity.x > 9.0 && gravity.y == 0.0 && gravity.z == 0.0
     }),
-    ("ideal", 6, Ends, "It goes from", |s| s.plots(&["Tip error by axis"])),
-    ("forces", 1, Begins, "Between the needles the line lies at 0", |s| {
+    ("ideal", 6, Ends, "It varies from", |s| s.plots(&["Tip error by axis"])),
+    ("forces", 1, Begins, "Between the spikes the force is 0", |s| {
         let mut run = Simulation::new(&s.app().player().running().machine).expect("starts");
         let mut impacts = Vec::new();
         let mut seen = Vec::new();
@@ -307,24 +308,24 @@ const CLAIMS: &[Claim] = &[
     ("forces", 1, Begins, "The plot shows the normal force of each joint", |s| {
         s.plots(&["Normal force, N", "S1", "S2", "S3"])
     }),
-    ("forces", 3, Begins, "The hump has a top at 871 N", |s| s.is_free(1) && s.strikes(1, 0.2e-3)),
-    ("forces", 5, Ends, "The line that the needles hid is here alone", |s| {
+    ("forces", 3, Begins, "The pulse peaks at 871 N", |s| s.is_free(1) && s.strikes(1, 0.2e-3)),
+    ("forces", 5, Ends, "Only the line that the spikes hid remains", |s| {
         s.joints().all(|joint| s.joint(joint).state == ContactMode::Ideal)
     }),
     ("twin", 1, Begins, "The violet ghost is a twin", |s| s.app().player().twin().is_some()),
     ("twin", 2, Begins, "The bench plots the distance of the twin against time", |s| bench(s)),
-    ("twin", 2, Begins, "So far no ball touches", |s| s.all_free()),
+    ("twin", 2, Begins, "So far no ball touches its wall", |s| s.all_free()),
     ("twin", 2, Ends, "Falling together, the two machines stay together", |s| s.all_free()),
-    ("twin", 5, Ends, "The drives lead both to the same place", |s| s.all_rest()),
+    ("twin", 5, Ends, "The drives take both to the same place", |s| s.all_rest()),
     ("chaos", 1, Begins, "The joint at the slider has a clearance of 0.3 mm", |s| s.joint(1).clearance == 0.3e-3),
     ("chaos", 1, Begins, "The violet twin", |s| s.app().player().twin().is_some() && bench(s)),
     ("chaos", 2, Begins, "Here the clearance is 0", |s| s.joint(0).state == ContactMode::Ideal),
-    ("chaos", 3, Ends, "The ball lies on its wall", |s| s.touches(1)),
-    ("to-the-class", 1, Begins, "The machine stands at 9 ms, after the first impacts", |s| {
+    ("chaos", 3, Ends, "The ball rests on its wall", |s| s.touches(1)),
+    ("to-the-class", 1, Begins, "The machine is paused at 9 ms, after the first impacts", |s| {
         let first = s.app().player().impact_record().until(s.time()).count();
         (s.time() - 9e-3).abs() < 1e-9 && s.all_free() && first == 3
     }),
-    ("to-the-class", 2, Ends, "The link even carries a check sum of the state", |s| {
+    ("to-the-class", 2, Ends, "The link even carries a checksum of the state", |s| {
         s.app().share_state().contains("hash=")
     }),
 ];
@@ -345,11 +346,11 @@ fn bench(shown: &mut Shown) -> bool {
     found
 }
 
-/// Walks every lesson in `mode`; all claims that do not hold.
+/// Walks every lesson to its end by Page Down and Play in `mode`; all claims that do not hold.
 fn walk(mode: Mode) -> Vec<String> {
     let mut wrong = Vec::new();
     for (name, _) in BUILT_IN_LESSONS {
-        let size = if mode == Mode::Phone { PHONE } else { [1280.0, 800.0] };
+        let size = if mode == Mode::Phone { PHONE } else { WIDE };
         let mut harness = taught(name, 0, size);
         if mode == Mode::Presentation {
             present(&mut harness, size);
@@ -358,6 +359,7 @@ fn walk(mode: Mode) -> Vec<String> {
         let steps = shown.app().course().expect("a lesson").lesson().steps.len();
         for step in 1..=steps {
             let mut check = |shown: &mut Shown, now: When| {
+                check_panel(shown, &format!("{mode:?}, {name}, step {step}"), now);
                 keep_picture(shown, &format!("{name}_{step}_{now:?}"));
                 for (_, _, _, words, holds) in
                     CLAIMS.iter().filter(|claim| (claim.0, claim.1, claim.2) == (name, step, now))
@@ -371,6 +373,8 @@ fn walk(mode: Mode) -> Vec<String> {
                     }
                 }
             };
+            assert_eq!(shown.app().course().expect("a lesson").step() + 1, step, "{mode:?}, {name}");
+            assert!(says(&shown.harness, &format!("{step} of {steps}")), "{mode:?}, {name}, step {step}");
             check(&mut shown, Begins);
             if play(&mut shown.harness) {
                 shown.harness.run_steps(8);
@@ -378,8 +382,27 @@ fn walk(mode: Mode) -> Vec<String> {
             }
             press(&mut shown.harness, Key::PageDown);
         }
+        // There is nothing behind the last one.
+        assert_eq!(shown.app().course().expect("a lesson").step() + 1, steps);
+        shown.harness.get_by_label("Leave the lesson").click();
+        shown.harness.run_steps(2);
+        assert!(shown.app().course().is_none());
     }
     wrong
+}
+
+/// The panel shows the answer at the end of the step and not before, and in the window all that the step points at is there.
+fn check_panel(shown: &Shown, at: &str, now: When) {
+    let course = shown.app().course().expect("a lesson");
+    assert!(!says(&shown.harness, "The machine has been changed"), "{at}");
+    if now == Begins {
+        let points_out = shown.mode != Mode::Window || shown.app().points_out(&shown.harness.ctx);
+        assert!(points_out, "{at}: something pointed at is not there");
+        assert!(!says(&shown.harness, "Answer:"), "{at}: the answer shows too early");
+    } else if course.lesson().steps[course.step()].question.is_some() {
+        let answer = course.answer().unwrap_or_else(|| panic!("{at}: no answer"));
+        assert!(says(&shown.harness, &format!("Answer: {answer}")), "{at}: {answer}");
+    }
 }
 
 /// Keeps the picture where `KEEP_PICTURES` says.

@@ -387,7 +387,7 @@ impl Lesson {
         let mut link = Link::parse(&format!("?{}", words.trim_start_matches(['?', '#'])))
             .map_err(|error| wrong(error.to_string()))?;
         if !link.log.entries.is_empty() {
-            let message = "has changes made on the way packed in `log`; write them as `change` of a step";
+            let message = "contains live changes, packed in `log`; write them as `change` of a step";
             return Err(wrong(message.to_owned()));
         }
         (link.steps, link.hash) = (None, None);
@@ -399,7 +399,7 @@ impl Lesson {
                 SceneText::BuiltIn(name) if named => name.clone(),
                 SceneText::BuiltIn(_) => beside(scene.get_ref(), source.file),
                 SceneText::File { .. } => {
-                    let message = "carries a scene file; name the file as `scene` of the lesson";
+                    let message = "contains a scene file; name the file as `scene` of the lesson";
                     return Err(wrong(message.to_owned()));
                 }
             };
@@ -415,13 +415,12 @@ impl Lesson {
             let name = row.name.clone().unwrap_or_default();
             let same = |run: &Run| !name.is_empty() && run.name == name;
             if self.runs.iter().any(same) {
-                let message = format!("another step is called `{name}`");
+                let message = format!("another step has the name `{name}`");
                 return Err(source.error(span, &key("name"), message));
             }
             self.runs.push(Run { name, scene: loaded, changes: Vec::new() });
         } else if row.name.is_some() {
-            let message =
-                "only a step whose state names an instant, a parameter or a scene begins a run that has a name";
+            let message = "names a run, but the step begins none: its `state` has no instant, parameter or scene";
             return Err(source.error(span, &key("name"), message));
         }
         let index = self.runs.len() - 1;
@@ -452,7 +451,7 @@ impl Lesson {
                 return Err(wrong(format!("{count} choices; allowed 2 to {MOST_CHOICES}")));
             }
             if row.until.is_none() {
-                return Err(wrong("needs `until`: the instant at which the answer shows".to_owned()));
+                return Err(wrong("needs `until`, the instant at which the answer is shown".to_owned()));
             }
         }
         Ok(Step {
@@ -508,23 +507,23 @@ impl Lesson {
         ];
         let given: Vec<Kind> = given.into_iter().flatten().collect();
         let [kind] = &given[..] else {
-            return Err(format!("{} of these keys; allowed one: {KINDS}", given.len()));
+            return Err(format!("{} kinds of measure; allowed one: {KINDS}", given.len()));
         };
         if matches!(kind, Kind::Impact { number: 0, .. }) {
-            return Err("impact = 0: allowed 1 and more; they count from 1".to_owned());
+            return Err("impact = 0: allowed 1 and more; the first impact has number 1".to_owned());
         }
         if (its.is_some() || of.is_some()) && !matches!(kind, Kind::Impact { .. }) {
             return Err("`its` and `of` belong to `impact`".to_owned());
         }
         if at.is_some() != matches!(kind, Kind::At(_)) {
-            return Err("`value` needs `at`, the instant, and no other key takes it".to_owned());
+            return Err("`value` needs `at`, the instant; no other measure has it".to_owned());
         }
         let ends = match kind {
             Kind::Peak(_) | Kind::Least(_) | Kind::Mean(_) | Kind::Count { .. } => to.is_some(),
             _ => true,
         };
         if !ends {
-            return Err("needs `to`, the instant at which it ends".to_owned());
+            return Err("needs `to`, the end of the measured interval".to_owned());
         }
         let run = match run {
             None => 0,
@@ -532,7 +531,7 @@ impl Lesson {
                 let names = self.runs.iter().map(|run| &*run.name).filter(|name| !name.is_empty());
                 let near = nearest(&name, names.clone());
                 let known: Vec<&str> = names.collect();
-                format!("no step that begins a run is called `{name}`{near}; allowed: {}", known.join(", "))
+                format!("no step that begins a run has the name `{name}`{near}; allowed: {}", known.join(", "))
             })?,
         };
         let scene = &self.runs[run].scene;
@@ -570,7 +569,7 @@ impl Lesson {
             let row = row.get_ref();
             let key = |name: &str| format!("step {}.{name}", index + 1);
             let condition = |text: &str| {
-                let parts = comparisons(text).ok_or("compares nothing; allowed <, > and =")?;
+                let parts = comparisons(text).ok_or("contains no comparison; allowed <, > and =")?;
                 let mut sides = parts.into_iter().flat_map(|(left, _, right)| [left, right]);
                 sides.try_for_each(|side| names.check(side).map_err(|why| format!("`{side}` {why}")))
             };

@@ -102,7 +102,7 @@ impl Measured {
             pass.gauges.push((index, gauge));
         }
         if let (None, Some(name)) = (&pass, waits) {
-            return Err(format!("measure {name}: its instants must be times"));
+            return Err(format!("measure {name}: its instants are not times"));
         }
         Ok(pass)
     }
@@ -157,11 +157,11 @@ impl Pass {
 
     fn gauge(&mut self, measure: &Measure, from: f64, to: f64) -> Result<Gauge, String> {
         if to > FARTHEST {
-            return Err(format!("later than {FARTHEST} s"));
+            return Err(format!("ends at {to} s; allowed up to {FARTHEST} s"));
         }
         let over_stretch = matches!(measure.kind, Kind::Peak(_) | Kind::Least(_) | Kind::Mean(_));
         if over_stretch && from >= to {
-            return Err(format!("ends at {to} s, but begins at {from} s"));
+            return Err(format!("ends at {to} s, not after its start at {from} s"));
         }
         let kind = measure.kind.clone();
         let joint = match kind.joint().filter(|name| *name != "any") {

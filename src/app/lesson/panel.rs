@@ -179,7 +179,7 @@ impl Course {
                     (false, _) => RichText::new(words),
                 };
                 let chosen = predicted == Some(index);
-                let help = "Your prediction; the run shows whether it is right";
+                let help = "Your prediction. The run shows whether it is correct.";
                 let radio = ui
                     .scope(|ui| {
                         // The correct choice must not fade with the others.
@@ -196,8 +196,8 @@ impl Course {
                 let colour = ui.visuals().selection.stroke.color;
                 let verdict = match predicted {
                     Some(choice) if choice == right => format!("As predicted: {words}"),
-                    Some(_) => format!("Not quite: the answer is {words}"),
-                    None => format!("The answer is {words}"),
+                    Some(_) => format!("Not as predicted. Answer: {words}"),
+                    None => format!("Answer: {words}"),
                 };
                 ui.label(RichText::new(verdict).strong().color(colour));
             } else if !self.reached {
@@ -210,10 +210,10 @@ impl Course {
         if !own {
             theme::warning(
                 ui,
-                "The machine was changed since this step began. The text describes the run as the step sets it.",
+                "The machine has been changed since this step began. The text describes the unchanged run.",
             );
-            let help = "Returns the machine to the state of this step";
-            set = ui.button("Set the step again").on_hover_text(help).clicked();
+            let help = "Resets the machine to the state in which this step begins";
+            set = ui.button("Restart this step").on_hover_text(help).clicked();
         }
         if (self.reached || step.until.is_none()) && !step.seen.is_empty() {
             ui.separator();
