@@ -331,7 +331,7 @@ impl App {
         }
         match (&self.notice, &self.verdict) {
             (Some(notice), _) => notice.text.clone(),
-            (None, Some(verdict)) => verdict_words(verdict),
+            (None, Some(verdict)) => verdict.to_string(),
             (None, None) => String::new(),
         }
     }
@@ -362,22 +362,6 @@ fn own_name(name: &str) -> &str {
 /// Whether a verdict needs no action; it then disappears after some seconds.
 pub fn is_right(verdict: &Verdict) -> bool {
     matches!(verdict, Verdict::Agrees(_) | Verdict::Reached)
-}
-
-/// Message of a verdict.
-pub fn verdict_words(verdict: &Verdict) -> String {
-    match verdict {
-        Verdict::Agrees(hash) => format!("State reproduced: hash {hash:016x} agrees"),
-        Verdict::Differs { expected, found, version } => {
-            let made = version.as_deref().map_or("another version".to_owned(), |version| format!("version {version}"));
-            format!(
-                "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {made}, this is {}",
-                crate::VERSION
-            )
-        }
-        Verdict::Reached => "State of the link reached; it has no hash to compare with".to_owned(),
-        Verdict::Failed(reason) => format!("State of the link not reproduced: {reason}"),
-    }
 }
 
 /// File name stem: scene and time.

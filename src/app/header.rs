@@ -8,7 +8,7 @@ use eframe::egui::{
 
 use super::App;
 use super::dialogs::Dialog;
-use super::files::{is_right, verdict_words};
+use super::files::is_right;
 use super::{layout, opening, spoken, theme};
 use crate::scene::{BUILT_IN, DEFAULT_SCENE, Scene};
 use crate::session::replay::Verdict;
@@ -333,7 +333,7 @@ impl App {
                 Verdict::Differs { .. } => ui.visuals().warn_fg_color,
                 Verdict::Failed(_) => ui.visuals().error_fg_color,
             };
-            if strip(ui, &verdict_words(verdict), colour) {
+            if strip(ui, &verdict.to_string(), colour) {
                 self.verdict = None;
             }
         }

@@ -6,6 +6,7 @@ use crate::scene::LiveScene;
 use crate::scene::Scene;
 use crate::session::goal::Obstacle;
 use crate::session::log::Script;
+use crate::session::replay::Verdict;
 
 /// The remaining replay of a link's run.
 pub struct Way {
@@ -82,21 +83,11 @@ impl Way {
         Ok(())
     }
 
-    /// Compares the state with the link's, in words; an error if they differ.
+    /// Compares the state with the link's, in words; an error if it differs.
     pub fn verdict(&self, simulation: &LiveScene) -> Result<String, String> {
-        let found = simulation.state_hash();
-        match self.link.hash {
-            None => Ok("the link has no hash to compare with".to_owned()),
-            Some(wanted) if wanted == found => Ok(format!("state reproduced: hash {found:016x} agrees")),
-            Some(wanted) => {
-                let made =
-                    self.link.version.as_deref().map_or("another version".to_owned(), |made| format!("version {made}"));
-                Err(format!(
-                    "the state hash is {found:016x}, the link says {wanted:016x}; the link was made by {made}, this is {}",
-                    crate::VERSION
-                ))
-            }
-        }
+        let verdict = Verdict::of(&self.link, simulation.state_hash());
+        let words = verdict.to_string();
+        if matches!(verdict, Verdict::Differs { .. }) { Err(words) } else { Ok(words) }
     }
 }
 

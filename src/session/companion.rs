@@ -22,6 +22,7 @@ pub(super) fn drop_every_second<T>(list: &mut Vec<T>) {
 }
 
 /// A simulation beside the run.
+#[derive(Clone)]
 pub struct Companion {
     /// May be ahead of the displayed instant by part of its latest step.
     pub(super) simulation: Simulation,

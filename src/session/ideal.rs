@@ -57,6 +57,7 @@ impl Gravity {
 }
 
 /// The ideal motion of a scene.
+#[derive(Clone)]
 pub struct Ideal {
     output: Output,
     motion: Result<Companion, StartError>,

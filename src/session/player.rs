@@ -24,7 +24,7 @@ use crate::simulate::{
     Channels, ContactMode, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull, Simulation, StartError, Stopped,
     Wear,
 };
-use before_change::{BeforeChange, copy_of};
+use before_change::BeforeChange;
 use keyframes::Keyframes;
 use record::Record;
 use travel::ImpactSearch;
@@ -35,6 +35,7 @@ pub use travel::{AbandonedFuture, Flag};
 /// There is one displayed instant, the pacer's: frame, peaks, sections and link all refer to it. The simulation itself is ahead
 /// by part of its latest step, which stays hidden until its time. The record extends as far as the run was ever shown
 /// ([`Self::reached`]): a past instant is displayed by restoring a keyframe and repeating the same steps.
+#[derive(Clone)]
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
@@ -525,7 +526,7 @@ impl Player {
         let effect = if pacer.shown() >= run.time() || run.step_start() >= run.time() {
             event.apply(run, original)?
         } else {
-            let mut copy = copy_of(run);
+            let mut copy = run.clone();
             let effect = event.apply(&mut copy, original)?;
             *unchanged = Some(Box::new(std::mem::replace(run, copy)));
             effect

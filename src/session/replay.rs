@@ -1,5 +1,7 @@
 //! Replays a run to the instant of a link, within a time budget per frame, and verifies the state.
 
+use std::fmt;
+
 use super::goal::Obstacle;
 use super::link::Link;
 use super::player::Player;
@@ -22,6 +24,36 @@ pub enum Verdict {
     Reached,
     /// The instant could not be reached, and why.
     Failed(String),
+}
+
+impl Verdict {
+    /// Compares the hash `found` of the state at the instant of `link` with that of the link.
+    pub fn of(link: &Link, found: u64) -> Self {
+        match link.hash {
+            None => Self::Reached,
+            Some(expected) if expected == found => Self::Agrees(found),
+            Some(expected) => Self::Differs { expected, found, version: link.version.clone() },
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Agrees(hash) => write!(f, "State reproduced: hash {hash:016x} agrees"),
+            Self::Differs { expected, found, version } => {
+                let made =
+                    version.as_ref().map_or("another version".to_owned(), |version| format!("version {version}"));
+                write!(
+                    f,
+                    "State differs: hash {found:016x}, the link says {expected:016x}. It was made by {made}, this is {}",
+                    crate::VERSION
+                )
+            }
+            Self::Reached => f.write_str("State of the link reached; it has no hash to compare with"),
+            Self::Failed(reason) => write!(f, "State of the link not reproduced: {reason}"),
+        }
+    }
 }
 
 /// A link that is being replayed.
@@ -57,23 +89,16 @@ impl Replay {
     /// Continues while `may_step`; returns the verdict once there.
     pub fn advance(&self, player: &mut Player, may_step: impl FnMut() -> bool) -> Option<Verdict> {
         match player.continue_to(self.link.goal(), may_step) {
-            Ok(true) => Some(self.compare(player)),
+            Ok(true) => {
+                player.set_playing(self.link.playing == Some(true));
+                Some(Verdict::of(&self.link, player.simulation().state_hash()))
+            }
             Ok(false) => None,
             Err(Obstacle::Stopped(_)) if self.link.steps.is_none() => Some(Verdict::Reached),
             Err(Obstacle::Stopped(_)) => {
                 Some(Verdict::Failed("the run stopped before the instant of the link".to_owned()))
             }
             Err(obstacle) => Some(Verdict::Failed(obstacle.to_string())),
-        }
-    }
-
-    fn compare(&self, player: &mut Player) -> Verdict {
-        player.set_playing(self.link.playing == Some(true));
-        let found = player.simulation().state_hash();
-        match self.link.hash {
-            None => Verdict::Reached,
-            Some(expected) if expected == found => Verdict::Agrees(found),
-            Some(expected) => Verdict::Differs { expected, found, version: self.link.version.clone() },
         }
     }
 }

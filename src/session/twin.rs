@@ -22,6 +22,7 @@ const NEARLY: f64 = 1e-9;
 const ROOM: usize = 1024;
 
 /// The renormalised twin and the growth of its separation.
+#[derive(Clone)]
 struct Growth {
     twin: Simulation,
     benettin: Benettin,
@@ -59,6 +60,7 @@ impl Growth {
 }
 
 /// The twin and its distances so far.
+#[derive(Clone)]
 pub struct Twin {
     pub(super) motion: Companion,
     /// Steps of the run before its start. While the run retraces earlier time, the twin waits.

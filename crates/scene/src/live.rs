@@ -18,6 +18,7 @@ pub enum SetError {
 }
 
 /// A running simulation with its scene in effect, and a pending scene with the changes that wait for a reset.
+#[derive(Clone)]
 pub struct LiveScene {
     pending: Arc<Scene>,
     running: Arc<Scene>,
@@ -126,15 +127,6 @@ impl LiveScene {
             running: self.running.clone(),
             model: self.simulation.model().clone(),
             state: self.simulation.state().clone(),
-        }
-    }
-
-    /// A live scene in the state of `snapshot`.
-    pub fn of(snapshot: &SceneSnapshot) -> Self {
-        Self {
-            pending: snapshot.pending.clone(),
-            running: snapshot.running.clone(),
-            simulation: Simulation::of(snapshot.model.clone(), snapshot.state.clone()),
         }
     }
 

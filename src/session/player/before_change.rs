@@ -1,9 +1,9 @@
 //! The run from before a parameter change: a copy that goes to the same instants with the old value.
 
-use super::{Effect, Event, Ideal, LiveScene, Player, SetError};
+use super::{Effect, Event, Player, SetError};
 
 /// Whether and when the run is copied.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct BeforeChange {
     enabled: bool,
     /// Key of the current gesture, which counts as one change.
@@ -12,29 +12,14 @@ pub(super) struct BeforeChange {
     copy: Option<(Box<Player>, String)>,
 }
 
-/// A simulation in the same state as `run`.
-pub(super) fn copy_of(run: &LiveScene) -> LiveScene {
-    LiveScene::of(&run.snapshot())
-}
-
 impl Player {
     /// A paused copy of the run and its record, without the twin, unaffected by later changes to this run.
     fn copy(&self) -> Self {
-        Self {
-            pacer: self.pacer.clone(),
-            clock: self.clock,
-            unchanged: self.unchanged.as_deref().map(|run| Box::new(copy_of(run))),
-            stopped: self.stopped.clone(),
-            frame: self.frame.clone(),
-            record: self.record.clone(),
-            keyframes: self.keyframes.clone(),
-            reached: self.reached,
-            most_steps: self.most_steps,
-            script: self.script.clone(),
-            gravity: self.gravity.clone(),
-            ideal: self.ideal.is_some().then(|| Box::new(Ideal::new(&self.simulation.running().machine))),
-            ..Self::of(copy_of(&self.simulation), self.original.clone())
-        }
+        let mut copy = self.clone();
+        copy.set_paused();
+        (copy.twin, copy.left) = (None, None);
+        (copy.edits, copy.before_change) = Default::default();
+        copy
     }
 
     /// Takes the copy made before the latest parameter change, with the key; `None` if none was made since the last call. `enabled`:
