@@ -1,6 +1,6 @@
-//! Every lesson is walked to its end in each of the ways in which it is shown. What it says of the machine and of the window at an
-//! instant is so when it says it. What it says of a whole run is measured by the lesson itself: `jointplay lessons` and the unit tests
-//! check that.
+//! Every lesson is walked to its end in each of the ways in which it is shown. What it says of the machine and of the window at
+//! an instant is so when it says it. What it says of a whole run is measured by the lesson itself: `jointplay lessons` and the
+//! unit tests check that.
 
 use eframe::egui::{Key, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
