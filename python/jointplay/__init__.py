@@ -13,16 +13,37 @@ from ._render import render
 from ._run import Run
 from ._scene import Check, Parameter, Scene
 from ._simulation import Frame, Simulation
-from ._study import Estimate, Indices, Quality, RejectDriver, Sensitivity, Study, Tolerance, sensitivity, tolerance
+from ._study import (
+    Changes,
+    Effects,
+    Ends,
+    Estimate,
+    FitChoice,
+    Fits,
+    Indices,
+    Quality,
+    RejectDriver,
+    Sensitivity,
+    Study,
+    Target,
+    Tolerance,
+    sensitivity,
+    tolerance,
+)
 from ._sweep import Sweep, SweepResult, sweep
 from ._tradeoff import Tradeoff, tradeoff
 from .errors import ChannelError, DoubtWarning, InternalError, JointplayError, OptionError, SceneError, Stopped
 
 __all__ = [
+    "Changes",
     "ChannelError",
     "Check",
     "DoubtWarning",
+    "Effects",
+    "Ends",
     "Estimate",
+    "FitChoice",
+    "Fits",
     "Frame",
     "Indices",
     "InternalError",
@@ -40,6 +61,7 @@ __all__ = [
     "Study",
     "Sweep",
     "SweepResult",
+    "Target",
     "Tolerance",
     "Tradeoff",
     "render",

@@ -102,21 +102,30 @@ class Study:
         start_after: float | str | None,
     ) -> Study: ...
     @property
-    def inputs(self) -> list[tuple[str, float]]: ...
+    def inputs(self) -> list[tuple[str, float, str]]: ...
     @property
     def outputs(self) -> list[tuple[str, str]]: ...
     @property
     def span(self) -> tuple[float, float]: ...
     def run(self, rows: list[list[float]], threads: int, progress: Callable[[float], object] | None = None) -> _Array: ...
-    def indices(
-        self, rows: int, seed: int, threads: int, progress: Callable[[float], object] | None = None
+    def sensitivity(
+        self,
+        rows: int,
+        screen: int | None,
+        target: float | str | None,
+        seed: int,
+        threads: int,
+        progress: Callable[[float], object] | None = None,
     ) -> dict[str, Any]: ...
-    def lot(
+    def tolerance(
         self,
         limits: list[tuple[float | str | None, float | str | None]],
         units: int,
         sampling: str,
         seed: int,
+        cost: list[tuple[str, str, float]] | None,
+        required_yield: float,
+        evaluations: int,
         threads: int,
         progress: Callable[[float], object] | None = None,
     ) -> dict[str, Any]: ...

@@ -67,7 +67,9 @@ class Check:
     ideal_joints: int
     """Ball joints without clearance."""
     warnings: list[str]
-    """What is probably not intended."""
+    """What is probably not intended: what `jointplay check` warns of."""
+    not_unique: str | None
+    """Which reactions and actuator forces are not unique; None if all are."""
     doubts: list[str]
     """Reasons to doubt the results of its runs."""
 

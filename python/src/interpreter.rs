@@ -19,6 +19,14 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| internal_error(py, &*panic))
 }
 
+/// Runs `work` with the interpreter's lock: for work that is short or that calls Python.
+///
+/// # Errors
+/// A panic in `work`, which is a bug, as `InternalError`.
+pub fn guarded<T>(py: Python<'_>, work: impl FnOnce() -> T) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| internal_error(py, &*panic))
+}
+
 fn internal_error(py: Python<'_>, panic: &(dyn Any + Send)) -> PyErr {
     let words = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
     let message = format!(

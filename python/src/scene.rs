@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use jointplay_analysis::assembly::StartReport;
 use jointplay_analysis::near_singular::near_singular;
-use jointplay_analysis::presets::too_slow;
 use jointplay_physics::simulate::{Frame, Listed, Simulation, channels_of};
 use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, contact_parts};
 use pyo3::prelude::*;
@@ -175,8 +175,8 @@ impl PyScene {
 
     /// Starts the scene. Returns its counts and its warnings.
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let live = self.start(py)?;
-        let scene = &self.scene;
+        let mut live = self.start(py)?;
+        let scene = &*self.scene;
         let contents = live.mechanism().summary();
         let all = PyDict::new(py);
         all.set_item("bodies", contents.bodies)?;
@@ -186,11 +186,13 @@ impl PyScene {
         all.set_item("dependent_rows", contents.dependent_rows)?;
         all.set_item("contacts", contents.contacts)?;
         all.set_item("ideal_joints", contents.ideal_joints)?;
-        let of_scene = scene.machine.warnings().into_iter().map(|warning| warning.to_string());
-        let singular = detached(py, || near_singular(scene).map(|near| near.to_string()))?;
-        let slow = too_slow(scene).map(|slow| slow.to_string());
-        let warnings: Vec<String> = of_scene.chain(slow).chain(singular).collect();
-        all.set_item("warnings", warnings)?;
+        let warnings = detached(py, || {
+            let singular = near_singular(scene).map(|near| near.to_string());
+            let start = StartReport::of(&mut live);
+            (start.warnings_of(scene).into_iter().chain(singular).collect::<Vec<_>>(), start.not_unique())
+        })?;
+        all.set_item("warnings", warnings.0)?;
+        all.set_item("not_unique", warnings.1)?;
         all.set_item("doubts", live.doubts().iter().map(ToString::to_string).collect::<Vec<_>>())?;
         Ok(all)
     }

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::{exception, option_error, scene_error, set_error, stopped};
-use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached};
+use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached, guarded};
 use crate::quantity::{duration, written};
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
@@ -213,14 +213,14 @@ impl PySimulation {
             };
             return Err(exception(py, "ChannelError", &message, None));
         };
-        self.sample();
+        guarded(py, || self.sample())?;
         Ok(self.layout.channels[place].reading().read(&self.frame).unwrap_or(f64::NAN))
     }
 
     /// Everything about this instant.
     #[pyo3(name = "_instant")]
     fn instant<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.sample();
+        guarded(py, || self.sample())?;
         let frame = &self.frame;
         let all = PyDict::new(py);
         all.set_item("time", frame.time)?;

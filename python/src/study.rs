@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use jointplay_analysis::indices::{Bootstrap, SaltelliDesign};
-use jointplay_analysis::lot::{Limit, Lot, PERCENTILES};
-use jointplay_analysis::sampling::{Sampler, Sampling};
-use jointplay_analysis::study::{Input, Output, RunSpan, StudyRuns, Uncertainty, inputs, outputs};
-use jointplay_analysis::yields::{Estimate, reject_drivers};
+use jointplay_analysis::lot::{Limit, PERCENTILES, Quality};
+use jointplay_analysis::sampling::Sampling;
+use jointplay_analysis::study::{
+    CandidateRequest, Change, CheapestFits, FitOptions, Input, Output, RunSpan, SensitivityOptions, StudyError,
+    StudyRunner, StudyRuns, TargetAnswer, ToleranceOptions, Uncertainty, candidates, inputs, outputs, sensitivity,
+    tolerance,
+};
+use jointplay_analysis::yields::Estimate;
 use jointplay_physics::suggest::nearest;
 use jointplay_physics::words::Words;
 use jointplay_scene::Scene;
@@ -14,9 +17,10 @@ use numpy::PyArray2;
 use numpy::ndarray::Array2;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::PyDict;
 
 use crate::errors::option_error;
+use crate::interpreter::guarded;
 use crate::quantity::duration;
 use crate::report::constant;
 use crate::scene::PyScene;
@@ -31,52 +35,133 @@ pub struct PyStudy {
     span: RunSpan,
 }
 
+/// Why runs ended early.
+enum Ended {
+    /// Ctrl-C, an error of the progress function, no memory, or a bug.
+    Raised(PyErr),
+    Study(StudyError),
+}
+
+impl From<StudyError> for Ended {
+    fn from(error: StudyError) -> Self {
+        Self::Study(error)
+    }
+}
+
+impl Ended {
+    fn raise(self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Raised(error) => error,
+            Self::Study(error) => option_error(py, &format!("{error:#}")),
+        }
+    }
+}
+
+/// Makes the runs of a study for Python.
+struct Runner<'a, 'py> {
+    study: &'a PyStudy,
+    py: Python<'py>,
+    threads: usize,
+    progress: Option<Bound<'py, PyAny>>,
+    /// Stage, values and outputs of the runs so far.
+    stages: Vec<(String, Vec<Vec<f64>>, Vec<Vec<f64>>)>,
+}
+
+impl<'a, 'py> Runner<'a, 'py> {
+    fn new(study: &'a PyStudy, py: Python<'py>, threads: usize, progress: Option<Bound<'py, PyAny>>) -> Self {
+        Self { study, py, threads, progress, stages: Vec::new() }
+    }
+
+    /// Adds values and outputs of the runs of `stage`.
+    fn describe(&self, stage: &str, all: &Bound<'py, PyDict>) -> PyResult<()> {
+        let of_stage = self.stages.iter().find(|(name, ..)| name == stage);
+        let (values, results) = of_stage.map_or((&[][..], &[][..]), |(_, values, results)| (&values[..], &results[..]));
+        all.set_item("values", array(self.py, values, self.study.inputs.len())?)?;
+        all.set_item("results", array(self.py, results, self.study.outputs.len())?)
+    }
+}
+
+impl StudyRunner for Runner<'_, '_> {
+    type Error = Ended;
+
+    fn inputs(&self) -> &[Input] {
+        &self.study.inputs
+    }
+
+    fn outputs(&self) -> &[Output] {
+        &self.study.outputs
+    }
+
+    fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Ended> {
+        let PyStudy { scene, inputs, outputs, span } = self.study;
+        let keys: Vec<String> = inputs.iter().map(|input| input.key.clone()).collect();
+        let runs = StudyRuns::new(scene, &keys, outputs, *span, &rows)?;
+        let records = records(self.py, runs.sweep(), self.threads, self.progress.clone()).map_err(Ended::Raised)?;
+        let length = runs.sweep().layout().record_length();
+        let results: Vec<Vec<f64>> = records.chunks_exact(length).map(|record| runs.outputs_of(record)).collect();
+        self.stages.push((stage.to_owned(), rows, results.clone()));
+        Ok(results)
+    }
+}
+
 /// An estimate as value, lower and upper end of its interval.
 fn triple(estimate: &Estimate) -> (f64, f64, f64) {
     (estimate.value, estimate.low, estimate.high)
 }
 
+/// Keys and values of changed parameters, with the output there.
+type Changed<'a> = (Vec<(&'a str, f64)>, f64);
+
 impl PyStudy {
-    /// The outputs of a run for each of `rows`, which give every input a value, SI.
-    fn results(
-        &self,
-        py: Python<'_>,
-        rows: &[Vec<f64>],
-        threads: usize,
-        progress: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<Vec<Vec<f64>>> {
-        let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
-        let runs = StudyRuns::new(&self.scene, &keys, &self.outputs, self.span, rows);
-        let runs = runs.map_err(|error| option_error(py, &error.to_string()))?;
-        let records = records(py, runs.sweep(), threads, progress)?;
-        let length = runs.sweep().layout().record_length();
-        Ok(records.chunks_exact(length).map(|record| runs.outputs_of(record)).collect())
+    fn changed(&self, changes: &[Change], output: f64) -> Changed<'_> {
+        let named = changes.iter().map(|change| (&self.inputs[change.input].key[..], change.value));
+        (named.collect(), output)
     }
 
-    /// Values of the inputs at points of the unit cube, SI.
-    fn values(&self, points: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
-        points.map(|point| self.inputs.iter().zip(point).map(|(input, u)| input.at(u)).collect()).collect()
+    fn target<'py>(&self, py: Python<'py>, answer: &TargetAnswer) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        let single = answer.single.iter().map(|(change, output)| self.changed(std::slice::from_ref(change), *output));
+        all.set_item("target", answer.target)?;
+        all.set_item("single", single.collect::<Vec<_>>())?;
+        all.set_item("together", answer.together.as_ref().map(|(changes, output)| self.changed(changes, *output)))?;
+        Ok(all)
+    }
+
+    fn fits<'py>(&self, py: Python<'py>, found: &CheapestFits) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        let of_candidates = || found.options.candidates.iter();
+        let best = found.search.best.as_ref().map(|best| {
+            let chosen = of_candidates().zip(&best.candidates);
+            let chosen = chosen.map(|(of, &chosen)| (&self.inputs[of.input].key[..], &of.list[chosen].text[..]));
+            (best.cost, chosen.collect::<Vec<_>>(), triple(&best.estimate))
+        });
+        let unchecked = of_candidates().filter(|of| !of.is_ordered()).map(|of| &self.inputs[of.input].key[..]);
+        all.set_item("best", best)?;
+        all.set_item("is_proven", found.search.is_proven)?;
+        all.set_item("evaluations", found.search.evaluations)?;
+        all.set_item("check", found.check.as_ref().map(|(check, verdict)| (triple(check), verdict.word())))?;
+        all.set_item("order_not_checked", unchecked.collect::<Vec<_>>())?;
+        Ok(all)
     }
 }
 
-/// An array of rows of equal length.
-fn array<'py>(py: Python<'py>, rows: &[Vec<f64>]) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let shape = (rows.len(), rows.first().map_or(0, Vec::len));
+/// An array of rows of `length`.
+fn array<'py>(py: Python<'py>, rows: &[Vec<f64>], length: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let shape = (rows.len(), length);
     let values = Array2::from_shape_vec(shape, rows.concat());
     constant(py, values.map_err(|error| PyMemoryError::new_err(error.to_string()))?)
 }
 
-/// A limit `name` of `output`: a number, SI, or text.
-fn limit(output: &Output, name: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
+/// A value of `output`: a number, SI, or text; `None` for none.
+fn quantity(output: &Output, value: &Bound<'_, PyAny>) -> Result<Option<f64>, String> {
     if value.is_none() {
         return Ok(None);
     }
-    let read = match value.cast::<PyString>() {
-        Ok(text) => output.read(&text.to_cow()?),
-        Err(_) => value.extract::<f64>().map_err(|_| "expected a number in SI units, or text".to_owned()),
-    };
-    let wrong = |why: String| option_error(value.py(), &format!("{} limit of {}: {why}", name, output.name));
-    read.map(Some).map_err(wrong)
+    if let Ok(text) = value.extract::<String>() {
+        return output.read(&text).map(Some);
+    }
+    let number = value.extract::<f64>().ok().filter(|number| number.is_finite());
+    number.map(Some).ok_or_else(|| "expected a number in SI units, or text".to_owned())
 }
 
 #[pymethods]
@@ -99,7 +184,7 @@ impl PyStudy {
             distribution,
         });
         let requested: Vec<Uncertainty> = requested.collect();
-        let wrong = |error: &dyn std::fmt::Display| option_error(py, &error.to_string());
+        let wrong = |error: &dyn std::fmt::Display| option_error(py, &format!("{error:#}"));
         let inputs = inputs(&scene, &requested).map_err(|error| wrong(&error))?;
         if inputs.is_empty() {
             return Err(wrong(&"over: give at least one parameter"));
@@ -120,10 +205,10 @@ impl PyStudy {
         Ok(Self { scene, inputs, outputs, span })
     }
 
-    /// Key and value in the scene, SI, of each parameter.
+    /// Key, value in the scene, SI, and SI unit of each parameter.
     #[getter]
-    fn inputs(&self) -> Vec<(&str, f64)> {
-        self.inputs.iter().map(|input| (&input.key[..], input.nominal)).collect()
+    fn inputs(&self) -> Vec<(&str, f64, &str)> {
+        self.inputs.iter().map(|input| (&input.key[..], input.nominal, input.si_unit)).collect()
     }
 
     /// Name and unit of each output.
@@ -152,28 +237,46 @@ impl PyStudy {
             let message = format!("values[{i}]: {} numbers are given for {inputs} parameters", row.len());
             return Err(option_error(py, &message));
         }
-        array(py, &self.results(py, &rows, threads, progress)?)
+        let results = Runner::new(self, py, threads, progress).run("values", rows);
+        array(py, &results.map_err(|ended| ended.raise(py))?, self.outputs.len())
     }
 
-    /// First-order and total indices of every parameter, from `rows` rows of a Sobol sequence.
-    #[pyo3(signature = (rows, seed, threads, progress=None))]
-    fn indices<'py>(
+    /// Each parameter alone, a screening of many, indices, and changes that reach a target.
+    #[pyo3(signature = (rows, screen, target, seed, threads, progress=None))]
+    fn sensitivity<'py>(
         &self,
         py: Python<'py>,
         rows: usize,
+        screen: Option<usize>,
+        target: Option<Bound<'py, PyAny>>,
         seed: u64,
         threads: usize,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let design = SaltelliDesign::new(Sampling::Sobol, self.inputs.len(), rows, seed);
-        let design = design.map_err(|error| option_error(py, &format!("rows = {rows}: {error}")))?;
-        let values = self.values((0..design.points()).filter_map(|index| design.point(index)));
-        let results = self.results(py, &values, threads, progress)?;
-        let mut all = Vec::new();
-        for o in 0..self.outputs.len() {
-            let own: Vec<f64> = results.iter().map(|outputs| outputs[o]).collect();
+        let target = match &target {
+            Some(value) => quantity(&self.outputs[0], value)
+                .map_err(|why| option_error(py, &format!("target of {}: {why}", self.outputs[0].name)))?,
+            None => None,
+        };
+        let mut runner = Runner::new(self, py, threads, progress);
+        let options = SensitivityOptions { rows, screen, target, seed };
+        let found = guarded(py, || sensitivity(&mut runner, &options))?.map_err(|ended| ended.raise(py))?;
+        let all = PyDict::new(py);
+        runner.describe("indices", &all)?;
+        all.set_item("kept", &found.kept)?;
+        all.set_item("nominal", &found.alone.nominal)?;
+        all.set_item("together", &found.alone.together)?;
+        all.set_item("alone", &found.alone.ends)?;
+        let effects = found.screening.as_ref().map(|screening| {
+            let of_input = screening.effects.iter();
+            let numbers = of_input.map(|effects| effects.map(|e| (e.mean, e.mean_magnitude, e.deviation)));
+            numbers.collect::<Vec<_>>()
+        });
+        all.set_item("screening", effects)?;
+        let mut indices = Vec::new();
+        for own in found.indices.iter().flatten() {
             let entry = PyDict::new(py);
-            match design.indices(&own, Bootstrap { seed, ..Bootstrap::default() }) {
+            match own {
                 Ok(found) => {
                     entry.set_item("mean", found.mean)?;
                     entry.set_item("variance", found.variance)?;
@@ -182,28 +285,30 @@ impl PyStudy {
                 }
                 Err(error) => entry.set_item("fault", error.to_string())?,
             }
-            all.push(entry);
+            indices.push(entry);
         }
-        let found = PyDict::new(py);
-        found.set_item("values", array(py, &values)?)?;
-        found.set_item("results", array(py, &results)?)?;
-        found.set_item("indices", all)?;
-        Ok(found)
+        all.set_item("indices", indices)?;
+        all.set_item("target", found.target.as_ref().map(|answer| self.target(py, answer)).transpose()?)?;
+        Ok(all)
     }
 
     /// A lot of `units` units: which hold the `limits`, a lower and an upper one for each output, and what drives the rejects.
-    #[pyo3(signature = (limits, units, sampling, seed, threads, progress=None))]
-    fn lot<'py>(
+    /// `cost` has a pattern, a fit and its cost for each candidate; without any, no fits are searched.
+    #[pyo3(signature = (limits, units, sampling, seed, cost, required_yield, evaluations, threads, progress=None))]
+    fn tolerance<'py>(
         &self,
         py: Python<'py>,
         limits: Vec<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
         units: usize,
         sampling: &str,
         seed: u64,
+        cost: Option<Vec<(String, String, f64)>>,
+        required_yield: f64,
+        evaluations: usize,
         threads: usize,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let wrong = |error: &dyn std::fmt::Display| option_error(py, &error.to_string());
+        let wrong = |message: &str| option_error(py, message);
         let Some(sampling) = Sampling::of_word(sampling) else {
             let (near, all) = (nearest(sampling, Sampling::WORDS.iter().copied()), Sampling::WORDS.join(", "));
             return Err(wrong(&format!("sampling = {sampling:?}: no such sampling{near}; there are: {all}")));
@@ -214,43 +319,57 @@ impl PyStudy {
         }
         let mut ends = Vec::new();
         for (output, (lower, upper)) in self.outputs.iter().zip(&limits) {
-            let [lower, upper] = [limit(output, "lower", lower)?, limit(output, "upper", upper)?];
+            let read = |name: &str, value| {
+                let failed = |why| wrong(&format!("{name} limit of {}: {why}", output.name));
+                quantity(output, value).map_err(failed)
+            };
+            let [lower, upper] = [read("lower", lower)?, read("upper", upper)?];
             if lower.is_none() && upper.is_none() || lower.zip(upper).is_some_and(|(lower, upper)| lower >= upper) {
                 return Err(wrong(&format!("limits of {}: give a lower one, or a higher upper one", output.name)));
             }
             ends.push(Limit { lower, upper });
         }
-        let sampler = Sampler::new(sampling, self.inputs.len(), units, seed);
-        let sampler = sampler.map_err(|error| wrong(&format!("units = {units}: {error}")))?;
-        let values = self.values((0..sampler.points()).filter_map(|index| sampler.point(index)));
-        let lot = Lot::new(self.results(py, &values, threads, progress)?, &ends).map_err(|error| wrong(&error))?;
-        let mut qualities = Vec::new();
-        for (o, limit) in ends.iter().enumerate() {
-            let found = lot.quality(o, limit).map_err(|error| wrong(&error))?;
-            let own = PyDict::new(py);
-            own.set_item("yield", triple(&found.yielded))?;
-            own.set_item("mean", found.mean)?;
-            own.set_item("deviation", found.deviation)?;
-            for (p, value) in PERCENTILES.iter().zip(&found.percentiles) {
-                own.set_item(format!("percentile_{:.0}", 100.0 * p), value.as_ref().map(triple))?;
-            }
-            own.set_item("cp", found.capability.as_ref().and_then(|capability| capability.cp))?;
-            own.set_item("cpk", found.capability.as_ref().map(|capability| triple(&capability.cpk)))?;
-            qualities.push(own);
-        }
-        let columns: Vec<Vec<f64>> =
-            (0..self.inputs.len()).map(|i| values.iter().map(|row| row[i]).collect()).collect();
-        let drivers = reject_drivers(&columns, &lot.accepted).map_err(|error| wrong(&error))?;
-        let drivers = drivers.map(|drivers| {
+        let requested = cost.map(|cost| {
+            let of_one = |(pattern, distribution, cost): (String, String, f64)| CandidateRequest {
+                place: "cost".to_owned(),
+                pattern,
+                distribution,
+                cost: cost.to_string(),
+            };
+            cost.into_iter().map(of_one).collect::<Vec<_>>()
+        });
+        let fits = requested.map(|requested| {
+            let candidates = candidates(&self.scene, &self.inputs, &requested)?;
+            Ok(FitOptions { candidates, required_yield, evaluations })
+        });
+        let fits = fits.transpose().map_err(|error: StudyError| wrong(&format!("{error:#}")))?;
+        let mut runner = Runner::new(self, py, threads, progress);
+        let options = ToleranceOptions { units, sampling, seed, fits };
+        let found = guarded(py, || tolerance(&mut runner, &ends, options))?.map_err(|ended| ended.raise(py))?;
+        let drivers = found.drivers.as_ref().map(|drivers| {
             drivers.iter().map(|driver| (driver.mean_shift, driver.distance, driver.p_value)).collect::<Vec<_>>()
         });
-        let found = PyDict::new(py);
-        found.set_item("yield", triple(&lot.yielded))?;
-        found.set_item("accepted", &lot.accepted)?;
-        found.set_item("qualities", qualities)?;
-        found.set_item("drivers", drivers)?;
-        found.set_item("values", array(py, &values)?)?;
-        found.set_item("results", array(py, &lot.outputs)?)?;
-        Ok(found)
+        let all = PyDict::new(py);
+        runner.describe("lot", &all)?;
+        all.set_item("yield", triple(&found.lot.yielded))?;
+        all.set_item("accepted", &found.lot.accepted)?;
+        let qualities = found.qualities.iter().map(|own| quality(py, own)).collect::<PyResult<Vec<_>>>()?;
+        all.set_item("qualities", qualities)?;
+        all.set_item("drivers", drivers)?;
+        all.set_item("fits", found.cheapest.as_ref().map(|cheapest| self.fits(py, cheapest)).transpose()?)?;
+        Ok(all)
     }
+}
+
+fn quality<'py>(py: Python<'py>, found: &Quality) -> PyResult<Bound<'py, PyDict>> {
+    let own = PyDict::new(py);
+    own.set_item("yield", triple(&found.yielded))?;
+    own.set_item("mean", found.mean)?;
+    own.set_item("deviation", found.deviation)?;
+    for (p, value) in PERCENTILES.iter().zip(&found.percentiles) {
+        own.set_item(format!("percentile_{:.0}", 100.0 * p), value.as_ref().map(triple))?;
+    }
+    own.set_item("cp", found.capability.as_ref().and_then(|capability| capability.cp))?;
+    own.set_item("cpk", found.capability.as_ref().map(|capability| triple(&capability.cpk)))?;
+    Ok(own)
 }

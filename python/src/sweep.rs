@@ -52,7 +52,7 @@ fn axis(scene: &Scene, key: &str, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
     let py = values.py();
     let wrong = |message: String| option_error(py, &message);
     if let Ok(text) = values.cast::<PyString>() {
-        return Axis::parse(scene, &format!("{key}={}", text.to_cow()?)).map_err(|error| wrong(error.to_string()));
+        return Axis::parse(scene, &format!("{key}={}", text.to_cow()?)).map_err(|error| wrong(format!("{error:#}")));
     }
     let parameter = scene.parameter(key).map_err(|error| scene_error(py, Some(scene), &error))?;
     let mut listed = Vec::new();
@@ -62,7 +62,7 @@ fn axis(scene: &Scene, key: &str, values: &Bound<'_, PyAny>) -> PyResult<Axis> {
         let text = text.ok_or_else(|| wrong(format!("{key} = None: a varied parameter needs values")))?;
         listed.push(parameter.read(&text).map_err(|error| wrong(format!("{key} = {text}: {error}")))?);
     }
-    Axis::listed(scene, key, listed).map_err(|error| wrong(error.to_string()))
+    Axis::listed(scene, key, listed).map_err(|error| wrong(format!("{error:#}")))
 }
 
 fn start(py: Python<'_>, word: &str) -> PyResult<Start> {
@@ -144,7 +144,7 @@ impl PySweep {
         let starts = starts.iter().map(|word| start(py, word)).collect::<PyResult<Vec<_>>>()?;
         let zip = option(options, "zip")?.map_or(Ok(false), |zip| zip.extract())?;
         let combine = if zip { Design::zipped } else { Design::crossed };
-        let design = combine(scene, axes, &starts).map_err(|error| wrong(error.to_string()))?;
+        let design = combine(scene, axes, &starts).map_err(|error| wrong(format!("{error:#}")))?;
         let keep = match option(options, "keep")? {
             None => Vec::new(),
             Some(keep) => {
@@ -158,7 +158,7 @@ impl PySweep {
             let scene = scene.clone();
             if tried { Sweep::untried(scene, design, protocol) } else { Sweep::new(scene, design, protocol) }
         })?;
-        Ok(Self { sweep: sweep.map_err(|error| wrong(error.to_string()))? })
+        Ok(Self { sweep: sweep.map_err(|error| wrong(format!("{error:#}")))? })
     }
 
     /// Number of blocks, which can be computed in any order and anywhere.

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas
 import pytest
 
 import jointplay as jp
@@ -34,6 +35,81 @@ def test_indices_are_those_of_the_program(program, tmp_path):
             assert same(indices.total[parameter["key"]], parameter["total"]), parameter
     table = found.to_pandas()
     assert len(table) == 9 and table["total_high"].ge(table["total_low"]).all()
+
+
+def test_effects_alone_screening_and_target_are_those_of_the_program(program, tmp_path):
+    options = ["--duration=5ms", "--rows=8", "--screen=2", "--target=1um", "--seed=3", "--summary=json", "--quiet"]
+    outputs = ["tip-error", "peak-force"]
+    told = json.loads(program("sensitivity", "four-bar", *ASKED, "--output", ",".join(outputs), *options, "--out", tmp_path / "found"))
+    found = jp.sensitivity(
+        jp.Scene.load("four-bar"), OVER, outputs, rows=8, screen=2, target="1 um", seed=3, duration="5 ms", threads=2
+    )
+    for own in told["outputs"]:
+        name = own["name"]
+        assert (found.nominal[name], found.units[name]) == (own["value"], own["unit"])
+        assert found.together[name] == (own["all_low"], own["all_high"])
+        for parameter in own["parameters"]:
+            key = parameter["key"]
+            assert found.alone[name][key] == tuple(parameter[end] for end in ("low", "alone_low", "high", "alone_high"))
+            indices = found.indices[name]
+            assert (key in indices.total) == (parameter["total"] is not None) == (key in found.kept)
+    assert found.screening is not None and found.target is not None
+    for effects in told["screening"]:
+        assert found.screening[effects["key"]] == tuple(effects[name] for name in ("mean", "mean_magnitude", "deviation"))
+
+    def changes(told):
+        return told and ({change["key"]: change["value"] for change in told["changes"]}, told["output"])
+
+    target = told["target"]
+    assert found.target.target == target["target"] == 1e-6
+    assert found.target.together == changes(target["together"])
+    assert found.target.single == [
+        ({one["change"]["key"]: one["change"]["value"]}, one["output"]) for one in target["single"]
+    ]
+    table = pandas.read_csv(tmp_path / "found" / "sensitivity.csv", keep_default_na=False, na_values="NaN")
+    pandas.testing.assert_frame_equal(found.to_pandas(), table, rtol=1e-11, check_dtype=False)
+    # One clearance decides; half of what it may be is more than enough.
+    easy = jp.sensitivity(
+        jp.Scene.load("four-bar"), ["joint.*.clearance"], rows=0, target=found.nominal["tip-error"] * 0.99, duration="5 ms"
+    )
+    assert easy.target is not None and easy.indices == {} and len(easy.values) == 0
+    assert easy.target.single or easy.target.together is not None
+
+
+def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
+    cost = {
+        "joint.A.clearance": {"0.05mm..0.2mm": 1.0, "0.05mm..0.1mm": 3.0},
+        "joint.B.clearance": {"0.05mm..0.2mm": 2.0, "0.05mm..0.1mm": 7.0},
+    }
+    rows = [f"{key},{fit},{price}" for key, fits in cost.items() for fit, price in fits.items()]
+    (tmp_path / "costs.csv").write_text("\n".join(["parameter,fit,cost", *rows]))
+    limits, verdicts = {"peak-force": 125.0}, set()
+    options = ["--duration=20ms", "--runs=32", "--limit=peak-force=125", "--summary=json", "--quiet", "--force"]
+    for required in (0.5, 1.0):
+        search = [f"--cost={tmp_path / 'costs.csv'}", f"--yield={required}", "--out", tmp_path / "found"]
+        told = json.loads(program("tolerance", "four-bar", *ASKED, *options, *search))["fits"]
+        found = jp.tolerance(
+            jp.Scene.load("four-bar"),
+            OVER,
+            limits,
+            units=32,
+            sampling="sobol",
+            cost=cost,
+            required_yield=required,
+            duration="20 ms",
+            threads=2,
+        ).fits
+        assert (found.is_proven, found.evaluations) == (told["is_proven"], told["evaluations"])
+        assert found.order_not_checked == told["order_not_checked"] == []
+        if told["best"] is None:
+            assert found.best is None and found.check is None and found.verdict is None
+            verdicts.add(None)
+            continue
+        assert found.best.cost == told["best"]["cost"] and same(found.best.yield_, told["best"]["yield"])
+        assert found.best.fits == {one["key"]: one["fit"] for one in told["best"]["fits"]}
+        assert same(found.check, told["check"]["yield"]) and found.verdict == told["check"]["verdict"]
+        verdicts.add(found.verdict)
+    assert len(verdicts) == 2
 
 
 def test_yields_are_those_of_the_program(program, tmp_path):
@@ -86,13 +162,20 @@ def test_a_study_is_a_function_of_its_parameters():
         (lambda scene: jp.sensitivity(scene, {"contact.clearance": "normal(1)"}), "contact.clearance"),
         (lambda scene: jp.sensitivity(scene, {"contact.clearance": "-1mm..1mm"}), "allowed"),
         (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, "tip-eror"), "tip-error"),
-        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, rows=0), "rows = 0"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, rows=4), "^rows = 4: allowed at least 8, or 0"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, target="5 kg"), "target of tip-error"),
         (lambda scene: jp.sensitivity(scene, {}), "at least one"),
         (lambda scene: jp.sensitivity(scene, ["contact.clearance"], start_after="1 ms"), "duration"),
         (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": "5 kg"}), "upper limit of tip-error"),
         (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": (2.0, 1.0)}), "higher upper one"),
         (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"*.normal:max": 1.0}), "not for a pattern"),
         (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": 1.0}, sampling="sobl"), "did you mean `sobol`"),
+        (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": 1.0}, units=0), "^units = 0: "),
+        (lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": 1.0}, cost={}), "^cost: no joints"),
+        (
+            lambda scene: jp.tolerance(scene, ["contact.clearance"], {"tip-error": 1.0}, cost={"contact.friction": {"0..1": 1}}),
+            "^cost: contact.friction: give the parameter a distribution",
+        ),
     ],
 )
 def test_bad_studies_are_refused(work, said):

@@ -3,13 +3,12 @@
 use std::fmt::Write;
 
 use super::args::CheckArguments;
-use super::assembly::Start;
 use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, start};
+use crate::analysis::assembly::StartReport;
 use crate::analysis::beginning::Beginning;
 use crate::analysis::near_singular::near_singular;
-use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::{Method, StepControl};
 use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
@@ -26,7 +25,7 @@ pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let scene = load(&arguments.scene)?;
     // Only starting the scene reveals joints that do not close and rods that do not reach.
     let mut simulation = start(&scene)?;
-    let begun = Start::of(&mut simulation);
+    let begun = StartReport::of(&mut simulation);
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     if arguments.channels {
@@ -61,7 +60,7 @@ fn is_ideal(joint: &BallJoint) -> bool {
 fn report(
     scene: &Scene,
     contents: &Summary,
-    begun: &Start,
+    begun: &StartReport,
     start: &Frame,
     beginning: Option<&Beginning>,
 ) -> Result<String, Failure> {
@@ -138,12 +137,8 @@ fn report(
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
-    let warnings = scene.machine.warnings().into_iter().map(|w| w.to_string());
-    warnings
-        .chain(too_slow(scene).map(|slow| slow.to_string()))
-        .chain(near_singular(scene).map(|near| near.to_string()))
-        .chain(begun.warnings.iter().cloned())
-        .for_each(|warning| line("Warning", &warning));
+    let singular = near_singular(scene).map(|near| near.to_string());
+    begun.warnings_of(scene).iter().chain(&singular).for_each(|warning| line("Warning", warning));
     Ok(out)
 }
 

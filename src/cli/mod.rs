@@ -1,7 +1,6 @@
 //! The command line: its arguments, its output and its exit codes.
 
 mod args;
-mod assembly;
 mod bench;
 mod check;
 #[cfg(feature = "gui")]

@@ -8,14 +8,13 @@ use indicatif::ProgressBar;
 use serde_json::{Value as Json, json};
 
 use super::args::{RunArguments, SummaryForm};
-use super::assembly::Start;
 use super::impacts::ImpactsFile;
 use super::link::Way;
 use super::output::{RowError, RowsFile, Table, check_distinct, check_size, significant};
 use super::state::{self, Checkpoint, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
-use crate::analysis::presets::too_slow;
+use crate::analysis::assembly::StartReport;
 use crate::analysis::row_times::RowTimes;
 use crate::files::{FileError, publish};
 use crate::scene::LiveScene;
@@ -75,7 +74,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
-    let begun = Start::of(&mut simulation);
+    let begun = StartReport::of(&mut simulation);
     let mut frame = Frame::default();
     // Columns are determined at t = 0, also for a resumed run.
     simulation.sample(0.0, &mut frame);
@@ -115,11 +114,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if wear_begins && arguments.from_state.is_some() {
             warn("the wear map begins at the saved state, which has none");
         }
-        let warnings = scene.machine.warnings().into_iter().map(|w| w.to_string());
-        warnings
-            .chain(too_slow(&scene).map(|slow| slow.to_string()))
-            .chain(begun.warnings.iter().cloned())
-            .for_each(|warning| warn(&warning));
+        begun.warnings_of(&scene).iter().for_each(|warning| warn(warning));
     }
 
     interrupt::listen();
@@ -149,7 +144,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let found = impacts.as_ref().map(ImpactsFile::impacts);
     let mut facts = summary::json(&simulation, end.status, stepping, found);
     let mut text = summary::text(&simulation, end.status, stepping, found);
-    begun.describe(&mut facts, &mut text);
+    summary::start(&mut facts, &mut text, &begun);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
         summary::line(&mut text, "No tip error", &format!("the ideal mechanism {fault}"));

@@ -9,6 +9,7 @@ use super::impacts::Restitution;
 use super::output::significant;
 use super::peaks::{self, parts};
 use super::provenance;
+use crate::analysis::assembly::StartReport;
 use crate::machine::Preset;
 use crate::scene::LiveScene;
 use crate::scene::Scene;
@@ -212,6 +213,17 @@ pub fn text(simulation: &LiveScene, status: Status, stepping: Stepping, impacts:
 pub fn line(text: &mut String, label: &str, words: &str) {
     // Writing to a String cannot fail.
     let _ = writeln!(text, "{label:<17} {words}");
+}
+
+/// Adds what was found at the start to the summary of a run.
+pub fn start(facts: &mut Map<String, Json>, text: &mut String, found: &StartReport) {
+    facts.insert("assembly".into(), found.assembly.clone());
+    let loose = json!({"reactions": found.reactions, "actuators": found.actuators});
+    facts.insert("not_unique".into(), loose);
+    let loose = found.not_unique().map(|words| ("Not unique".to_owned(), words));
+    for (label, words) in found.lines.iter().chain(&loose) {
+        line(text, label, words);
+    }
 }
 
 /// Adds a line about a written file to a summary.

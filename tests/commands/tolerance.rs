@@ -71,7 +71,7 @@ fn a_yield_counts_the_runs_that_hold_all_limits() {
 
     // Values within their distributions, and drivers in order of the distance, recomputed for the first.
     for (_, values) in &runs {
-        let clearances = ["joint.A.clearance", "joint.B.clearance"].map(|key| values[key]);
+        let clearances = ["joint.A.clearance (m)", "joint.B.clearance (m)"].map(|key| values[key]);
         assert!(clearances.iter().all(|clearance| (50e-6..=200e-6).contains(clearance)));
         assert!((0.05..=0.15).contains(&values["contact.friction"]));
     }
@@ -80,12 +80,13 @@ fn a_yield_counts_the_runs_that_hold_all_limits() {
     assert_eq!(distances.len(), 3);
     assert!(distances.is_sorted_by(|a, b| a >= b), "{distances:?}");
     let key = drivers[0]["key"].as_str().unwrap();
+    let key = if key.ends_with("clearance") { format!("{key} (m)") } else { key.to_owned() };
     let below = |value: f64, of: bool| {
-        let own: Vec<f64> = runs.iter().filter(|run| is_accepted(run) == of).map(|run| run.1[key]).collect();
+        let own: Vec<f64> = runs.iter().filter(|run| is_accepted(run) == of).map(|run| run.1[&key]).collect();
         own.iter().filter(|own| **own <= value).count() as f64 / own.len() as f64
     };
     let distance =
-        runs.iter().map(|run| (below(run.1[key], true) - below(run.1[key], false)).abs()).fold(0.0, f64::max);
+        runs.iter().map(|run| (below(run.1[&key], true) - below(run.1[&key], false)).abs()).fold(0.0, f64::max);
     close(&drivers[0]["distance"], distance);
 
     // The same bytes from two threads and for people as for programs.
@@ -107,8 +108,8 @@ fn methods_and_seeds_give_other_lots_and_options_refine_the_file() {
     for rest in ["", "--seed 2", "--sampling latin-hypercube", "--sampling random"] {
         jointplay(folder.path(), &format!("{line} --over joint.A.clearance=0.1mm..0.11mm {rest}")).expect(0);
         let clearances = |key: &str| runs(folder.path()).iter().map(|run| run.1[key]).collect::<Vec<_>>();
-        assert!(clearances("joint.A.clearance").iter().all(|clearance| (1e-4..=1.1e-4).contains(clearance)));
-        let mut own = clearances("joint.B.clearance");
+        assert!(clearances("joint.A.clearance (m)").iter().all(|clearance| (1e-4..=1.1e-4).contains(clearance)));
+        let mut own = clearances("joint.B.clearance (m)");
         // Of 16 units a lot other than a random one has one in each sixteenth.
         own.sort_by(f64::total_cmp);
         let stratified = own.iter().enumerate().all(|(i, b)| (((b - 50e-6) / 150e-6 * 16.0) as usize) == i);

@@ -1,67 +1,50 @@
 //! The values of one varied parameter: equally or geometrically spaced, or listed.
 
+use std::fmt::{Display as _, Formatter};
+
+use super::argument::Argument;
 use jointplay_physics::units::{Dimension, parse_quantity};
 use jointplay_scene::{Kind, Parameter, Scene, SceneError, Value, ValueError};
-
-/// Option of a sweep, and of a map over the workspace.
-const VARY: &str = "--vary";
-const OVER: &str = "--over";
 
 /// Largest relative distance of a geometrically spaced value from a whole number that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Why a range is invalid.
+/// Why a range defines no values.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RangeError {
+pub enum RangeFault {
     /// Malformed.
-    #[error("{text}: expected KEY=A..B:N, KEY=A..B:N:log or KEY=V1,V2,…, e.g. contact.clearance=0.01mm..1mm:200")]
-    Form {
-        /// As written.
-        text: String,
-    },
+    #[error("expected KEY=A..B:N, KEY=A..B:N:log or KEY=V1,V2,…, e.g. contact.clearance=0.01mm..1mm:200")]
+    Form,
     /// An unknown key, or a value that the scene does not accept.
-    #[error("{text}: {error}")]
-    Scene {
-        /// As written.
-        text: String,
-        /// What is wrong.
-        error: Box<SceneError>,
-    },
+    #[error(transparent)]
+    Scene(Box<SceneError>),
     /// Neither a parameter nor a driven coordinate.
-    #[error("{text}: {error}; {}", driven(.coordinates))]
+    #[error("{error}; {}", driven(.coordinates))]
     NoSubject {
-        /// As written.
-        text: String,
         /// What is wrong.
         error: Box<SceneError>,
         /// Names of the driven coordinates.
         coordinates: Vec<String>,
     },
     /// Not a value of the parameter.
-    #[error("{text}: {value}: {error}")]
+    #[error("{value}: {error}")]
     Value {
-        /// As written.
-        text: String,
         /// The value at fault.
         value: String,
         /// What is wrong and what is allowed.
         error: ValueError,
     },
     /// A range of a parameter whose values are words.
-    #[error("{text}: {key} is not a number; list its values, as in {key}={example}")]
+    #[error("{key} is not a number; list its values, as in {key}={example}")]
     Words {
-        /// As written.
-        text: String,
         /// Key.
         key: String,
         /// Its allowed words.
         example: String,
     },
     /// A whole-number parameter whose spaced values are not whole.
-    #[error("{text}: {key} takes whole numbers, which {count} spaced values from {from} to {to} are not")]
+    #[error("{key} takes whole numbers, which {count} spaced values from {from} to {to} are not")]
     NotWhole {
-        /// As written.
-        text: String,
         /// Key.
         key: String,
         /// First value.
@@ -72,35 +55,88 @@ pub enum RangeError {
         count: usize,
     },
     /// Geometric spacing from or to a number that is not positive.
-    #[error("{text}: both ends of a logarithmic range must be above 0")]
-    NotPositive {
-        /// As written.
-        text: String,
-    },
+    #[error("both ends of a logarithmic range must be above 0")]
+    NotPositive,
     /// No points.
-    #[error("{text}: the range is empty: {what}")]
+    #[error("the range is empty: {what}")]
     Empty {
-        /// As written.
-        text: String,
         /// Why.
         what: String,
     },
     /// The last value is below the first.
     #[error(
-        "{text}: the range is reversed: its first end is above its second; write {to}..{from} (--start \
-         follow-down runs through it downwards)"
+        "the range is reversed: its first end is above its second; write {to}..{from} (a start of follow-down runs through it \
+         downwards)"
     )]
     Reversed {
-        /// As written.
-        text: String,
         /// First end as written.
         from: String,
         /// Second end as written.
         to: String,
     },
-    /// Axes that do not fit together, or not with the starts.
-    #[error("{0}")]
-    Together(String),
+}
+
+/// Why there are no such points.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RangeError {
+    /// One axis.
+    #[error(fmt = of_axis)]
+    Axis {
+        /// Its argument.
+        argument: Argument,
+        /// As written.
+        text: String,
+        /// What is wrong.
+        fault: RangeFault,
+    },
+    /// A key that is given twice.
+    #[error(fmt = twice)]
+    Twice {
+        /// Its argument.
+        argument: Argument,
+        /// The key.
+        key: String,
+    },
+    /// A start from which the points cannot follow.
+    #[error(fmt = of_start)]
+    Start {
+        /// Its word.
+        start: &'static str,
+        /// Why they cannot.
+        why: String,
+        /// What could be done in place of a cold start; empty for nothing.
+        or: &'static str,
+    },
+    /// Axes that do not fit together: the argument at fault, if it is one, and what is wrong.
+    #[error(fmt = together)]
+    Together(Option<Argument>, String),
+}
+
+fn of_axis(argument: &Argument, text: &str, fault: &RangeFault, f: &mut Formatter<'_>) -> std::fmt::Result {
+    argument.fmt(f)?;
+    f.write_str(if f.alternate() { ": " } else { " " })?;
+    write!(f, "{text}: {fault}")
+}
+
+fn twice(argument: &Argument, key: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+    argument.fmt(f)?;
+    f.write_str(if f.alternate() { ": " } else { " " })?;
+    write!(f, "{key} is given twice")
+}
+
+fn of_start(start: &str, why: &str, or: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+    Argument::Start.write(start, f)?;
+    write!(f, ": {why}; use ")?;
+    Argument::Start.write("cold", f)?;
+    f.write_str(or)
+}
+
+fn together(argument: &Option<Argument>, what: &str, f: &mut Formatter<'_>) -> std::fmt::Result {
+    if let Some(argument) = argument {
+        argument.fmt(f)?;
+        f.write_str(": ")?;
+    }
+    f.write_str(what)
 }
 
 fn driven(coordinates: &[String]) -> String {
@@ -126,14 +162,14 @@ enum Subject {
 }
 
 impl Subject {
-    /// The subject called `key` of an axis written as `text`.
-    fn find(scene: &Scene, option: &str, text: &str, key: &str) -> Result<Self, RangeError> {
+    /// The subject called `key` of an axis that `argument` gives.
+    fn find(scene: &Scene, argument: Argument, key: &str) -> Result<Self, RangeFault> {
         let error = match scene.parameter(key) {
             Ok(parameter) => return Ok(Self::Parameter(parameter)),
             Err(error) => error,
         };
-        if option != OVER {
-            return Err(of_scene(text, error));
+        if argument != Argument::Over {
+            return Err(RangeFault::Scene(Box::new(error)));
         }
         let names = scene.machine.driven().map(|(joint, freedom)| {
             let dimension = if freedom.turns() { Dimension::Angle } else { Dimension::Length };
@@ -144,7 +180,7 @@ impl Subject {
             Some(index) => Ok(Self::Coordinate(Coordinate { index, dimension: names[index].1 })),
             None => {
                 let coordinates = names.into_iter().map(|(name, _)| name).collect();
-                Err(RangeError::NoSubject { text: text.to_owned(), error: Box::new(error), coordinates })
+                Err(RangeFault::NoSubject { error: Box::new(error), coordinates })
             }
         }
     }
@@ -220,9 +256,9 @@ impl Values {
 /// One varied parameter, or driven coordinate, with its values in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    option: &'static str,
+    argument: Argument,
     key: String,
-    /// As written, with the option, for error messages.
+    /// As written, for error messages.
     text: String,
     coordinate: Option<Coordinate>,
     values: Values,
@@ -234,7 +270,7 @@ impl Axis {
     /// # Errors
     /// An unknown key, a malformed or empty range, or a value that the parameter does not accept.
     pub fn parse(scene: &Scene, text: &str) -> Result<Self, RangeError> {
-        Self::of_option(VARY, scene, text)
+        Self::of_argument(Argument::Vary, scene, text)
     }
 
     /// The same; KEY may also be a driven coordinate by the name of its channel, such as `crank.angle` or `slider.position`.
@@ -242,31 +278,31 @@ impl Axis {
     /// # Errors
     /// The same.
     pub fn parse_over(scene: &Scene, text: &str) -> Result<Self, RangeError> {
-        Self::of_option(OVER, scene, text)
+        Self::of_argument(Argument::Over, scene, text)
     }
 
-    fn of_option(option: &'static str, scene: &Scene, written: &str) -> Result<Self, RangeError> {
-        let text = &format!("{option} {written}");
-        let form = || RangeError::Form { text: text.to_owned() };
-        let (key, values) = written.split_once('=').ok_or_else(form)?;
-        let (key, values) = (key.trim(), values.trim());
-        let (subject, values) = if let Some((from, rest)) = values.split_once("..") {
-            let range = parts(text, rest)?;
-            let subject = Subject::find(scene, option, text, key)?;
-            let values = spaced(scene, &subject, text, key, from.trim(), range)?;
-            (subject, values)
-        } else {
-            let subject = Subject::find(scene, option, text, key)?;
-            if !values.contains(',') {
-                return Err(form());
-            }
-            let listed =
-                values.split(',').map(|value| subject.read(value).map_err(|error| of_value(text, value, error)));
-            let listed = Values::Listed(listed.collect::<Result<_, _>>()?);
-            (subject, listed)
+    fn of_argument(argument: Argument, scene: &Scene, text: &str) -> Result<Self, RangeError> {
+        let read = || {
+            let (key, values) = text.split_once('=').ok_or(RangeFault::Form)?;
+            let (key, values) = (key.trim(), values.trim());
+            let (subject, values) = if let Some((from, rest)) = values.split_once("..") {
+                let range = parts(rest)?;
+                let subject = Subject::find(scene, argument, key)?;
+                let values = spaced(scene, &subject, key, from.trim(), range)?;
+                (subject, values)
+            } else {
+                let subject = Subject::find(scene, argument, key)?;
+                if !values.contains(',') {
+                    return Err(RangeFault::Form);
+                }
+                let listed = values.split(',').map(|value| subject.read(value).map_err(|error| of_value(value, error)));
+                let listed = Values::Listed(listed.collect::<Result<_, _>>()?);
+                (subject, listed)
+            };
+            let (key, text) = (key.to_owned(), text.to_owned());
+            Ok(Self { argument, key, text, coordinate: subject.coordinate(), values })
         };
-        let coordinate = subject.coordinate();
-        Ok(Self { option, key: key.to_owned(), text: text.to_owned(), coordinate, values })
+        read().map_err(|fault| RangeError::Axis { argument, text: text.to_owned(), fault })
     }
 
     /// A parameter with listed values.
@@ -274,15 +310,19 @@ impl Axis {
     /// # Errors
     /// An unknown key, no values, or a value that the parameter does not accept.
     pub fn listed(scene: &Scene, key: &str, values: Vec<Value>) -> Result<Self, RangeError> {
-        let text = format!("{VARY} {key}");
-        let parameter = scene.parameter(key).map_err(|error| of_scene(&text, error))?;
-        if values.is_empty() {
-            return Err(RangeError::Empty { text, what: "0 values".to_owned() });
+        let (argument, text) = (Argument::Vary, key.to_owned());
+        let read = || {
+            let parameter = scene.parameter(key).map_err(|error| RangeFault::Scene(Box::new(error)))?;
+            if values.is_empty() {
+                return Err(RangeFault::Empty { what: "0 values".to_owned() });
+            }
+            let check = |value| parameter.check(value).map_err(|error| of_value(&parameter.show(value), error));
+            values.iter().try_for_each(check)
+        };
+        match read() {
+            Ok(()) => Ok(Self { argument, key: text.clone(), text, coordinate: None, values: Values::Listed(values) }),
+            Err(fault) => Err(RangeError::Axis { argument, text, fault }),
         }
-        for value in &values {
-            parameter.check(value).map_err(|error| of_value(&text, &parameter.show(value), error))?;
-        }
-        Ok(Self { option: VARY, key: key.to_owned(), text, coordinate: None, values: Values::Listed(values) })
     }
 
     /// Tries the first and the last value, or every listed one, in `scene`.
@@ -297,7 +337,9 @@ impl Axis {
         let all = 0..if self.is_listed() { last } else { 1 };
         for i in all.chain([last]) {
             let mut trial = scene.clone();
-            trial.set_value(&self.key, &self.value(i)).map_err(|error| of_scene(&self.text, error))?;
+            trial
+                .set_value(&self.key, &self.value(i))
+                .map_err(|error| self.wrong(RangeFault::Scene(Box::new(error))))?;
         }
         Ok(())
     }
@@ -312,9 +354,13 @@ impl Axis {
         self.coordinate
     }
 
-    /// The option that gave it.
-    pub(super) fn option(&self) -> &'static str {
-        self.option
+    /// The error that it is given twice.
+    pub(super) fn twice(&self) -> RangeError {
+        RangeError::Twice { argument: self.argument, key: self.key.clone() }
+    }
+
+    fn wrong(&self, fault: RangeFault) -> RangeError {
+        RangeError::Axis { argument: self.argument, text: self.text.clone(), fault }
     }
 
     /// Number of values.
@@ -388,30 +434,26 @@ impl Axis {
 
     /// Error of an axis with words where numbers are needed.
     pub(super) fn not_numbers(&self, scene: &Scene) -> RangeError {
-        no_numbers(scene, &self.text, &self.key)
+        self.wrong(no_numbers(scene, &self.key))
     }
 }
 
-fn of_scene(text: &str, error: SceneError) -> RangeError {
-    RangeError::Scene { text: text.to_owned(), error: Box::new(error) }
+fn of_value(value: &str, error: ValueError) -> RangeFault {
+    RangeFault::Value { value: value.trim().to_owned(), error }
 }
 
-fn of_value(text: &str, value: &str, error: ValueError) -> RangeError {
-    RangeError::Value { text: text.to_owned(), value: value.trim().to_owned(), error }
-}
-
-fn no_numbers(scene: &Scene, text: &str, key: &str) -> RangeError {
+fn no_numbers(scene: &Scene, key: &str) -> RangeFault {
     let example = scene.parameter(key).map(|parameter| parameter.range().replace(", ", ",")).unwrap_or_default();
-    RangeError::Words { text: text.to_owned(), key: key.to_owned(), example }
+    RangeFault::Words { key: key.to_owned(), example }
 }
 
 /// Last value, number of values and spacing of a range that continues with `rest`: `B:N` or `B:N:log`.
-fn parts<'a>(text: &str, rest: &'a str) -> Result<(&'a str, &'a str, Spacing), RangeError> {
+fn parts(rest: &str) -> Result<(&str, &str, Spacing), RangeFault> {
     let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
     match parts[..] {
         [last, count] => Ok((last, count, Spacing::Linear)),
         [last, count, "log"] => Ok((last, count, Spacing::Geometric)),
-        _ => Err(RangeError::Form { text: text.to_owned() }),
+        _ => Err(RangeFault::Form),
     }
 }
 
@@ -419,29 +461,26 @@ fn parts<'a>(text: &str, rest: &'a str) -> Result<(&'a str, &'a str, Spacing), R
 fn spaced(
     scene: &Scene,
     subject: &Subject,
-    text: &str,
     key: &str,
     first: &str,
     (last, count, spacing): (&str, &str, Spacing),
-) -> Result<Values, RangeError> {
-    let own = || text.to_owned();
-    let form = || RangeError::Form { text: own() };
-    let empty = |what: String| Err(RangeError::Empty { text: own(), what });
-    let count: usize = count.parse().map_err(|_| form())?;
+) -> Result<Values, RangeFault> {
+    let empty = |what: String| Err(RangeFault::Empty { what });
+    let count: usize = count.parse().map_err(|_| RangeFault::Form)?;
     if count == 0 {
         return empty("0 values".to_owned());
     }
-    let read = |end: &str| subject.read(end).map_err(|error| of_value(text, end, error));
+    let read = |end: &str| subject.read(end).map_err(|error| of_value(end, error));
     if subject.has_words() {
-        return Err(no_numbers(scene, text, key));
+        return Err(no_numbers(scene, key));
     }
     let (from, to, whole) = match (read(first)?, read(last)?) {
         (Value::Number(from), Value::Number(to)) => (from, to, false),
         (Value::Count(from), Value::Count(to)) => (from as f64, to as f64, true),
-        _ => return Err(no_numbers(scene, text, key)),
+        _ => return Err(no_numbers(scene, key)),
     };
     if from > to {
-        return Err(RangeError::Reversed { text: own(), from: first.to_owned(), to: last.to_owned() });
+        return Err(RangeFault::Reversed { from: first.to_owned(), to: last.to_owned() });
     }
     if (from == to) != (count == 1) {
         return empty(if count == 1 {
@@ -451,11 +490,11 @@ fn spaced(
         });
     }
     if spacing == Spacing::Geometric && from <= 0.0 {
-        return Err(RangeError::NotPositive { text: own() });
+        return Err(RangeFault::NotPositive);
     }
     let values = Values::Spaced { spacing, from, to, count, whole };
     if whole && (0..count).any(|i| values.number(i).fract() != 0.0) {
-        return Err(RangeError::NotWhole { text: own(), key: key.to_owned(), from: from as u64, to: to as u64, count });
+        return Err(RangeFault::NotWhole { key: key.to_owned(), from: from as u64, to: to as u64, count });
     }
     Ok(values)
 }

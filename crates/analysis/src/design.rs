@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::argument::Argument;
 use super::axis::{Axis, Coordinate, RangeError};
 use jointplay_scene::{Scene, SceneError, Value};
 
@@ -84,13 +85,14 @@ impl Design {
     /// As [`Self::crossed`]; axes of different lengths.
     pub fn zipped(scene: &Scene, axes: Vec<Axis>, starts: &[Start]) -> Result<Self, RangeError> {
         if let Some(other) = axes.iter().find(|axis| axis.count() != axes[0].count()) {
-            return Err(RangeError::Together(format!(
-                "--zip: {} has {} values and {} has {}; values in parallel need the same number",
+            let what = format!(
+                "{} has {} values and {} has {}; values in parallel need the same number",
                 axes[0].key(),
                 axes[0].count(),
                 other.key(),
                 other.count(),
-            )));
+            );
+            return Err(RangeError::Together(Some(Argument::Zip), what));
         }
         Self::new(scene, axes, Arrangement::Zipped, starts)
     }
@@ -102,7 +104,8 @@ impl Design {
     pub fn table(scene: &Scene, keys: &[String], rows: &[Vec<Value>], starts: &[Start]) -> Result<Self, RangeError> {
         if let Some(i) = rows.iter().position(|row| row.len() != keys.len()) {
             let (values, keys) = (rows[i].len(), keys.len());
-            return Err(RangeError::Together(format!("row {i} of the points has {values} values for {keys} keys")));
+            let what = format!("row {i} of the points has {values} values for {keys} keys");
+            return Err(RangeError::Together(None, what));
         }
         let column =
             |(j, key): (usize, &String)| Axis::listed(scene, key, rows.iter().map(|row| row[j].clone()).collect());
@@ -111,24 +114,24 @@ impl Design {
     }
 
     fn new(scene: &Scene, axes: Vec<Axis>, arrangement: Arrangement, starts: &[Start]) -> Result<Self, RangeError> {
-        let wrong = |message: String| Err(RangeError::Together(message));
+        let wrong = |argument, what: String| Err(RangeError::Together(argument, what));
         if axes.is_empty() {
-            return wrong("a sweep varies at least one parameter: add --vary KEY=A..B:N".to_owned());
+            return wrong(Some(Argument::Vary), "a sweep varies at least one parameter, as in KEY=A..B:N".to_owned());
         }
         let mut keys = BTreeSet::new();
         if let Some(twice) = axes.iter().find(|axis| !keys.insert(axis.key())) {
-            return wrong(format!("{} {} is given twice", twice.option(), twice.key()));
+            return Err(twice.twice());
         }
         let mut known = BTreeSet::new();
         match starts.iter().find(|start| !known.insert(start.word())) {
-            Some(twice) => return wrong(format!("--start: {} is given twice", twice.word())),
-            None if starts.is_empty() => return wrong("--start: give at least one start".to_owned()),
+            Some(twice) => return wrong(Some(Argument::Start), format!("{} is given twice", twice.word())),
+            None if starts.is_empty() => return wrong(Some(Argument::Start), "give at least one start".to_owned()),
             None => {}
         }
         let design = Self { axes, arrangement, starts: starts.to_vec() };
         let points = design.shape().into_iter().try_fold(1_usize, usize::checked_mul);
         if points.is_none_or(|points| points > MOST_POINTS) {
-            return wrong(format!("the ranges have more than {MOST_POINTS} points together"));
+            return wrong(None, format!("the ranges have more than {MOST_POINTS} points together"));
         }
         if let Some(start) = design.starts.iter().find(|start| **start != Start::Cold) {
             design.check_following(scene, *start)?;
@@ -138,32 +141,29 @@ impl Design {
 
     /// Requires numbers in ascending order along a row, and no change along it that waits for a reset.
     fn check_following(&self, scene: &Scene, start: Start) -> Result<(), RangeError> {
-        let wrong = |message: String| Err(RangeError::Together(format!("--start {}: {message}", start.word())));
+        let wrong = |why: String, or| Err(RangeError::Start { start: start.word(), why, or });
         let (last, others) = match self.axes.split_last() {
             Some((last, others)) => (last, others),
             None => return Ok(()),
         };
         if !last.is_ascending() {
-            return wrong(format!(
-                "a state is followed from one value to the next, and the values of {} are not numbers in ascending order; use \
-                 --start cold, or name a range last",
+            let why = format!(
+                "a state is followed from one value to the next, and the values of {} are not numbers in ascending order",
                 last.key()
-            ));
+            );
+            return wrong(why, ", or name a range last");
         }
         let along = match self.arrangement {
             Arrangement::Crossed => std::slice::from_ref(last),
             Arrangement::Zipped => &self.axes[..],
         };
         if let Some(waiting) = along.iter().find(|axis| axis.waits(scene)) {
-            return wrong(format!(
-                "{} takes effect at the next reset only, so no state can be followed through its values; use --start cold{}",
-                waiting.key(),
-                if others.is_empty() || self.arrangement == Arrangement::Zipped {
-                    ""
-                } else {
-                    ", or name another range last"
-                },
-            ));
+            let why = format!(
+                "{} takes effect at the next reset only, so no state can be followed through its values",
+                waiting.key()
+            );
+            let is_alone = others.is_empty() || self.arrangement == Arrangement::Zipped;
+            return wrong(why, if is_alone { "" } else { ", or name another range last" });
         }
         Ok(())
     }

@@ -25,7 +25,7 @@ impl RequiredYield {
 
 /// Why there is no search.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum FitSearchError<E> {
+pub enum FitSearchError {
     /// No joints.
     #[error("no joints to choose fits for")]
     NoJoints,
@@ -54,9 +54,6 @@ pub enum FitSearchError<E> {
     /// No evaluations allowed.
     #[error("0 evaluations: at least one is needed")]
     NoEvaluations,
-    /// The evaluation of a choice failed.
-    #[error(transparent)]
-    Evaluation(E),
 }
 
 /// A candidate for each joint, with its cost and yield.
@@ -81,55 +78,67 @@ pub struct FitSearch {
     pub evaluations: usize,
 }
 
-/// Finds the cheapest choice that holds a required yield. `costs` holds the costs of each joint's candidates, **loosest first**;
-/// `evaluate` estimates the yield of a choice, given as the index of each joint's candidate, and is called at most
-/// `most_evaluations` times, never twice for a choice.
-///
-/// The search assumes that a tighter fit in any joint never lowers the yield. It holds for a tip error that grows with every
-/// clearance; with estimates from samples, all choices must share the same random points, or noise breaks it. Where a tighter fit
-/// moves the centre of a clearance away from its best value, the result is not the optimum.
-///
-/// Candidates that cost as much as a tighter one are left out. First one joint after the other is loosened as far as the yield
-/// allows. Then choices cheaper than the best are visited in the order of their costs (branch and bound). One that is not tighter
-/// in any joint than a choice known to fail fails, too. Of the others, the tightest affordable choice above is evaluated: either
-/// it is a cheaper solution, or it decides all choices below it.
-///
-/// # Errors
-/// No joints or candidates, a cost or yield out of range, no evaluations, or an error of `evaluate`.
-pub fn cheapest_fits<E>(
-    costs: &[Vec<f64>],
+/// What a search is given, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitProblem {
+    /// (candidate, cost) of each joint, loosest first.
+    levels: Vec<Vec<(usize, f64)>>,
     required: RequiredYield,
     most_evaluations: usize,
-    evaluate: impl FnMut(&[usize]) -> Result<Estimate, E>,
-) -> Result<FitSearch, FitSearchError<E>> {
-    if costs.is_empty() {
-        return Err(FitSearchError::NoJoints);
-    }
-    for (joint, costs) in costs.iter().enumerate() {
+}
+
+impl FitProblem {
+    /// `costs` holds the costs of each joint's candidates, **loosest first**. At most `most_evaluations` choices are tried.
+    ///
+    /// # Errors
+    /// No joints or candidates, a cost or yield out of range, or no evaluations.
+    pub fn new(costs: &[Vec<f64>], required: RequiredYield, most_evaluations: usize) -> Result<Self, FitSearchError> {
         if costs.is_empty() {
-            return Err(FitSearchError::NoCandidates { joint });
+            return Err(FitSearchError::NoJoints);
         }
-        let is_cost = |cost: f64| cost.is_finite() && cost >= 0.0;
-        if let Some((candidate, &cost)) = costs.iter().enumerate().find(|(_, cost)| !is_cost(**cost)) {
-            return Err(FitSearchError::Cost { joint, candidate, cost });
+        for (joint, costs) in costs.iter().enumerate() {
+            if costs.is_empty() {
+                return Err(FitSearchError::NoCandidates { joint });
+            }
+            let is_cost = |cost: f64| cost.is_finite() && cost >= 0.0;
+            if let Some((candidate, &cost)) = costs.iter().enumerate().find(|(_, cost)| !is_cost(**cost)) {
+                return Err(FitSearchError::Cost { joint, candidate, cost });
+            }
         }
+        if !(required.fraction > 0.0 && required.fraction <= 1.0) {
+            return Err(FitSearchError::Yield { fraction: required.fraction });
+        }
+        if most_evaluations == 0 {
+            return Err(FitSearchError::NoEvaluations);
+        }
+        let levels = costs.iter().map(|costs| levels(costs)).collect();
+        Ok(Self { levels, required, most_evaluations })
     }
-    if !(required.fraction > 0.0 && required.fraction <= 1.0) {
-        return Err(FitSearchError::Yield { fraction: required.fraction });
+
+    /// Finds the cheapest choice that holds the required yield. `evaluate` estimates the yield of a choice, given as the index
+    /// of each joint's candidate, and is never called twice for a choice.
+    ///
+    /// The search assumes that a tighter fit in any joint never lowers the yield. It holds for a tip error that grows with every
+    /// clearance; with estimates from samples, all choices must share the same random points, or noise breaks it. Where a tighter
+    /// fit moves the centre of a clearance away from its best value, the result is not the optimum.
+    ///
+    /// Candidates that cost as much as a tighter one are left out. First one joint after the other is loosened as far as the
+    /// yield allows. Then choices cheaper than the best are visited in the order of their costs (branch and bound). One that is
+    /// not tighter in any joint than a choice known to fail fails, too. Of the others, the tightest affordable choice above is
+    /// evaluated: either it is a cheaper solution, or it decides all choices below it.
+    ///
+    /// # Errors
+    /// An error of `evaluate`.
+    pub fn solve<E>(&self, evaluate: impl FnMut(&[usize]) -> Result<Estimate, E>) -> Result<FitSearch, E> {
+        let mut search = Search { problem: self, evaluations: 0, evaluate, failed: Vec::new(), best: None };
+        let is_proven = search.run()?;
+        let best = search.best.as_ref().map(|(choice, estimate)| FitChoice {
+            candidates: search.candidates(choice),
+            cost: search.cost(choice),
+            estimate: *estimate,
+        });
+        Ok(FitSearch { best, is_proven, evaluations: search.evaluations })
     }
-    if most_evaluations == 0 {
-        return Err(FitSearchError::NoEvaluations);
-    }
-    let levels = costs.iter().map(|costs| levels(costs)).collect();
-    let mut search =
-        Search { levels, required, most_evaluations, evaluations: 0, evaluate, failed: Vec::new(), best: None };
-    let is_proven = search.run().map_err(FitSearchError::Evaluation)?;
-    let best = search.best.as_ref().map(|(choice, estimate)| FitChoice {
-        candidates: search.candidates(choice),
-        cost: search.cost(choice),
-        estimate: *estimate,
-    });
-    Ok(FitSearch { best, is_proven, evaluations: search.evaluations })
 }
 
 /// (candidate, cost) of the candidates that cost less than every tighter one, loosest and cheapest first.
@@ -144,10 +153,8 @@ fn levels(costs: &[f64]) -> Vec<(usize, f64)> {
     levels
 }
 
-struct Search<F> {
-    levels: Vec<Vec<(usize, f64)>>,
-    required: RequiredYield,
-    most_evaluations: usize,
+struct Search<'a, F> {
+    problem: &'a FitProblem,
     evaluations: usize,
     evaluate: F,
     /// Choices known to fail, none of them below another.
@@ -162,15 +169,15 @@ struct Node {
     open: usize,
 }
 
-impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
+impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<'_, F> {
     /// Whether the result is proven.
     fn run(&mut self) -> Result<bool, E> {
-        let tightest: Vec<usize> = self.levels.iter().map(|levels| levels.len() - 1).collect();
+        let tightest: Vec<usize> = self.problem.levels.iter().map(|levels| levels.len() - 1).collect();
         match self.holds(&tightest)? {
             Some(true) => self.loosen(tightest)?,
             _ => return Ok(true),
         }
-        let loosest = vec![0; self.levels.len()];
+        let loosest = vec![0; self.problem.levels.len()];
         let mut nodes = BinaryHeap::from([Node { cost: self.cost(&loosest), choice: loosest, open: 0 }]);
         let mut visited = 0;
         while let Some(node) = nodes.pop() {
@@ -187,7 +194,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
                 }
             }
             for joint in node.open..node.choice.len() {
-                if node.choice[joint] + 1 < self.levels[joint].len() {
+                if node.choice[joint] + 1 < self.problem.levels[joint].len() {
                     let mut choice = node.choice.clone();
                     choice[joint] += 1;
                     let cost = self.cost(&choice);
@@ -201,11 +208,11 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
     }
 
     fn candidates(&self, choice: &[usize]) -> Vec<usize> {
-        self.levels.iter().zip(choice).map(|(levels, &level)| levels[level].0).collect()
+        self.problem.levels.iter().zip(choice).map(|(levels, &level)| levels[level].0).collect()
     }
 
     fn cost(&self, choice: &[usize]) -> f64 {
-        self.levels.iter().zip(choice).map(|(levels, &level)| levels[level].1).sum()
+        self.problem.levels.iter().zip(choice).map(|(levels, &level)| levels[level].1).sum()
     }
 
     fn best_cost(&self) -> f64 {
@@ -221,13 +228,13 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
         if self.is_known_to_fail(choice) {
             return Ok(Some(false));
         }
-        if self.evaluations == self.most_evaluations {
+        if self.evaluations == self.problem.most_evaluations {
             return Ok(None);
         }
         self.evaluations += 1;
         let candidates = self.candidates(choice);
         let estimate = (self.evaluate)(&candidates)?;
-        let is_held = self.required.is_held(estimate);
+        let is_held = self.problem.required.is_held(estimate);
         if !is_held {
             self.failed.retain(|failed| failed.iter().zip(choice).any(|(failed, own)| failed > own));
             self.failed.push(choice.to_vec());
@@ -239,7 +246,7 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
 
     /// Loosens one joint after the other of a choice that holds the yield, by bisection, the one with the largest saving first.
     fn loosen(&mut self, mut choice: Vec<usize>) -> Result<(), E> {
-        let saving = |joint: usize| self.levels[joint][choice[joint]].1 - self.levels[joint][0].1;
+        let saving = |joint: usize| self.problem.levels[joint][choice[joint]].1 - self.problem.levels[joint][0].1;
         let mut joints: Vec<(usize, f64)> = (0..choice.len()).map(|joint| (joint, saving(joint))).collect();
         joints.sort_by(|a, b| b.1.total_cmp(&a.1));
         for (joint, _) in joints {
@@ -262,11 +269,12 @@ impl<E, F: FnMut(&[usize]) -> Result<Estimate, E>> Search<F> {
     fn tightest_affordable(&self, choice: &[usize]) -> Vec<usize> {
         let mut above = choice.to_vec();
         loop {
-            let next = (0..above.len()).filter(|&joint| above[joint] + 1 < self.levels[joint].len()).map(|joint| {
-                let mut next = above.clone();
-                next[joint] += 1;
-                (self.cost(&next), next)
-            });
+            let next =
+                (0..above.len()).filter(|&joint| above[joint] + 1 < self.problem.levels[joint].len()).map(|joint| {
+                    let mut next = above.clone();
+                    next[joint] += 1;
+                    (self.cost(&next), next)
+                });
             match next.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((cost, next)) if cost < self.best_cost() => above = next,
                 _ => return above,
@@ -348,7 +356,7 @@ mod tests {
 
     fn search(stack: &Stack, required: RequiredYield, most: usize) -> FitSearch {
         let mut seen = Vec::new();
-        let found = cheapest_fits(&stack.costs, required, most, |choice| {
+        let found = FitProblem::new(&stack.costs, required, most).unwrap().solve(|choice| {
             assert!(!seen.contains(&choice.to_vec()), "{choice:?} is evaluated twice");
             seen.push(choice.to_vec());
             Ok::<_, String>(stack.yield_of(choice))
@@ -411,7 +419,7 @@ mod tests {
             Ok::<_, String>(Estimate { value, low: value, high: value })
         };
         let required = RequiredYield { fraction: 0.5, with_confidence: false };
-        let found = cheapest_fits(&costs, required, 1000, estimate).unwrap();
+        let found = FitProblem::new(&costs, required, 1000).unwrap().solve(estimate).unwrap();
         assert_eq!(found.best.unwrap().cost, 15.0);
         assert!(found.is_proven && found.evaluations < 66 + 50, "{}", found.evaluations);
     }
@@ -419,10 +427,10 @@ mod tests {
     #[test]
     fn bad_input_is_refused_and_errors_are_passed_on() {
         let required = RequiredYield { fraction: 0.9, with_confidence: false };
-        let failing = |costs: &[Vec<f64>], required, most| {
-            cheapest_fits(costs, required, most, |_| Err("diverged".to_owned())).unwrap_err().to_string()
-        };
-        assert_eq!(failing(&[vec![1.0]], required, 9), "diverged");
+        let failing =
+            |costs: &[Vec<f64>], required, most| FitProblem::new(costs, required, most).unwrap_err().to_string();
+        let problem = FitProblem::new(&[vec![1.0]], required, 9).unwrap();
+        assert_eq!(problem.solve(|_| Err("diverged")), Err("diverged"));
         assert_eq!(failing(&[], required, 9), "no joints to choose fits for");
         assert_eq!(failing(&[vec![1.0], vec![]], required, 9), "joint 1 has no candidate fits");
         let cost = failing(&[vec![1.0, f64::NAN]], required, 9);

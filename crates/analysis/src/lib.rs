@@ -40,6 +40,8 @@
 //! ```
 
 pub mod alone_task;
+pub mod argument;
+pub mod assembly;
 pub mod axis;
 pub mod beginning;
 mod cost;

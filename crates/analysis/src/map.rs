@@ -59,11 +59,12 @@ impl WorkspaceMap {
         let axes = over.iter().map(|text| Axis::parse_over(&scene, text)).collect::<Result<Vec<_>, _>>()?;
         let design = Design::crossed(&scene, axes, &[Start::Cold])?;
         if design.points() > MOST_ERRORS / directions {
-            return Err(RangeError::Together(format!(
+            let what = format!(
                 "{} points with {directions} directions each are more than a map holds ({MOST_ERRORS} errors): fewer values in \
                  --over, or fewer --directions",
                 design.points()
-            )));
+            );
+            return Err(RangeError::Together(None, what));
         }
         Ok(Self { scene, design, directions })
     }

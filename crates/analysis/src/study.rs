@@ -1,23 +1,42 @@
-//! Studies of uncertain parameters: the parameters that vary ([`Input`]), the numbers that a run is reduced to ([`Output`]), and the
-//! runs at given values ([`StudyRuns`]). The caller schedules the runs, as it does those of any [`Sweep`].
+//! Studies of uncertain parameters: the parameters that vary ([`Input`]), the numbers that a run is reduced to ([`Output`]), the
+//! runs at given values ([`StudyRuns`]), and what follows from them ([`sensitivity()`], [`tolerance()`]). The caller schedules the
+//! runs, as it does those of any [`Sweep`].
 
 mod alone;
+mod candidates;
 mod inputs;
 mod outputs;
+mod runner;
+mod sensitivity;
+mod target;
+mod tolerance;
 
-pub use alone::{Alone, ENDS};
+pub use alone::{Alone, AloneOutputs, ENDS};
+pub use candidates::{Candidate, CandidateRequest, Candidates, candidates};
 pub use inputs::{Input, Uncertainty, inputs, matching};
 pub use outputs::{NAMED, NamedOutput, Output, outputs};
+pub use runner::StudyRunner;
+pub use sensitivity::{Screening, Sensitivity, SensitivityOptions, sensitivity};
+pub use target::{Change, TargetAnswer};
+pub use tolerance::{CheapestFits, FitOptions, FitVerdict, Tolerance, ToleranceOptions, tolerance};
+
+use std::fmt::{Display, Formatter};
 
 use serde::{Deserialize, Serialize};
 
+use crate::argument::Argument;
 use crate::axis::RangeError;
 use crate::design::{Design, Start};
 use crate::distribution::DistributionError;
 use crate::drive::common_period;
+use crate::fits::FitSearchError;
+use crate::indices::{IndicesError, LEAST_ROWS};
+use crate::morris::MorrisError;
 use crate::point::{Protocol, Span};
+use crate::sampling::SamplingError;
 use crate::statistic::StatisticError;
 use crate::sweep::{Sweep, SweepError};
+use crate::yields::YieldsError;
 use jointplay_scene::{Scene, SceneError, Value, ValueError};
 
 /// Observed periods of a driven scene, and time of another, s, if no duration is given.
@@ -28,7 +47,7 @@ const UNDRIVEN: f64 = 1.0;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StudyError {
     /// One of the requested parameters.
-    #[error("{place}: {error}")]
+    #[error(fmt = at)]
     At {
         /// Option, or file with line.
         place: String,
@@ -111,6 +130,76 @@ pub enum StudyError {
     /// Runs that define no sweep.
     #[error(transparent)]
     Sweep(#[from] SweepError),
+    /// A number that an argument does not accept.
+    #[error(fmt = of_argument)]
+    Argument {
+        /// The argument.
+        argument: Argument,
+        /// The number.
+        value: usize,
+        /// What is wrong.
+        error: Box<Self>,
+    },
+    /// Fewer rows than indices need.
+    #[error("allowed at least {LEAST_ROWS}, or 0 for no indices")]
+    TooFewRows,
+    /// No design for indices.
+    #[error(transparent)]
+    Indices(#[from] IndicesError),
+    /// No screening.
+    #[error(transparent)]
+    Screening(#[from] MorrisError),
+    /// No sample.
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    /// No statistics of a lot.
+    #[error(transparent)]
+    Yields(#[from] YieldsError),
+    /// A candidate without a cost.
+    #[error("expected a cost, a finite number of at least 0")]
+    NoCost,
+    /// A candidate for a parameter that does not vary.
+    #[error("give the parameter a distribution of its own, too")]
+    NoDistribution,
+    /// Candidates in the wrong order.
+    #[error(
+        "{text} is wider than the candidate before it; list the candidates of a parameter from the loosest to the tightest"
+    )]
+    Wider {
+        /// The later one, as written.
+        text: String,
+    },
+    /// No search of the cheapest fits.
+    #[error(fmt = of_fits)]
+    Fits(FitSearchError),
+}
+
+fn at(place: &str, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
+    write!(f, "{place}: ")?;
+    error.fmt(f)
+}
+
+fn of_argument(argument: &Argument, value: &usize, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
+    argument.write(value, f)?;
+    f.write_str(": ")?;
+    error.fmt(f)
+}
+
+fn of_fits(error: &FitSearchError, f: &mut Formatter<'_>) -> std::fmt::Result {
+    Argument::Cost.fmt(f)?;
+    write!(f, ": {error}")
+}
+
+impl StudyError {
+    /// The same, with the place at fault.
+    pub(crate) fn at(self, place: &str) -> Self {
+        Self::At { place: place.to_owned(), error: Box::new(self) }
+    }
+
+    /// Of the number `value` that `argument` gives.
+    fn argument(argument: Argument, value: usize, error: impl Into<Self>) -> Self {
+        Self::Argument { argument, value, error: Box::new(error.into()) }
+    }
 }
 
 impl From<SceneError> for StudyError {

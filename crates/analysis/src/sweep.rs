@@ -1,6 +1,9 @@
 //! A whole sweep: its scene, its points, and the computation of one block of them. The caller schedules the blocks: the records
 //! of a block depend only on the sweep and the block number.
 
+use std::fmt::{Display as _, Formatter};
+
+use super::argument::Argument;
 use super::design::{Design, Start};
 use super::drive::{NoPeriod, ObservedRun};
 use super::layout::Layout;
@@ -15,12 +18,10 @@ const MOST_SECTIONS: usize = 1 << 26;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
     /// No kept periods.
-    #[error(
-        "{option} {all} --discard {discard}: they include those discarded, so --discard must be less than {option}"
-    )]
+    #[error(fmt = nothing_kept)]
     NothingKept {
-        /// Option with the number of periods or crossings.
-        option: &'static str,
+        /// Which of the two is counted.
+        counted: Argument,
         /// Periods or crossings.
         all: usize,
         /// Discarded ones.
@@ -28,8 +29,8 @@ pub enum SweepError {
     },
     /// More numbers than a result can hold.
     #[error(
-        "{points} points with {kept} kept sections each are more than a result holds ({most} sections): fewer values in \
-         --vary, fewer --periods, or more of them in --discard"
+        "{points} points with {kept} kept sections each are more than a result holds ({most} sections): vary fewer values, keep \
+         fewer periods, or discard more of them"
     )]
     TooLarge {
         /// Points.
@@ -40,10 +41,7 @@ pub enum SweepError {
         most: usize,
     },
     /// Longer than the longest allowed run.
-    #[error(
-        "--periods {periods}: at {point} the longest run allowed, {LONGEST_RUN:e} s, covers {most} periods of \
-             {period} s"
-    )]
+    #[error(fmt = too_long)]
     TooLong {
         /// Periods.
         periods: usize,
@@ -65,6 +63,21 @@ pub enum SweepError {
         /// What is wrong there.
         error: Box<SceneError>,
     },
+}
+
+fn nothing_kept(counted: &Argument, all: &usize, discard: &usize, f: &mut Formatter<'_>) -> std::fmt::Result {
+    counted.write(all, f)?;
+    f.write_str(if f.alternate() { ", " } else { " " })?;
+    Argument::Discard.write(discard, f)?;
+    f.write_str(": they include those discarded, so ")?;
+    Argument::Discard.fmt(f)?;
+    f.write_str(" must be less than ")?;
+    counted.fmt(f)
+}
+
+fn too_long(periods: &usize, point: &str, period: &f64, most: &usize, f: &mut Formatter<'_>) -> std::fmt::Result {
+    Argument::Periods.write(periods, f)?;
+    write!(f, ": at {point} the longest run allowed, {LONGEST_RUN:e} s, covers {most} periods of {period} s")
 }
 
 /// A sweep.
@@ -96,8 +109,8 @@ impl Sweep {
         let protocol = protocol.into();
         if let Some((all, discard)) = protocol.sections() {
             if discard >= all {
-                let option = if protocol.plan().is_some() { "--periods" } else { "--crossings" };
-                return Err(SweepError::NothingKept { option, all, discard });
+                let counted = if protocol.plan().is_some() { Argument::Periods } else { Argument::Crossings };
+                return Err(SweepError::NothingKept { counted, all, discard });
             }
             let (points, kept) = (design.points(), protocol.kept());
             if kept > MOST_SECTIONS / points {

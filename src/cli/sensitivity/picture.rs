@@ -1,6 +1,6 @@
 //! Tornado of each parameter alone, and its indices, for every output.
 
-use super::Found;
+use crate::analysis::study::{Sensitivity, StudyRunner as _};
 use crate::chart::{Axis, Chart, Colour, PALETTE, Series, Sheet};
 use crate::cli::study::{Study, drawn};
 
@@ -21,7 +21,7 @@ const ASIDE: f64 = 0.5 * HALF / ROW as f64;
 const ENDS: [(Colour, &str); 2] = [(PALETTE[1], "lower end of the range"), (PALETTE[5], "upper end")];
 
 /// Two charts side by side for each output.
-pub fn sheet(study: &Study, found: &Found) -> Sheet {
+pub fn sheet(study: &Study, found: &Sensitivity) -> Sheet {
     let outputs = study.outputs().len();
     let mut charts = Vec::new();
     let drawn = study.inputs().len().min(MOST) as u32;
@@ -45,7 +45,7 @@ pub fn sheet(study: &Study, found: &Found) -> Sheet {
 }
 
 /// Parameters with the largest effects alone on output `o`, the largest first.
-fn order(found: &Found, o: usize) -> Vec<usize> {
+fn order(found: &Sensitivity, o: usize) -> Vec<usize> {
     let spread = |i: usize| {
         let [(_, low), (_, high)] = &found.alone.ends[i];
         let nominal = found.alone.nominal[o];
@@ -59,7 +59,7 @@ fn order(found: &Found, o: usize) -> Vec<usize> {
 }
 
 /// A bar from the value of the scene to that at each end of a parameter's range, side by side where both are on the same side of it.
-fn tornado(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
+fn tornado(study: &Study, found: &Sensitivity, o: usize, order: &[usize]) -> Chart {
     let output = &study.outputs()[o];
     let scaled = |value: f64| drawn(value, output.unit).0;
     let nominal = scaled(found.alone.nominal[o]);
@@ -80,7 +80,7 @@ fn tornado(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
 }
 
 /// Bars of the indices, with their intervals as lines.
-fn indices(study: &Study, found: &Found, o: usize, order: &[usize]) -> Chart {
+fn indices(study: &Study, found: &Sensitivity, o: usize, order: &[usize]) -> Chart {
     let mut series = Vec::new();
     let mut labelled = false;
     if let Some(Ok(indices)) = &found.indices[o] {

@@ -4,9 +4,8 @@ use std::path::Path;
 
 use serde_json::{Map, Value as Json, json};
 
-use super::target::{Answer, Change};
-use super::{Found, picture};
-use crate::analysis::study::{Input, Output};
+use super::picture;
+use crate::analysis::study::{Change, Input, Output, Sensitivity, StudyRunner as _, TargetAnswer};
 use crate::analysis::yields::Estimate;
 use crate::cli::Failure;
 use crate::cli::args::SensitivityArguments;
@@ -20,7 +19,7 @@ use crate::files::Folder;
 pub fn fill(
     folder: &Folder,
     study: &Study,
-    found: &Found,
+    found: &Sensitivity,
     arguments: &SensitivityArguments,
 ) -> Result<Map<String, Json>, Failure> {
     let mut meta = study.meta();
@@ -48,7 +47,7 @@ fn interval(estimate: Option<&Estimate>) -> String {
 }
 
 /// For a terminal.
-pub fn text(study: &Study, found: &Found, out: &Path) -> String {
+pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
     let mut text = format!(
         "Scene             {}: runs of {}\nRuns              {}\n",
         study.scene().name,
@@ -118,11 +117,11 @@ pub fn text(study: &Study, found: &Found, out: &Path) -> String {
 }
 
 /// Row of parameter `i` in the table of output `o`, of which `cell` writes a value.
-fn line(study: &Study, found: &Found, o: usize, i: usize, cell: &impl Fn(&[f64]) -> String) -> Vec<String> {
+fn line(study: &Study, found: &Sensitivity, o: usize, i: usize, cell: &impl Fn(&[f64]) -> String) -> Vec<String> {
     let input = &study.inputs()[i];
     let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
-    let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
-    let at = found.kept.iter().position(|&kept| kept == i);
+    let indices = found.indices_of(o);
+    let at = found.place_of(i);
     let [first, total] = match (indices, at) {
         (Some(indices), Some(at)) => [Some(&indices.first[at]), Some(&indices.total[at])],
         _ => [None, None],
@@ -139,7 +138,7 @@ fn line(study: &Study, found: &Found, o: usize, i: usize, cell: &impl Fn(&[f64])
 }
 
 /// The answer to `--target` in words.
-fn sentence(study: &Study, answer: &Answer) -> String {
+fn sentence(study: &Study, answer: &TargetAnswer) -> String {
     let output = &study.outputs()[0];
     let goal = format!("{} of at most {}", output.name, shown(answer.target, output.unit));
     let change = |change: &Change| {
@@ -170,12 +169,12 @@ fn sentence(study: &Study, answer: &Answer) -> String {
 }
 
 /// Everything but the runs, SI.
-pub fn json(study: &Study, found: &Found) -> Json {
+pub fn json(study: &Study, found: &Sensitivity) -> Json {
     let of_output = |(o, output): (usize, &Output)| {
-        let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
+        let indices = found.indices_of(o);
         let of_input = |(i, input): (usize, &Input)| {
             let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
-            let at = found.kept.iter().position(|&kept| kept == i);
+            let at = found.place_of(i);
             let own = indices.zip(at);
             json!({
                 "key": input.key,
@@ -228,20 +227,21 @@ pub fn json(study: &Study, found: &Found) -> Json {
 }
 
 /// One row per output and parameter, SI.
-fn table(study: &Study, found: &Found) -> String {
+fn table(study: &Study, found: &Sensitivity) -> String {
     let mut out = String::from(
-        "output,unit,parameter,low,high,alone_low,alone_high,first_order,first_order_low,first_order_high,total,total_low,total_high\n",
+        "output,unit,parameter,parameter_unit,low,high,alone_low,alone_high,first_order,first_order_low,first_order_high,total,total_low,total_high\n",
     );
     for (o, output) in study.outputs().iter().enumerate() {
-        let indices = found.indices[o].as_ref().and_then(|indices| indices.as_ref().ok());
+        let indices = found.indices_of(o);
         for (i, input) in study.inputs().iter().enumerate() {
             let [(low, at_low), (high, at_high)] = &found.alone.ends[i];
-            let own = indices.zip(found.kept.iter().position(|&kept| kept == i));
+            let own = indices.zip(found.place_of(i));
             let both = own.map_or([None, None], |(indices, at)| [Some(indices.first[at]), Some(indices.total[at])]);
             let estimates = both.into_iter().flat_map(|e| e.map_or([f64::NAN; 3], |e| [e.value, e.low, e.high]));
             let numbers = [*low, *high, at_low[o], at_high[o]].into_iter().chain(estimates);
             let cells: Vec<String> = numbers.map(|value| significant(value, 12)).collect();
-            out += &format!("{},{},{},{}\n", quoted(&output.name), output.unit, quoted(&input.key), cells.join(","));
+            let heads = [quoted(&output.name), output.unit.to_owned(), quoted(&input.key), input.si_unit.to_owned()];
+            out += &format!("{},{}\n", heads.join(","), cells.join(","));
         }
     }
     out

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use super::args::StudyArguments;
 use super::sweep::{Partial, Source as _, compute, meta};
 use super::{Failure, interrupt, progress, quantity, start, threads, warn};
-use crate::analysis::study::{self, Input, Output, RunSpan, StudyError, StudyRuns, Uncertainty};
+use crate::analysis::study::{self, Input, Output, RunSpan, StudyError, StudyRunner, StudyRuns, Uncertainty};
 use crate::scene::Scene;
 use crate::units::format_quantity;
 
@@ -111,16 +111,6 @@ impl Study {
         &self.scene
     }
 
-    /// Varied parameters.
-    pub fn inputs(&self) -> &[Input] {
-        &self.inputs
-    }
-
-    /// Kept numbers.
-    pub fn outputs(&self) -> &[Output] {
-        &self.outputs
-    }
-
     /// All runs so far, in order.
     pub fn runs(&self) -> &[Run] {
         &self.runs
@@ -131,12 +121,32 @@ impl Study {
         self.span
     }
 
-    /// The outputs at each of `rows`, which give every input a value, SI. NaN where a run does not start or diverges. `stage`
-    /// names the runs for the user, and the file from which an interrupted command resumes.
-    ///
-    /// # Errors
-    /// A row that the scene does not accept; Ctrl-C; the file system.
-    pub fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Failure> {
+    /// Removes the files of the finished stages, once the results are written.
+    pub fn finish(self) {
+        self.partials.into_iter().for_each(Partial::remove);
+    }
+
+    /// One line about the runs.
+    pub fn describe(&self) -> String {
+        let RunSpan { duration, from } = self.span;
+        let observed = format_quantity(duration, "s");
+        if from > 0.0 { format!("{observed}, observed from {} on", format_quantity(from, "s")) } else { observed }
+    }
+}
+
+impl StudyRunner for Study {
+    type Error = Failure;
+
+    fn inputs(&self) -> &[Input] {
+        &self.inputs
+    }
+
+    fn outputs(&self) -> &[Output] {
+        &self.outputs
+    }
+
+    /// `stage` also names the file from which an interrupted command resumes. Fails with Ctrl-C and the file system, too.
+    fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Failure> {
         let keys: Vec<String> = self.inputs.iter().map(|input| input.key.clone()).collect();
         let study = StudyRuns::new(&self.scene, &keys, &self.outputs, self.span, &rows)?;
         let sweep = study.sweep();
@@ -176,17 +186,5 @@ impl Study {
             outputs: outputs.clone(),
         }));
         Ok(results)
-    }
-
-    /// Removes the files of the finished stages, once the results are written.
-    pub fn finish(self) {
-        self.partials.into_iter().for_each(Partial::remove);
-    }
-
-    /// One line about the runs.
-    pub fn describe(&self) -> String {
-        let RunSpan { duration, from } = self.span;
-        let observed = format_quantity(duration, "s");
-        if from > 0.0 { format!("{observed}, observed from {} on", format_quantity(from, "s")) } else { observed }
     }
 }

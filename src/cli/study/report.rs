@@ -3,7 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::Study;
-use crate::analysis::study::{Input, RunSpan};
+use crate::analysis::study::{Input, RunSpan, StudyRunner as _};
 use crate::analysis::yields::Estimate;
 use crate::chart::{Sheet, SheetError};
 use crate::cli::output::significant;
@@ -112,12 +112,13 @@ impl Study {
 
     /// All runs as CSV, SI.
     fn table(&self) -> String {
-        let keys = self.inputs().iter().map(|input| quoted(&input.key));
-        let outputs = self.outputs().iter().map(|output| {
-            let unit = if output.unit.is_empty() { String::new() } else { format!(" ({})", output.unit) };
-            quoted(&format!("{}{unit}", output.name))
+        let inputs = self.inputs().iter().map(|input| (&input.key, input.si_unit));
+        let columns = inputs.chain(self.outputs().iter().map(|output| (&output.name, output.unit)));
+        let columns = columns.map(|(name, unit)| {
+            let unit = if unit.is_empty() { String::new() } else { format!(" ({unit})") };
+            quoted(&format!("{name}{unit}"))
         });
-        let heads: Vec<String> = ["stage".to_owned()].into_iter().chain(keys).chain(outputs).collect();
+        let heads: Vec<String> = ["stage".to_owned()].into_iter().chain(columns).collect();
         let mut out = heads.join(",") + "\n";
         for run in self.runs() {
             let cells: Vec<String> =

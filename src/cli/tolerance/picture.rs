@@ -1,6 +1,7 @@
 //! Distribution function of each limited output, with its limits.
 
 use crate::analysis::lot::{Limit, Lot};
+use crate::analysis::study::StudyRunner as _;
 use crate::chart::{Axis, Chart, PALETTE, Series, Sheet};
 use crate::cli::study::{Study, drawn};
 

@@ -3,9 +3,8 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::limit::describe;
-use super::{Cheapest, Found};
 use crate::analysis::lot::{Limit, PERCENTILES, Quality};
-use crate::analysis::study::Output;
+use crate::analysis::study::{CheapestFits, FitVerdict, Output, StudyRunner as _, Tolerance};
 use crate::analysis::yields::{Estimate, RejectDriver};
 use crate::cli::args::ToleranceArguments;
 use crate::cli::output::significant;
@@ -56,7 +55,7 @@ fn statistics(output: &Output, quality: &Quality) -> Vec<Statistic> {
 }
 
 /// Number of units of the lot that did not start, or diverged.
-fn without_result(found: &Found) -> usize {
+fn without_result(found: &Tolerance) -> usize {
     found.lot.outputs.iter().filter(|outputs| outputs.iter().any(|value| !value.is_finite())).count()
 }
 
@@ -68,7 +67,7 @@ fn order(drivers: &[RejectDriver]) -> Vec<usize> {
 }
 
 /// For a terminal.
-pub fn text(study: &Study, limits: &[Limit], found: &Found, arguments: &ToleranceArguments) -> String {
+pub fn text(study: &Study, limits: &[Limit], found: &Tolerance, arguments: &ToleranceArguments) -> String {
     let units = found.lot.accepted.len();
     let rejects = found.lot.accepted.iter().filter(|accepted| !**accepted).count();
     let mut text = format!(
@@ -117,7 +116,7 @@ pub fn text(study: &Study, limits: &[Limit], found: &Found, arguments: &Toleranc
         None => "\nNothing but rejects: what drives them cannot be told\n".to_owned(),
     };
     if let Some(cheapest) = &found.cheapest {
-        text += &fits(study, cheapest, arguments);
+        text += &fits(study, cheapest);
     }
     text + &format!(
         "\nWritten           {}\nVersion           jointplay {}\n",
@@ -131,8 +130,8 @@ fn p_value(p: f64) -> String {
 }
 
 /// The cheapest fits in words.
-fn fits(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> String {
-    let required = percent(arguments.required_yield);
+fn fits(study: &Study, cheapest: &CheapestFits) -> String {
+    let required = percent(cheapest.options.required_yield);
     let search = &cheapest.search;
     let effort = count(search.evaluations as u64, "choice");
     let mut text = String::new();
@@ -144,10 +143,10 @@ fn fits(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> S
             let proof = if search.is_proven {
                 "proven the cheapest if a tighter fit never lowers the yield".to_owned()
             } else {
-                format!("not proven the cheapest: --evaluations {} ended the search", arguments.evaluations)
+                format!("not proven the cheapest: --evaluations {} ended the search", cheapest.options.evaluations)
             };
             text += &format!("\nFits for a yield of {required}: cost {}, {proof}; {effort} tried\n", best.cost);
-            let rows = cheapest.candidates.iter().zip(&best.candidates).map(|(of, &chosen)| {
+            let rows = cheapest.options.candidates.iter().zip(&best.candidates).map(|(of, &chosen)| {
                 let one = &of.list[chosen];
                 vec![study.inputs()[of.input].key.clone(), one.text.clone(), one.cost.to_string()]
             });
@@ -155,11 +154,15 @@ fn fits(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> S
             text += &format!("Yield {} in the lot of the search\n", with_interval(&best.estimate));
         }
     }
-    if let Some(check) = &cheapest.check {
-        text +=
-            &format!("Yield {} in another lot: {}\n", with_interval(check), verdict(check, arguments.required_yield).1);
+    if let Some((check, verdict)) = &cheapest.check {
+        let verdict = match verdict {
+            FitVerdict::Held => "it holds",
+            FitVerdict::Missed => "it does not hold",
+            FitVerdict::Open => "too few runs to tell whether it holds",
+        };
+        text += &format!("Yield {} in another lot: {verdict}\n", with_interval(check));
     }
-    for of in cheapest.candidates.iter().filter(|of| !of.is_ordered()) {
+    for of in cheapest.options.candidates.iter().filter(|of| !of.is_ordered()) {
         text += &format!(
             "The order of the candidates of {} is not checked: a distribution without limits has no width\n",
             study.inputs()[of.input].key
@@ -168,19 +171,8 @@ fn fits(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> S
     text
 }
 
-/// What another lot says about a required yield: a word and a sentence.
-fn verdict(check: &Estimate, required: f64) -> (&'static str, &'static str) {
-    if check.low >= required {
-        ("held", "it holds")
-    } else if check.high < required {
-        ("missed", "it does not hold")
-    } else {
-        ("open", "too few runs to tell whether it holds")
-    }
-}
-
 /// Everything but the runs, SI.
-pub fn json(study: &Study, limits: &[Limit], found: &Found, arguments: &ToleranceArguments) -> Json {
+pub fn json(study: &Study, limits: &[Limit], found: &Tolerance) -> Json {
     let of_output = |((output, limit), quality): ((&Output, &Limit), &Quality)| {
         let mut all = Map::new();
         all.insert("name".into(), json!(output.name));
@@ -215,34 +207,35 @@ pub fn json(study: &Study, limits: &[Limit], found: &Found, arguments: &Toleranc
         "yield": estimate(&found.lot.yielded),
         "outputs": outputs.collect::<Vec<_>>(),
         "reject_drivers": drivers,
-        "fits": found.cheapest.as_ref().map(|cheapest| fits_json(study, cheapest, arguments)),
+        "fits": found.cheapest.as_ref().map(|cheapest| fits_json(study, cheapest)),
         "runs": study.runs().len(),
     })
 }
 
-fn fits_json(study: &Study, cheapest: &Cheapest, arguments: &ToleranceArguments) -> Json {
+fn fits_json(study: &Study, cheapest: &CheapestFits) -> Json {
     let best = cheapest.search.best.as_ref().map(|best| {
-        let fits = cheapest.candidates.iter().zip(&best.candidates).map(|(of, &chosen)| {
+        let fits = cheapest.options.candidates.iter().zip(&best.candidates).map(|(of, &chosen)| {
             let one = &of.list[chosen];
             json!({"key": study.inputs()[of.input].key, "fit": one.text, "cost": one.cost})
         });
         json!({"cost": best.cost, "fits": fits.collect::<Vec<_>>(), "yield": estimate(&best.estimate)})
     });
-    let unchecked = cheapest.candidates.iter().filter(|of| !of.is_ordered()).map(|of| &study.inputs()[of.input].key);
+    let unchecked =
+        cheapest.options.candidates.iter().filter(|of| !of.is_ordered()).map(|of| &study.inputs()[of.input].key);
     json!({
-        "required_yield": arguments.required_yield,
+        "required_yield": cheapest.options.required_yield,
         "best": best,
         "is_proven": cheapest.search.is_proven,
         "evaluations": cheapest.search.evaluations,
-        "check": cheapest.check.as_ref().map(|check| {
-            json!({"yield": estimate(check), "verdict": verdict(check, arguments.required_yield).0})
+        "check": cheapest.check.as_ref().map(|(check, verdict)| {
+            json!({"yield": estimate(check), "verdict": verdict.word()})
         }),
         "order_not_checked": unchecked.collect::<Vec<_>>(),
     })
 }
 
 /// One row per output and statistic, SI.
-pub fn table(study: &Study, limits: &[Limit], found: &Found) -> String {
+pub fn table(study: &Study, limits: &[Limit], found: &Tolerance) -> String {
     let mut out = String::from("output,unit,lower,upper,statistic,value,low,high\n");
     let cell = |value: f64| significant(value, 12);
     let mut line = |heads: &str, name: &str, value: &Estimate| {

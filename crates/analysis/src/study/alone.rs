@@ -2,6 +2,7 @@
 
 use super::StudyError;
 use super::inputs::{Input, check_count, check_end, real_parameter};
+use super::runner::StudyRunner;
 use crate::distribution::Distribution;
 use jointplay_scene::Scene;
 
@@ -42,7 +43,7 @@ impl Alone {
                 check_end(parameter, *high)?;
                 Ok(nominal)
             };
-            checked().map_err(|error| StudyError::At { place: key.clone(), error: Box::new(error) })
+            checked().map_err(|error: StudyError| error.at(key))
         });
         Ok(Self { nominal: nominal.collect::<Result<_, _>>()?, ends: ranges.iter().map(|(_, ends)| *ends).collect() })
     }
@@ -68,5 +69,33 @@ impl Alone {
             }
         }
         rows
+    }
+}
+
+/// Outputs of a study with one parameter at an end of its distribution and the others at their values in the scene, SI.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AloneOutputs {
+    /// With the values of the scene.
+    pub nominal: Vec<f64>,
+    /// For each parameter the values at its ends, and the outputs there.
+    pub ends: Vec<[(f64, Vec<f64>); 2]>,
+    /// With all parameters at their lower, or upper, ends.
+    pub together: [Vec<f64>; 2],
+}
+
+impl AloneOutputs {
+    /// Makes the runs.
+    ///
+    /// # Errors
+    /// As [`StudyRunner::run`].
+    pub(super) fn find<R: StudyRunner>(runner: &mut R) -> Result<Self, R::Error> {
+        let plan = Alone::new(runner.inputs());
+        let mut rows = plan.rows();
+        rows.extend([0, 1].map(|end| plan.ends().iter().map(|own| own[end]).collect()));
+        let mut results = runner.run("alone", rows)?.into_iter();
+        let mut next = || results.next().unwrap_or_default();
+        let nominal = next();
+        let ends = plan.ends().iter().map(|own| own.map(|end| (end, next()))).collect();
+        Ok(Self { nominal, ends, together: [next(), next()] })
     }
 }

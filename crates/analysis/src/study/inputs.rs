@@ -5,7 +5,7 @@ use crate::distribution::Distribution;
 use crate::iso286::{Fit, FitError};
 use jointplay_physics::simulate::matches_pattern;
 use jointplay_physics::suggest::nearest;
-use jointplay_physics::units::{QuantityError, parse_quantity};
+use jointplay_physics::units::{QuantityError, parse_quantity, si_unit};
 use jointplay_scene::{Kind, Parameter, Scene, Value, ValueError, ValueFault, contact_parts};
 
 /// Range of an input without one of its own, over its value in the scene.
@@ -33,6 +33,8 @@ pub struct Input {
     pub key: String,
     /// Unit in which it is shown.
     pub unit: &'static str,
+    /// SI unit.
+    pub si_unit: &'static str,
     /// Value in the scene, SI.
     pub nominal: f64,
     /// Distribution, SI.
@@ -57,10 +59,9 @@ impl Uncertainty {
 pub fn inputs(scene: &Scene, requested: &[Uncertainty]) -> Result<Vec<Input>, StudyError> {
     let mut inputs: Vec<Input> = Vec::new();
     for Uncertainty { place, pattern, distribution } in requested {
-        let at = |place: &str, error| StudyError::At { place: place.to_owned(), error: Box::new(error) };
-        for key in matching(scene, pattern).map_err(|error| at(place, error))? {
+        for key in matching(scene, pattern).map_err(|error| error.at(place))? {
             let input = Input::new(scene, &key, distribution.as_deref());
-            let input = input.map_err(|error| at(place, at(&key, error)))?;
+            let input = input.map_err(|error| error.at(&key).at(place))?;
             match inputs.iter_mut().find(|known| known.key == key) {
                 // A later one refines an earlier pattern.
                 Some(known) => *known = input,
@@ -153,7 +154,11 @@ impl Input {
         for end in [low, distribution.quantile(0.5), high].into_iter().filter(|end| end.is_finite()) {
             check_end(parameter, end)?;
         }
-        Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), nominal, distribution })
+        let si_unit = match parameter.kind {
+            Kind::Number { dimension, .. } => si_unit(dimension),
+            _ => "",
+        };
+        Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), si_unit, nominal, distribution })
     }
 
     /// Its value at the fraction `u` of all values, 0 < u < 1.

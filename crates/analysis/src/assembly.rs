@@ -1,13 +1,14 @@
-//! How assembly changed a scene's values at the start, and which forces are not unique: in words and as JSON.
+//! How assembly changed a scene's values at the start, which forces are not unique, and what is probably not intended: in words
+//! and as JSON.
 
 use serde_json::{Map, Value as Json, json};
 
-use super::output::significant;
-use super::summary;
-use crate::machine::Machine;
-use crate::mechanism::Placement;
-use crate::simulate::{Doubt, Simulation};
-use crate::units::format_quantity_digits;
+use crate::presets::too_slow;
+use jointplay_physics::machine::Machine;
+use jointplay_physics::mechanism::Placement;
+use jointplay_physics::simulate::{Doubt, Simulation};
+use jointplay_physics::units::format_quantity_digits;
+use jointplay_scene::Scene;
 
 /// A body moved or turned by more than this during assembly gets a warning: m, rad.
 const FAR: Placement = Placement { moved: 5e-3, turned: 5.0 * DEGREE };
@@ -29,7 +30,8 @@ fn exceeds(a: &Placement, b: &Placement) -> bool {
 }
 
 fn words(placement: &Placement) -> String {
-    format!("moved {} mm, turned {}°", significant(placement.moved * 1e3, 4), significant(placement.turned / DEGREE, 4))
+    let turned = format_quantity_digits(placement.turned / DEGREE, "", 4);
+    format!("moved {}, turned {turned}°", format_quantity_digits(placement.moved, "mm", 4))
 }
 
 /// Label and text of each line about the assembly.
@@ -100,19 +102,20 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
 }
 
 /// Findings about a scene at the start of its run.
-pub struct Start {
+pub struct StartReport {
     /// Label and text of each line about the assembly.
     pub lines: Vec<(String, String)>,
     /// Assembly results that are probably not intended.
-    pub warnings: Vec<String>,
+    warnings: Vec<String>,
     /// Ideal ball joints and joints that close loops whose reactions are not unique.
     pub reactions: Vec<String>,
     /// Driven joints whose actuator forces are not unique.
     pub actuators: Vec<String>,
-    assembly: Json,
+    /// The assembly as JSON, in m and rad.
+    pub assembly: Json,
 }
 
-impl Start {
+impl StartReport {
     /// From a simulation at its start.
     pub fn of(simulation: &mut Simulation) -> Self {
         let loose = simulation.not_unique();
@@ -145,15 +148,11 @@ impl Start {
         ))
     }
 
-    /// Adds everything to the summary of a run.
-    pub fn describe(&self, facts: &mut Map<String, Json>, text: &mut String) {
-        facts.insert("assembly".into(), self.assembly.clone());
-        let loose = json!({"reactions": self.reactions, "actuators": self.actuators});
-        facts.insert("not_unique".into(), loose);
-        let loose = self.not_unique().map(|words| ("Not unique".to_owned(), words));
-        for (label, words) in self.lines.iter().chain(&loose) {
-            summary::line(text, label, words);
-        }
+    /// What is probably not intended in `scene`, which started as reported here.
+    pub fn warnings_of(&self, scene: &Scene) -> Vec<String> {
+        let of_machine = scene.machine.warnings().into_iter().map(|warning| warning.to_string());
+        let slow = too_slow(scene).map(|slow| slow.to_string());
+        of_machine.chain(slow).chain(self.warnings.iter().cloned()).collect()
     }
 }
 
