@@ -68,7 +68,7 @@ def test_effects_alone_screening_and_target_are_those_of_the_program(program, tm
     ]
     table = pandas.read_csv(tmp_path / "found" / "sensitivity.csv", keep_default_na=False, na_values="NaN")
     pandas.testing.assert_frame_equal(found.to_pandas(), table, rtol=1e-11, check_dtype=False)
-    # One clearance decides; half of what it may be is more than enough.
+    # Without indices.
     easy = jp.sensitivity(
         jp.Scene.load("four-bar"), ["joint.*.clearance"], rows=0, target=found.nominal["tip-error"] * 0.99, duration="5 ms"
     )
@@ -83,19 +83,20 @@ def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
     }
     rows = [f"{key},{fit},{price}" for key, fits in cost.items() for fit, price in fits.items()]
     (tmp_path / "costs.csv").write_text("\n".join(["parameter,fit,cost", *rows]))
-    limits, verdicts = {"peak-force": 125.0}, set()
-    options = ["--duration=20ms", "--runs=32", "--limit=peak-force=125", "--summary=json", "--quiet", "--force"]
-    for required in (0.5, 1.0):
-        search = [f"--cost={tmp_path / 'costs.csv'}", f"--yield={required}", "--out", tmp_path / "found"]
+    verdicts = set()
+    options = ["--duration=20ms", "--runs=32", "--yield=0.5", "--summary=json", "--quiet", "--force"]
+    # No machine holds the second limit.
+    for limit in (125.0, 1.0):
+        search = [f"--cost={tmp_path / 'costs.csv'}", f"--limit=peak-force={limit}", "--out", tmp_path / "found"]
         told = json.loads(program("tolerance", "four-bar", *ASKED, *options, *search))["fits"]
         found = jp.tolerance(
             jp.Scene.load("four-bar"),
             OVER,
-            limits,
+            {"peak-force": limit},
             units=32,
             sampling="sobol",
             cost=cost,
-            required_yield=required,
+            required_yield=0.5,
             duration="20 ms",
             threads=2,
         ).fits
@@ -109,7 +110,7 @@ def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
         assert found.best.fits == {one["key"]: one["fit"] for one in told["best"]["fits"]}
         assert same(found.check, told["check"]["yield"]) and found.verdict == told["check"]["verdict"]
         verdicts.add(found.verdict)
-    assert len(verdicts) == 2
+    assert len(verdicts) == 2 and None in verdicts
 
 
 def test_yields_are_those_of_the_program(program, tmp_path):

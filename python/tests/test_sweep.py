@@ -139,3 +139,23 @@ def test_dask_loses_no_point_with_a_worker(program, tmp_path):
         assert any(not future.done() for future in futures), "the worker was killed too late"
         result = sweep.assemble(client.gather(futures))
     same(result, archive(program, tmp_path, name, vary, arguments))
+
+
+@pytest.mark.parametrize(
+    "vary, options, said",
+    [
+        ({"contact.clearance": "1mm..0.1mm:3"}, {"periods": 2, "discard": 1}, "^vary: contact.clearance=1mm..0.1mm:3: the range"),
+        ({"contact.clearance": []}, {"periods": 2, "discard": 1}, "^vary: contact.clearance: the range is empty"),
+        ({}, {"periods": 2, "discard": 1}, "^vary: a sweep varies at least one parameter"),
+        ({"contact.clearance": [1e-4]}, {"periods": 2, "discard": 2}, "^periods = 2, discard = 2: .* discard must be less than"),
+        (
+            {"contact.clearance": [2e-4, 1e-4]},
+            {"periods": 2, "discard": 1, "start": "follow-up"},
+            "^start = follow-up: .*; use start = cold, or name a range last$",
+        ),
+    ],
+)
+def test_errors_name_arguments_and_no_options_of_the_command_line(vary, options, said):
+    with pytest.raises(jp.OptionError, match=said) as caught:
+        jp.Sweep(jp.Scene.load("spcmm"), vary, **options)
+    assert "--" not in str(caught.value)
