@@ -71,6 +71,17 @@ def test_the_check_counts_what_there_is():
     assert warned.warnings
 
 
+def test_the_check_warns_of_what_the_program_warns_of(program, tmp_path):
+    text = jp.Scene.load("slider-crank").toml
+    moved = 'start = "ideal"\n' + text.replace('position = "200 mm"', 'position = "230 mm"')
+    file = tmp_path / "moved.toml"
+    file.write_text(moved)
+    told = [line.removeprefix("Warning").strip() for line in program("check", file).splitlines() if line.startswith("Warning")]
+    check = jp.Scene.load(file).check()
+    assert sorted(check.warnings) == sorted(told) and any("moved bodies far" in warning for warning in told)
+    assert check.not_unique is None
+
+
 def test_an_error_in_a_file_names_line_key_and_range(falling):
     text = falling.replace('"0.2 mm"', '"-3 mm"')
     with pytest.raises(jp.SceneError) as caught:

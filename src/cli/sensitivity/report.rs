@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::{Map, Value as Json, json};
 
 use super::picture;
+use crate::analysis::indices::IndicesError;
 use crate::analysis::study::{Change, Input, Output, Sensitivity, StudyRunner as _, TargetAnswer};
 use crate::analysis::yields::Estimate;
 use crate::cli::Failure;
@@ -93,6 +94,10 @@ pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
         let heads = "parameter | from | output alone | to | output alone | first-order | total";
         text += &Table::new(heads, rows).text();
         match &found.indices[o] {
+            Some(Err(IndicesError::NoVariance { value })) => {
+                let value = shown(*value, output.unit);
+                text += &format!("No indices: the variance of the result is 0: it is {value}, whatever the inputs\n");
+            }
             Some(Err(error)) => text += &format!("No indices: {error}\n"),
             Some(Ok(indices)) => {
                 text += &format!(
