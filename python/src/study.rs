@@ -57,14 +57,22 @@ impl Ended {
     }
 }
 
+/// Runs that were made.
+struct Stage {
+    name: String,
+    /// Values of the inputs of each run, SI.
+    values: Vec<Vec<f64>>,
+    /// Its outputs, SI.
+    results: Vec<Vec<f64>>,
+}
+
 /// Makes the runs of a study for Python.
 struct Runner<'a, 'py> {
     study: &'a PyStudy,
     py: Python<'py>,
     threads: usize,
     progress: Option<Bound<'py, PyAny>>,
-    /// Stage, values and outputs of the runs so far.
-    stages: Vec<(String, Vec<Vec<f64>>, Vec<Vec<f64>>)>,
+    stages: Vec<Stage>,
 }
 
 impl<'a, 'py> Runner<'a, 'py> {
@@ -74,8 +82,8 @@ impl<'a, 'py> Runner<'a, 'py> {
 
     /// Adds values and outputs of the runs of `stage`.
     fn describe(&self, stage: &str, all: &Bound<'py, PyDict>) -> PyResult<()> {
-        let of_stage = self.stages.iter().find(|(name, ..)| name == stage);
-        let (values, results) = of_stage.map_or((&[][..], &[][..]), |(_, values, results)| (&values[..], &results[..]));
+        let stage = self.stages.iter().find(|known| known.name == stage);
+        let (values, results) = stage.map_or((&[][..], &[][..]), |stage| (&stage.values[..], &stage.results[..]));
         all.set_item("values", array(self.py, values, self.study.inputs.len())?)?;
         all.set_item("results", array(self.py, results, self.study.outputs.len())?)
     }
@@ -99,7 +107,7 @@ impl StudyRunner for Runner<'_, '_> {
         let records = records(self.py, runs.sweep(), self.threads, self.progress.clone()).map_err(Ended::Raised)?;
         let length = runs.sweep().layout().record_length();
         let results: Vec<Vec<f64>> = records.chunks_exact(length).map(|record| runs.outputs_of(record)).collect();
-        self.stages.push((stage.to_owned(), rows, results.clone()));
+        self.stages.push(Stage { name: stage.to_owned(), values: rows, results: results.clone() });
         Ok(results)
     }
 }
