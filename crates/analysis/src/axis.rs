@@ -571,6 +571,7 @@ mod tests {
         let chain = Scene::load("chain", &[]).expect("built in");
         let links = Axis::parse(&chain, "chain.links=2..6:3").expect("whole numbers");
         assert_eq!(links.value(1), Value::Count(4));
-        assert!(matches!(Axis::parse(&chain, "chain.links=2..6:4"), Err(RangeError::NotWhole { .. })));
+        let error = Axis::parse(&chain, "chain.links=2..6:4");
+        assert!(matches!(error, Err(RangeError::Axis { fault: RangeFault::NotWhole { .. }, .. })));
     }
 }
