@@ -51,6 +51,46 @@ def test_every_kind_of_number_has_its_unit():
     assert scene["spring.s.stiffness"] == 50.0 and scene["spring.s.length"] == 0.2
 
 
+def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
+    inertia = [1e-3, 1e-3, 1e-3]
+    axes = {"axis": [0, 0, 1]}
+    machine = {
+        "body": [{"name": name, "mass": 1.0, "inertia": inertia} for name in ("arm", "block", "tube", "wheel")],
+        "joint": [
+            {"name": "hinge", "kind": "revolute", "child": "arm", "start": {"position": 0.1, "velocity": 2}} | axes,
+            {"name": "slide", "kind": "prismatic", "child": "block", "start": {"position": 0.2, "velocity": 3}} | axes,
+            {
+                "name": "both",
+                "kind": "cylindrical",
+                "child": "tube",
+                "drive": {
+                    "position": {"law": "constant", "position": 0.01, "velocity": 0.4},
+                    "angle": {"law": "harmonic", "mean": 0.3, "amplitude": 0.5, "frequency": 2.0},
+                },
+            }
+            | axes,
+            {"name": "wheel", "kind": "revolute", "child": "wheel", "drive": {"law": "constant", "velocity": 6}} | axes,
+        ],
+        "motor": [{"name": "m", "joint": "hinge", "torque": 0.7}, {"name": "n", "joint": "slide", "force": 8, "damping": 9}],
+    }
+    machine["motor"][1]["target"] = {"law": "constant", "position": 0.05}
+    toml = jp.Scene.from_dict(machine).toml
+    for line in [
+        'position = "0.1 rad"',
+        'velocity = "2 rad/s"',
+        'position = "0.2 m"',
+        'velocity = "3 m/s"',
+        'position = "0.01 m"',
+        'velocity = "0.4 m/s"',
+        'mean = "0.3 rad"',
+        'amplitude = "0.5 rad"',
+        'velocity = "6 rad/s"',
+        'damping = "9 N s/m"',
+        'position = "0.05 m"',
+    ]:
+        assert line in toml, toml
+
+
 @pytest.mark.parametrize(
     "change, said",
     [
@@ -59,7 +99,7 @@ def test_every_kind_of_number_has_its_unit():
         ({"body": [{"name": "L0", "mess": 1.0}]}, "mass"),
         ({"contact": {"clearance": -1.0}}, "allowed"),
         ({"sprung": [{}]}, "spring"),
-        ({"joint": [{"name": "L0", "kind": "revolute", "child": "L0", "axis": "y", "start": {"position": 0.1}}]}, "unit depends"),
+        ({"motor": [{"name": "m", "joint": "nowhere", "stiffness": 5.0}]}, r"motor\[0\].stiffness: the unit depends"),
     ],
 )
 def test_what_is_wrong_is_named(change, said):

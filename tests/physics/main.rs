@@ -4,6 +4,7 @@
 mod common;
 
 mod bushings;
+mod closed_form;
 mod coordinates;
 mod corners;
 mod discrete_gradient;

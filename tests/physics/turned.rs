@@ -128,12 +128,19 @@ fn a_file_in_a_turned_scene_turns_with_it() {
 }
 
 #[test]
-fn a_machine_with_a_closed_form_stays_where_it_is() {
-    let text = format!("{PLACE}{}", built_in_text("spcmm").unwrap());
-    let error = Scene::parse(&text, None, &[]).unwrap_err().to_string();
-    assert!(
-        error.contains("position = ")
-            && error.contains("the functions of [closed_form] are those of the machine where it is"),
-        "{error}"
-    );
+fn a_machine_with_a_closed_form_moves_alike_and_its_path_with_it() {
+    let text = built_in_text("spcmm").unwrap();
+    let (along_x, along_z) = ("[gravity]\nx = \"9.81 m/s^2\"\n", GRAVITY);
+    assert!(text.contains(along_x));
+    let plain = text.replace(along_x, along_z);
+    let both = [plain.clone(), turned(&plain)].map(|text| parse(&text, &FINE));
+    let probe = both[0].machine.output.probe.unwrap();
+    let mut tips = both.each_ref().map(|scene| {
+        let frame = at(&mut Simulation::new(&scene.machine).unwrap(), 0.02);
+        let body = &frame.bodies[scene.machine.output.body];
+        body.position + body.rotation * probe - frame.probe_error.unwrap()
+    });
+    tips[0] = turn() * tips[0] + Vec3::from(SHIFT);
+    assert!((tips[0] - tips[1]).norm() < 1e-12, "{tips:?}");
+    move_alike("spcmm", both, 0.02);
 }

@@ -46,7 +46,7 @@ fn every_law_is_read_on_slides_and_hinges() {
         ] {
             let scene = parse(kind, &drive).unwrap_or_else(|error| panic!("{error}"));
             let law = match scene.machine.joints[0].drive.as_ref().expect("driven") {
-                Drive::ClosedForm(_) => "spcmm",
+                Drive::Function(_) => "function",
                 Drive::Constant { .. } => "constant",
                 Drive::Harmonic { terms, .. } if terms.len() == 1 => "harmonic",
                 Drive::Harmonic { .. } => "harmonics",
@@ -59,7 +59,7 @@ fn every_law_is_read_on_slides_and_hinges() {
             assert_eq!(scene.to_toml().as_ref(), Ok(&scene.source.text));
         }
     }
-    // All but the one that needs the paper's machine.
+    // All but the one that needs functions.
     assert_eq!(DRIVE_LAWS.len(), 8);
 }
 
@@ -164,7 +164,7 @@ fn what_is_wrong_with_a_law_is_named() {
                 "my.toml:10:17",
                 "joint.P.drive.law = \"ramps\"",
                 "did you mean `ramp`?",
-                "allowed spcmm, constant, harmonic, harmonics, ramp, pulse, table, formula",
+                "allowed function, constant, harmonic, harmonics, ramp, pulse, table, formula",
             ],
         ),
         ("to = \"1 mm\"", &["joint.P.drive.law", "missing"]),

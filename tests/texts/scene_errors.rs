@@ -51,7 +51,7 @@ fn a_law_and_a_role_that_are_none_are_named_before_their_keys() {
         (
             "law = \"constant\"",
             "law = \"sinus\", speed = \"3 Hz\"",
-            ["drive.law = \"sinus\"", "allowed spcmm, constant, harmonic"],
+            ["drive.law = \"sinus\"", "allowed function, constant, harmonic"],
         ),
         ("role = \"frame\"", "role = \"fame\"\ncolour = \"red\"", ["role = \"fame\"", "did you mean `frame`"]),
     ] {
@@ -330,12 +330,35 @@ fn additions_that_contradict_the_scene_are_refused() {
 }
 
 #[test]
-fn one_slider_law_drives_one_joint() {
+fn functions_of_a_closed_form_are_named_with_what_is_wrong() {
     let text = jointplay::scene::built_in_text("spcmm").unwrap();
-    let error = parse(&text.replace("slider = 2", "slider = 1")).unwrap_err();
-    holds("slider twice", &error, &["joint.P2.drive", "slider 1 already drives joint `P1`"]);
-    let error = parse(&text.replace("slider = 2", "slider = 4")).unwrap_err();
-    holds("slider 4", &error, &["joint.P2.drive.slider = 4", "allowed 1, 2 or 3"]);
+    let cases: [(&str, &str, &[&str]); 9] = [
+        (
+            "function = \"f1\"",
+            "function = \"f4\"",
+            &["joint.P1.drive.function = \"f4\"", "no such function; allowed phase, across", "root1, root2"],
+        ),
+        ("function = \"f1\"", "function = \"root1\"", &["joint.P1.drive.function", "m^2, which is not in m"]),
+        (
+            "\"y + hinge_radius*cosine\"",
+            "\"z + hinge_radius*cosine\"",
+            &["closed_form.functions[6].formula", "no variable `z`"],
+        ),
+        ("\"c*c + 1\"", "\"c*y + 1\"", &["closed_form.functions[10].formula", "adds or compares"]),
+        (
+            "name = \"over\"",
+            "name = \"gamma\"",
+            &["closed_form.functions[9].name", "already a parameter or a function"],
+        ),
+        ("name = \"over\"", "name = \"mm\"", &["closed_form.functions[9].name", "cannot name a function"]),
+        ("z = \"z\"", "", &["closed_form.z", "missing"]),
+        ("angle = \"beta\"", "angle = \"across\"", &["closed_form.turns[0].angle", "which is not in rad"]),
+        ("frequency = \"frequency\"", "frequency = \"-1 Hz\"", &["closed_form.frequency", "allowed 0 Hz to"]),
+    ];
+    for (from, to, words) in cases {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        holds(to, &parse(&text.replace(from, to)).unwrap_err(), words);
+    }
 }
 
 #[test]

@@ -32,17 +32,9 @@ impl Scene {
         &self.overrides[joint]
     }
 
-    /// Whether this scene has a parameter.
-    fn has(&self, parameter: &Parameter) -> bool {
-        match parameter.scope {
-            Scope::Every | Scope::Contact => true,
-            Scope::Own => self.source.numbers.contains_key(parameter.key),
-        }
-    }
-
     /// Parameters of this scene in table order, then user-defined ones; a contact row also stands for `joint.<name>.<key>`.
     pub fn parameters(&self) -> Vec<&'static Parameter> {
-        table().iter().filter(|parameter| self.has(parameter)).chain(self.source.own.iter().copied()).collect()
+        table().iter().chain(self.source.own.iter().copied()).collect()
     }
 
     /// Row of a number of the file, by key.
@@ -60,8 +52,7 @@ impl Scene {
             return Some(Resolved { parameter, joint: None });
         }
         let Some((name, part)) = joint_part(key) else {
-            let parameter = find(key).filter(|parameter| self.has(parameter))?;
-            return Some(Resolved { parameter, joint: None });
+            return Some(Resolved { parameter: find(key)?, joint: None });
         };
         let joint = self.machine.ball_joints.iter().position(|joint| joint.name == name)?;
         Some(Resolved { parameter: find(&format!("contact.{part}"))?, joint: Some(joint) })
@@ -75,10 +66,6 @@ impl Scene {
     fn explain_missing(&self, key: &str) -> String {
         let numbers = self.source.numbers.keys().map(String::as_str);
         let Some((name, part)) = joint_part(key) else {
-            if let Some(parameter) = find(key) {
-                let place = parameter.scope.describe();
-                return format!("the scene `{}` has no such key: it exists only in {place}", self.name);
-            }
             if file_only(key) {
                 return "only in the scene file: it cannot be changed from outside it".to_owned();
             }

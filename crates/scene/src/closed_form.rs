@@ -3,7 +3,6 @@
 use super::document::{Node, Section};
 use super::formula::within;
 use super::key::{FileKey, FileTable, ValueType, key, many};
-use super::own::read_identifier;
 use super::*;
 use jointplay_physics::expression::Program;
 use jointplay_physics::machine::{ClosedForm, Function, Path};
@@ -100,7 +99,7 @@ pub(super) fn read_closed_form(section: &Section<'_>) -> Result<ClosedForm, Scen
     for node in section.require("functions")?.entries()? {
         let entry = node.section()?;
         let name_node = entry.require("name")?;
-        let name = read_identifier(&name_node, "a function")?;
+        let name = name_node.identifier("a function")?;
         let reading = section.document.reading;
         if reading.names(name) {
             return Err(name_node.error("there is already a parameter or a function of this name; names must differ"));
@@ -129,7 +128,7 @@ fn read_path(section: &Section<'_>) -> Result<Option<Path>, SceneError> {
         let turn = node.section()?;
         Ok((turn.require("axis")?.direction()?, read_value(&turn.require("angle")?, Dimension::Angle)?))
     });
-    Ok(Some(Path { position: [x?, y?, z?], turns: turns.collect::<Result<_, SceneError>>()? }))
+    Ok(Some(Path { position: [x?, y?, z?], turns: turns.collect::<Result<_, SceneError>>()?, place: None }))
 }
 
 /// Reads an expression of time and functions with this dimension, or a pure number in SI units.

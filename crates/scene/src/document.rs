@@ -451,6 +451,22 @@ impl<'d> Node<'d> {
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
     }
 
+    /// The name of `what`, such as a parameter, as it stands in expressions.
+    pub fn identifier(&self, what: &str) -> Result<&'d str, SceneError> {
+        let name = self.text()?;
+        let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let reserved = ["i", "pi", "e", "t"].contains(&name)
+            || all_units().any(|(unit, ..)| unit == name)
+            || !name.starts_with(|c: char| letters(c) && !c.is_ascii_digit());
+        if reserved || name.len() > 40 || !name.chars().all(letters) {
+            return Err(self.error(format!(
+                "cannot name {what}, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, \
+                 pi, e, t or a unit"
+            )));
+        }
+        Ok(name)
+    }
+
     /// The full name of a body: numbered in a copy of a pattern that has it, after the name of an included file that has it.
     pub fn body(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;

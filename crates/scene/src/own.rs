@@ -40,22 +40,6 @@ fn defined_later(node: &Node<'_>, later: &[Node<'_>]) -> Option<SceneError> {
     Some(value.error(format!("uses the parameter {name}, which is defined after it: define that one first")))
 }
 
-/// Reads the name of `what`, a parameter or a function, as it stands in expressions.
-pub(super) fn read_identifier<'d>(node: &Node<'d>, what: &str) -> Result<&'d str, SceneError> {
-    let name = node.text()?;
-    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let reserved = ["i", "pi", "e", "t"].contains(&name)
-        || all_units().any(|(unit, ..)| unit == name)
-        || !name.starts_with(|c: char| letters(c) && !c.is_ascii_digit());
-    if reserved || name.len() > 40 || !name.chars().all(letters) {
-        return Err(node.error(format!(
-            "cannot name {what}, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, pi, e, \
-             t or a unit"
-        )));
-    }
-    Ok(name)
-}
-
 /// Reads a `[[parameter]]` of a file with the keys `file`: its row, and whether it is adjustable.
 fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Parameter, bool), SceneError> {
     let title = node.title("parameter");
@@ -63,7 +47,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let section = node.section_as(title.clone())?;
     let name_node = section.require("name")?;
     let full = name_node.name()?;
-    let name = read_identifier(&name_node, "a parameter")?;
+    let name = name_node.identifier("a parameter")?;
     let own_node = section.require("value")?;
     let passed = document.include.and_then(|include| include.values.get(name));
     let value_node = passed.unwrap_or(&own_node);

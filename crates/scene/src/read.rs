@@ -120,6 +120,12 @@ impl Scene {
         let files: Vec<Section<'_>> = files.collect();
         let patterns = read_patterns(&files)?;
         let mut scene = read_settings(&top)?;
+        if let (Some(whole), Some(form)) = (&whole, &mut scene.machine.closed_form)
+            && let Some(path) = &mut form.path
+        {
+            let origin = whole.point(None, Vec3::zeros());
+            path.place = Some((whole.rotation(None, Quat::identity()).to_rotation_matrix().into_inner(), origin));
+        }
         let mut places = read_parameters(&top, &mut scene)?;
         scene.source.places = places
             .iter()
@@ -150,14 +156,9 @@ impl Scene {
 /// The scene as a group with a place of its own, if the file gives one.
 ///
 /// # Errors
-/// An invalid place, or one for a machine whose closed form has its place.
+/// An invalid place.
 fn read_whole<'d>(top: &Section<'_>) -> Result<Option<Instance<'d>>, SceneError> {
     let placement = read_placement(top)?;
-    if placement.is_some() && top.get("closed_form").is_some() {
-        for key in ["position", "rotation"] {
-            top.refuse(key, "the functions of [closed_form] are those of the machine where it is")?;
-        }
-    }
     Ok(placement.map(|placement| Instance { group: Group::Scene, placement, outer: None }))
 }
 

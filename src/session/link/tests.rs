@@ -214,7 +214,7 @@ fn what_is_wrong_in_a_link_is_said() {
         ("scene=pendulun", "did you mean `pendulum`?"),
         ("c=0.5", "contact.clearance = 0.5: needs a unit"),
         ("c=-1mm", "out of range"),
-        ("scene=pendulum&spcmm.frequency=1Hz", "the scene `pendulum` has no such key"),
+        ("scene=pendulum&spcmm.frequency=1Hz", "spcmm.frequency = 1Hz: unknown key"),
         ("contact.clearence=1mm", "did you mean `contact.clearance`?"),
     ] {
         let error = Link::parse(text).expect("well formed").load();

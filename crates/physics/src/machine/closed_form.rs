@@ -1,6 +1,6 @@
 //! A motion in closed form: functions of time that drives follow, and the path of the output body that results.
 
-use super::Vec3;
+use super::{Mat3, Vec3};
 use crate::expression::Program;
 
 /// Functions of time in closed form, such as the inverse kinematics of a platform that is to follow a path.
@@ -34,4 +34,6 @@ pub struct Path {
     pub position: [Program; 3],
     /// Turns about unit vectors in the axes that the turns before have reached, with their angles, rad.
     pub turns: Vec<(Vec3, Program)>,
+    /// Where the machine was put as a whole: by which rotation about the world's origin, and then by which shift, m.
+    pub place: Option<(Mat3, Vec3)>,
 }

@@ -106,11 +106,17 @@ impl Path {
             let along = axis * axis.transpose();
             rotation *= along + (Mat3::identity() - along) * cosine + axis.cross_matrix() * sine;
         }
-        ClosedMotion {
-            position: self.position.each_ref().map(|program| program.eval(values)),
-            rotation,
-            angular_velocity,
+        let mut position = self.position.each_ref().map(|program| program.eval(values));
+        if let Some((turn, shift)) = &self.place {
+            let row = |i: usize| {
+                let turned = turn[(i, 0)] * position[0] + turn[(i, 1)] * position[1] + turn[(i, 2)] * position[2];
+                turned + Jet::constant(shift[i])
+            };
+            position = [0, 1, 2].map(row);
+            rotation = turn * rotation;
+            angular_velocity = turn * angular_velocity;
         }
+        ClosedMotion { position, rotation, angular_velocity }
     }
 }
 
@@ -118,7 +124,6 @@ impl Path {
 mod tests {
     use super::*;
     use crate::scene::Scene;
-    use crate::simulate::Simulation;
 
     fn paper(changes: &[(&str, String)]) -> ClosedForm {
         let changes: Vec<(String, String)> =
@@ -185,57 +190,5 @@ mod tests {
         }
         let still = paper(&["spcmm.amplitude_x", "spcmm.amplitude_beta"].map(|key| (key, "0".to_owned())));
         assert_eq!(still.period(&sliders_of(&still)), f64::INFINITY);
-    }
-
-    /// A crank of 30 mm that turns at 2 Hz and pushes a block through a rod of `length`: x = r cos + sqrt(L^2 - r^2 sin^2).
-    fn slider_crank(length: &str) -> Scene {
-        let text = format!(
-            r#"
-            start = "ideal"
-            parameter = [{{ name = "r", value = "30 mm" }}, {{ name = "l", value = "{length}" }}]
-            contact = {{ clearance = 0 }}
-            output = {{ body = "block", probe = "10 5 0 mm" }}
-            body = [
-                {{ name = "crank", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
-                {{ name = "rod", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
-                {{ name = "block", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
-            ]
-            joint = [
-                {{ name = "A", kind = "revolute", child = "crank", axis = [0, 1, 0], drive = {{ law = "function", function = "turn" }} }},
-                {{ name = "B", kind = "revolute", parent = "crank", parent_point = ["r", 0, 0], child = "rod", axis = [0, 1, 0] }},
-                {{ name = "C", kind = "prismatic", child = "block", axis = [1, 0, 0], start = {{ position = "r + l" }} }},
-            ]
-            ball_joint = [{{ name = "S", socket = {{ body = "block" }}, ball = {{ body = "rod", at = ["l", 0, 0] }} }}]
-            [closed_form]
-            frequency = "2 Hz"
-            x = "r*cos(turn) + sqrt(left)"
-            y = "0 mm"
-            z = "0 mm"
-            functions = [
-                {{ name = "turn", formula = "2*pi*2 Hz*t" }},
-                {{ name = "left", formula = "l*l - (r*sin(turn))^2", positive = "the rod is too short" }},
-            ]
-            "#
-        );
-        Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"))
-    }
-
-    #[test]
-    fn a_scene_of_its_own_follows_its_path() {
-        let mut simulation = Simulation::new(&slider_crank("100 mm").machine).expect("starts");
-        let mut frame = crate::simulate::Frame::default();
-        let mut travel = (f64::INFINITY, 0.0_f64);
-        for k in 1..=50 {
-            let time = 0.01 * f64::from(k);
-            simulation.advance_to(time).expect("runs");
-            simulation.sample(time, &mut frame);
-            let off = frame.probe_error.expect("is known").norm();
-            assert!(off < 1e-12, "{off:e} at {time}");
-            let x = frame.bodies[2].position.x;
-            travel = (travel.0.min(x), travel.1.max(x));
-        }
-        assert!((travel.0 - 0.07).abs() < 1e-4 && (travel.1 - 0.13).abs() < 1e-4, "{travel:?}");
-        let short = Simulation::new(&slider_crank("25 mm").machine).expect_err("cannot turn").to_string();
-        assert!(short.starts_with("the rod is too short at t = 0.1250 s: left = -2.7500e-4"), "{short}");
     }
 }

@@ -1,0 +1,57 @@
+//! A scene whose drive follows functions of `[closed_form]`: its path is that of the machine.
+
+use crate::common::parse;
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
+
+/// A crank of 30 mm that turns at 2 Hz and pushes a block through a rod of `length`: x = r cos + sqrt(L^2 - r^2 sin^2).
+fn slider_crank(length: &str) -> Scene {
+    let text = format!(
+        r#"
+        start = "ideal"
+        parameter = [{{ name = "r", value = "30 mm" }}, {{ name = "l", value = "{length}" }}]
+        contact = {{ clearance = 0 }}
+        output = {{ body = "block", probe = "10 5 0 mm" }}
+        body = [
+            {{ name = "crank", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
+            {{ name = "rod", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
+            {{ name = "block", mass = "1 kg", inertia = "1e-3 1e-3 1e-3 kg m^2" }},
+        ]
+        joint = [
+            {{ name = "A", kind = "revolute", child = "crank", axis = [0, 1, 0], drive = {{ law = "function", function = "turn" }} }},
+            {{ name = "B", kind = "revolute", parent = "crank", parent_point = ["r", 0, 0], child = "rod", axis = [0, 1, 0] }},
+            {{ name = "C", kind = "prismatic", child = "block", axis = [1, 0, 0], start = {{ position = "r + l" }} }},
+        ]
+        ball_joint = [{{ name = "S", socket = {{ body = "block" }}, ball = {{ body = "rod", at = ["l", 0, 0] }} }}]
+        [closed_form]
+        frequency = "2 Hz"
+        x = "r*cos(turn) + sqrt(left)"
+        y = "0 mm"
+        z = "0 mm"
+        functions = [
+            {{ name = "turn", formula = "2*pi*2 Hz*t" }},
+            {{ name = "left", formula = "l*l - (r*sin(turn))^2", positive = "the rod is too short" }},
+        ]
+        "#
+    );
+    parse(&text, &[])
+}
+
+#[test]
+fn a_scene_of_its_own_follows_its_path() {
+    let mut simulation = Simulation::new(&slider_crank("100 mm").machine).expect("starts");
+    let mut frame = Frame::default();
+    let mut travel = (f64::INFINITY, 0.0_f64);
+    for k in 1..=50 {
+        let time = 0.01 * f64::from(k);
+        simulation.advance_to(time).expect("runs");
+        simulation.sample(time, &mut frame);
+        let off = frame.probe_error.expect("is known").norm();
+        assert!(off < 1e-12, "{off:e} at {time}");
+        let x = frame.bodies[2].position.x;
+        travel = (travel.0.min(x), travel.1.max(x));
+    }
+    assert!((travel.0 - 0.07).abs() < 1e-4 && (travel.1 - 0.13).abs() < 1e-4, "{travel:?}");
+    let short = Simulation::new(&slider_crank("25 mm").machine).expect_err("cannot turn").to_string();
+    assert!(short.starts_with("the rod is too short at t = 0.1250 s: left = -2.7500e-4"), "{short}");
+}
