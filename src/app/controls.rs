@@ -12,7 +12,7 @@ use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{equations, keys, spoken, theme, value};
-use crate::scene::{Kind, Parameter, SceneError, Scope, SetError, Value};
+use crate::scene::{Kind, OWN_GROUP, Parameter, SceneError, Scope, SetError, Value};
 use crate::simulate::Effect;
 use crate::units::{format_quantity_digits, from_display, to_display};
 
@@ -95,14 +95,16 @@ impl Controls {
         self.accuracy_ui(ui, player, accuracy, &table);
         self.one_joint(ui, player, &table);
         let mut groups: Vec<&'static str> = Vec::new();
-        for parameter in &table {
+        // The groups of the scene's author come first.
+        let own = table.iter().filter(|p| p.scope == Scope::Own);
+        for parameter in own.chain(table.iter().filter(|p| p.scope != Scope::Own)) {
             if !groups.contains(&parameter.group) {
                 groups.push(parameter.group);
             }
         }
         for group in groups {
             let rest = || {
-                let apart = |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || p.scope == Scope::Own;
+                let apart = |p: &Parameter| FIRST.contains(&p.key) || p.key == PRESET || shows_first(p);
                 table.iter().filter(move |p| p.group == group && !apart(p))
             };
             if rest().next().is_none() {
@@ -127,7 +129,7 @@ impl Controls {
             }
         }
         // Parameters defined by the scene's author.
-        for parameter in table.iter().filter(|p| p.scope == Scope::Own) {
+        for parameter in table.iter().filter(|p| shows_first(p)) {
             self.control(ui, player, parameter, parameter.key);
             ui.add_space(4.0);
         }
@@ -478,6 +480,11 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
             ui.label(RichText::new(when).small());
         }
     });
+}
+
+/// Whether a parameter is the scene's own, in no group.
+fn shows_first(parameter: &Parameter) -> bool {
+    parameter.scope == Scope::Own && parameter.group == OWN_GROUP
 }
 
 #[cfg(test)]

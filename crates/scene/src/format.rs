@@ -615,6 +615,8 @@ static PARAMETER: FileTable = FileTable::new(
         key("whole", ValueType::Flag, "true", "whether it is a whole number").absent("false"),
         key("key", ValueType::Text, "\"chain.links\"", "its key for `--set`").absent("`parameter.` and its name"),
         key("help", ValueType::Text, "\"How far it goes.\"", "what it is").absent("none"),
+        key("group", ValueType::Text, "\"Drive\"", "heading under which the window folds it away")
+            .absent("shown first"),
         key("equation", ValueType::Text, "\"Paper eq. (59)\"", "the equation that it enters").absent("none"),
     ],
 );

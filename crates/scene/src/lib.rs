@@ -76,6 +76,7 @@ pub use key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, ValueType,
 pub use live::{LiveScene, SceneSnapshot, SetError};
 pub use load::*;
 pub use model::*;
+pub use numbers::OWN_GROUP;
 
 pub use parameters::*;
 pub use quantity::{DimensionError, Quantity, evaluate};

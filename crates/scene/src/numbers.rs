@@ -11,6 +11,9 @@ use super::value::Value;
 /// Larger than any number in a scene file: the reader enforces the actual limits.
 pub(super) const LARGEST: f64 = 1e13;
 
+/// Group of the parameters of a file that names none; a window shows them first.
+pub const OWN_GROUP: &str = "Machine";
+
 /// Row of a number of the file. The reader checks the allowed range when the scene is read again.
 pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {
     let kind = Kind::Number {
@@ -21,14 +24,22 @@ pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Paramete
         slider: (-1.0, 1.0),
         logarithmic: false,
     };
-    row_of_file([key, key, "A number of the scene file.", "Wherever the scene file uses it"], kind, Value::Unset)
+    row_of_file(
+        [key, key, "A number of the scene file.", "Wherever the scene file uses it", OWN_GROUP],
+        kind,
+        Value::Unset,
+    )
 }
 
-/// Row with this key, label, help and equation. Rows live as long as the program, like those of the table; equal ones are shared, so that a
+/// Row with this key, label, help, equation and group. Rows live as long as the program, like those of the table; equal ones are shared, so that a
 /// change of value adds none.
-pub(super) fn row_of_file([key, label, help, equation]: [&str; 4], kind: Kind, default: Value) -> &'static Parameter {
+pub(super) fn row_of_file(
+    [key, label, help, equation, group]: [&str; 5],
+    kind: Kind,
+    default: Value,
+) -> &'static Parameter {
     static ROWS: LazyLock<Mutex<BTreeMap<String, &'static Parameter>>> = LazyLock::new(Mutex::default);
-    let identity = format!("{key} {label} {help} {equation} {kind:?} {default:?}");
+    let identity = format!("{key} {label} {help} {equation} {group} {kind:?} {default:?}");
     let mut rows = ROWS.lock().unwrap_or_else(PoisonError::into_inner);
     rows.entry(identity).or_insert_with(|| {
         let text = |text: &str| -> &'static str { Box::leak(text.into()) };
@@ -36,7 +47,7 @@ pub(super) fn row_of_file([key, label, help, equation]: [&str; 4], kind: Kind, d
             key: text(key),
             access: Access::Number,
             label: text(label),
-            group: "Machine",
+            group: text(group),
             kind,
             default,
             scope: Scope::Own,

@@ -4,7 +4,7 @@ use super::document::{Node, Section, lists};
 use super::error::place_of;
 use super::include::check_values;
 use super::instance::Instance;
-use super::numbers::{LARGEST, row_of_file};
+use super::numbers::{LARGEST, OWN_GROUP, row_of_file};
 use super::*;
 use jointplay_physics::units::{all_units, same_unit, split_unit};
 
@@ -85,6 +85,7 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
     let label = words("label")?.unwrap_or(&full);
     let help = words("help")?.unwrap_or("A parameter of this scene.");
     let equation = words("equation")?.unwrap_or("Wherever the scene file uses it");
+    let group = words("group")?.unwrap_or(OWN_GROUP);
     let range = pair("range")?;
     let default = parse_quantity(text, dimension).ok();
     let around = match default.unwrap_or_default() {
@@ -98,7 +99,8 @@ fn read_parameter(node: &Node<'_>, file: &FileTable) -> Result<(&'static Paramet
         false => Kind::Number { dimension, min, max, display: unit, slider, logarithmic: false },
     };
     let given = default.map_or(Value::Unset, |default| kind.value_of(default));
-    let row = row_of_file([&key, &visible_line(label), &visible_line(help), &visible_line(equation)], kind, given);
+    let shown = visible_line;
+    let row = row_of_file([&key, &shown(label), &shown(help), &shown(equation), &shown(group)], kind, given);
     let checked = if whole { row.read(value_node.scalar()?).map(|_| ()) } else { row.check(&Value::Number(value)) };
     checked.map_err(|error| {
         let place = passed.map(|_| {

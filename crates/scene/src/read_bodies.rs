@@ -169,8 +169,7 @@ pub(super) fn read_shape(node: &Node<'_>, fixed: bool) -> Result<Shape, SceneErr
         Form::Sphere => Geometry::Sphere { centre: point("centre")?, radius: size("radius")? },
         Form::Plate => {
             let node = section.require("corners")?;
-            let corners =
-                node.entries()?.iter().map(|corner| Ok(corner.vector()?)).collect::<Result<Vec<_>, SceneError>>()?;
+            let corners = node.entries()?.iter().map(Node::vector).collect::<Result<Vec<_>, SceneError>>()?;
             let triangles = fill(&corners).map_err(|fault| node.error(fault.to_string()))?;
             Geometry::Plate { corners, triangles, thickness: size("thickness")? }
         }
