@@ -73,7 +73,7 @@ def test_a_number_of_a_joint_has_the_unit_of_its_coordinate():
         ],
         "motor": [{"name": "m", "joint": "hinge", "torque": 0.7}, {"name": "n", "joint": "slide", "force": 8, "damping": 9}],
     }
-    machine["motor"][1]["target"] = {"law": "constant", "position": 0.05}
+    machine["motor"][1]["target"] = {"law": "constant", "position": 0.05, "velocity": 0.0}
     toml = jp.Scene.from_dict(machine).toml
     for line in [
         'position = "0.1 rad"',
