@@ -161,7 +161,8 @@ impl Machine {
             let skew = (body.inertia - body.inertia.transpose()).amax();
             let symmetric = skew <= ROUNDING * body.inertia.amax();
             let definite = symmetric && body.inertia.symmetric_eigenvalues().min() > 0.0;
-            if body.mass != 0.0 && !(body.mass > 0.0 && body.mass.is_finite() && definite) {
+            let massless = body.mass == 0.0 && body.inertia.amax() == 0.0;
+            if !massless && !(body.mass > 0.0 && body.mass.is_finite() && definite) {
                 return Err(MachineFault::Inertia { body: body.name.clone() });
             }
         }
