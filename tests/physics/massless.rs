@@ -5,7 +5,7 @@ use crate::common::matrix::every_way;
 use crate::elements::at;
 use crate::joint_elements::started;
 use crate::two_degrees::{G, train};
-use jointplay::machine::{MachineFault, MasslessFault, Vec3};
+use jointplay::machine::{MachineFault, Vec3};
 use jointplay::mechanism::MechanismError;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
@@ -196,7 +196,6 @@ fn a_body_that_needs_its_mass_is_refused_with_its_line() {
     assert!(said.contains("formulation = lagrange: body outer has mass 0 kg"), "{said}");
     let mut machine = scene.machine;
     machine.bodies[0].inertia.m11 = 1.0;
-    let fault =
-        MechanismError::Machine(MachineFault::Massless { body: "outer".to_owned(), why: MasslessFault::Inertia });
+    let fault = MechanismError::Machine(MachineFault::Inertia { body: "outer".to_owned() });
     assert_eq!(Simulation::new(&machine).expect_err("refused").0, fault);
 }

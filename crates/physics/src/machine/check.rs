@@ -106,9 +106,6 @@ pub enum MachineFault {
 /// joints, as the cross of a universal joint does: the mass matrix has the mass of all bodies beyond a joint on its diagonal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MasslessFault {
-    /// It has an inertia.
-    #[error("its inertia must be 0, too")]
-    Inertia,
     /// Nothing bounds its motion.
     #[error("it is carried by a free joint")]
     Free,
@@ -128,10 +125,9 @@ impl Machine {
     pub fn check_massless(&self) -> Result<(), (usize, MasslessFault)> {
         let mut massless = self.bodies.iter().zip(&self.joints).enumerate().filter(|(_, (body, _))| body.mass == 0.0);
         let ends = |joint: &BallJoint| [joint.socket.body, joint.ball.body];
-        massless.try_for_each(|(index, (body, joint))| {
+        massless.try_for_each(|(index, (_, joint))| {
             let ball = self.ball_joints.iter().find(|ball| ends(ball).contains(&Some(index)));
             let why = match ball {
-                _ if body.inertia.amax() != 0.0 => MasslessFault::Inertia,
                 _ if joint.kind == JointKind::Free => MasslessFault::Free,
                 _ if self.joints.iter().all(|joint| joint.parent != Some(index)) => MasslessFault::Leaf,
                 Some(ball) => MasslessFault::BallJoint(ball.name.clone()),
