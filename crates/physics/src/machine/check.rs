@@ -158,7 +158,8 @@ impl Machine {
             let symmetric = skew <= ROUNDING * body.inertia.amax();
             let definite = symmetric && body.inertia.symmetric_eigenvalues().min() > 0.0;
             let massless = body.mass == 0.0 && body.inertia.amax() == 0.0;
-            if !massless && !(body.mass > 0.0 && body.mass.is_finite() && definite) {
+            let heavy = body.mass > 0.0 && body.mass.is_finite() && definite;
+            if !(massless || heavy) {
                 return Err(MachineFault::Inertia { body: body.name.clone() });
             }
         }
