@@ -5,6 +5,9 @@
 //! require a regex engine, and do not report the byte of an error.
 
 mod derivatives;
+mod tape;
+
+pub use tape::Tape;
 
 use crate::suggest::{brief, did_you_mean, nearest_name};
 use std::fmt;
@@ -161,6 +164,8 @@ enum Step {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     steps: Vec<Step>,
+    /// Most intermediate results at once.
+    held: usize,
     kink: Option<&'static str>,
 }
 
@@ -207,6 +212,7 @@ impl Program {
             at: 0,
             steps: Vec::new(),
             held: 0,
+            most_held: 0,
             depth: 0,
             kink: None,
             variable: &variable,
@@ -216,7 +222,7 @@ impl Program {
         };
         parser.sum()?;
         match parser.peek() {
-            None => Ok(Self { steps: parser.steps, kink: parser.kink }),
+            None => Ok(Self { steps: parser.steps, held: parser.most_held, kink: parser.kink }),
             Some(_) => Err(parser.unexpected("an operator")),
         }
     }
@@ -226,7 +232,17 @@ impl Program {
     /// # Panics
     /// If `variables` lacks one that the text uses.
     pub fn eval<N: Number>(&self, variables: &[N]) -> N {
-        let mut stack = [N::constant(0.0); STACK];
+        // To clear the whole stack would take longer than a short program.
+        match self.held {
+            0..=4 => self.eval_on::<N, 4>(variables),
+            5..=8 => self.eval_on::<N, 8>(variables),
+            _ => self.eval_on::<N, STACK>(variables),
+        }
+    }
+
+    /// The same with a stack of this depth.
+    fn eval_on<N: Number, const DEPTH: usize>(&self, variables: &[N]) -> N {
+        let mut stack = [N::constant(0.0); DEPTH];
         let mut top = 0;
         for step in &self.steps {
             match *step {
@@ -268,7 +284,7 @@ impl Program {
                 _ => steps.push(step),
             }
         }
-        Self { steps, kink: self.kink }
+        Self { steps, held: self.held, kink: self.kink }
     }
 
     /// A function in the program whose derivatives jump, if any.
@@ -370,6 +386,7 @@ struct Parser<'t> {
     steps: Vec<Step>,
     /// Depth of the stack after `steps`.
     held: usize,
+    most_held: usize,
     depth: usize,
     kink: Option<&'static str>,
     variable: &'t dyn Fn(&str) -> Option<usize>,
@@ -429,6 +446,7 @@ impl<'t> Parser<'t> {
                 self.steps.push(step);
             }
         }
+        self.most_held = self.most_held.max(self.held);
         if self.held > STACK {
             return Err(self.error(self.at, Fault::TooDeep));
         }

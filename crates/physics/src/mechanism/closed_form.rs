@@ -1,6 +1,7 @@
 //! Evaluation of a motion in closed form, with exact first and second derivatives.
 
 use super::MechanismError;
+use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{ClosedForm, Mat3, Path, Vec3};
 
@@ -30,6 +31,16 @@ pub struct Unreachable {
 }
 
 impl ClosedForm {
+    /// The functions for evaluation at every instant; value 0 is the functions' time.
+    pub(super) fn tape(&self) -> Tape {
+        Tape::new(self.functions.iter().map(|function| &function.program))
+    }
+
+    /// The functions' time at `t`.
+    pub(super) fn time(&self, t: f64) -> Jet {
+        Jet::new(self.pace * t, self.pace, 0.0)
+    }
+
     /// Number of values of [`Self::evaluate`].
     pub(super) fn length(&self) -> usize {
         1 + self.functions.len()
@@ -37,7 +48,7 @@ impl ClosedForm {
 
     /// The time and the functions at `t`, in the order of the programs' variables.
     pub(super) fn evaluate(&self, t: f64, values: &mut [Jet]) {
-        values[0] = Jet::new(self.pace * t, self.pace, 0.0);
+        values[0] = self.time(t);
         for (i, function) in self.functions.iter().enumerate() {
             values[i + 1] = function.program.eval(values);
         }
@@ -74,12 +85,16 @@ impl ClosedForm {
     pub(super) fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
         let period = Some(self.repetition()).filter(|period| period.is_finite()).unwrap_or(0.0);
-        let mut values = self.at(0.0);
+        let mut values = vec![0.0; self.length()];
         let mut worst: Option<Unreachable> = None;
         for n in 0..=SAMPLES {
             let time = period * f64::from(n) / f64::from(SAMPLES);
-            self.evaluate(time, &mut values);
-            for (function, Jet { value, .. }) in self.functions.iter().zip(&values[1..]) {
+            // Values alone, which are those of the jets.
+            values[0] = self.pace * time;
+            for (i, function) in self.functions.iter().enumerate() {
+                values[i + 1] = function.program.eval(&values);
+            }
+            for (function, value) in self.functions.iter().zip(&values[1..]) {
                 // Not a number, too, is not above 0.
                 if let Some(what) = &function.positive
                     && !(*value > 0.0)

@@ -3,7 +3,7 @@
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
-use crate::machine::{ClosedForm, Mat3, Quat, Vec3};
+use crate::machine::{Mat3, Quat, Vec3};
 
 /// Motion of a body's centroid frame. For the world everything is zero.
 #[derive(Clone, Copy, Debug)]
@@ -243,8 +243,8 @@ pub fn accelerate(child: &mut Kinematics, parent: &Kinematics, revolute: bool, r
 /// Motion prescribed by time alone, computed once per instant.
 pub struct Driven {
     time: Option<f64>,
-    /// Time, coordinates and motion of the bodies at the instant before, to which the end of a step often returns.
-    earlier: (Option<f64>, Vec<Jet>, Vec<Kinematics>),
+    /// Time, coordinates, motion of the bodies and functions at the instant before, to which the end of a step often returns.
+    earlier: (Option<f64>, Vec<Jet>, Vec<Kinematics>, Vec<Jet>),
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
     /// Values of the closed form; empty if there is none.
@@ -258,11 +258,12 @@ impl Driven {
     pub fn new(model: &Model) -> Self {
         let bodies: Vec<usize> = model.order.iter().copied().filter(|&b| model.bodies[b].driven_only).collect();
         let coordinates = vec![Jet::default(); model.drives.len()];
+        let functions = vec![Jet::default(); model.functions.length()];
         Self {
             time: None,
-            earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()]),
+            earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()], functions.clone()),
             coordinates,
-            functions: vec![Jet::default(); model.closed_form.as_ref().map_or(0, ClosedForm::length)],
+            functions,
             bodies,
         }
     }
@@ -285,17 +286,14 @@ impl Driven {
         if self.time == Some(t) {
             return;
         }
-        // A closed form computes more than these, at once.
-        if self.time.is_some() && model.closed_form.is_none() {
+        if self.time.is_some() {
             self.exchange(motion);
             if self.time == Some(t) {
                 return;
             }
         }
         self.time = Some(t);
-        if let Some(form) = &model.closed_form {
-            form.evaluate(t, &mut self.functions);
-        }
+        self.evaluate_functions(model, t);
         for i in 0..self.coordinates.len() {
             self.coordinates[i] = model.drive(i, t, &self.functions);
         }
@@ -304,9 +302,22 @@ impl Driven {
         }
     }
 
+    /// Evaluates the closed form, if any, unless the instant is that of its values.
+    fn evaluate_functions(&mut self, model: &Model, t: f64) {
+        let Some(form) = &model.closed_form else {
+            return;
+        };
+        let time = form.time(t);
+        if self.functions[0] != time {
+            self.functions[0] = time;
+            model.functions.run(&mut self.functions);
+        }
+    }
+
     /// Exchanges the latest instant with the one before.
     fn exchange(&mut self, motion: &mut [Kinematics]) {
-        let (time, coordinates, bodies) = &mut self.earlier;
+        let (time, coordinates, bodies, functions) = &mut self.earlier;
+        std::mem::swap(&mut self.functions, functions);
         std::mem::swap(&mut self.time, time);
         std::mem::swap(&mut self.coordinates, coordinates);
         for (&b, body) in self.bodies.iter().zip(bodies) {
@@ -319,15 +330,11 @@ impl Driven {
         if self.time == Some(t) || path.drives.is_empty() {
             return;
         }
-        if model.closed_form.is_some() {
-            // A closed form computes all its coordinates at once.
-            self.update(model, t, motion);
-            return;
-        }
         // Only part of the coordinates now belong to this instant.
         self.time = None;
+        self.evaluate_functions(model, t);
         for &i in &path.drives {
-            self.coordinates[i] = model.drive(i, t, &[]);
+            self.coordinates[i] = model.drive(i, t, &self.functions);
         }
         for &b in &path.driven {
             self.move_body(model, b, motion);

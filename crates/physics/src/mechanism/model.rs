@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::assembly::{Assembled, Settled};
 use super::drives::{Law, Trajectory, trajectory_of};
 use super::factor::{NONE, Pattern};
+use crate::expression::Tape;
 use crate::jet::Jet;
 use crate::machine::{
     Attachment, ClosedForm, Drive, Freedom, Joint, JointKind, JointStart, Machine, Mat3, Path, Quat, StartRule, Vec3,
@@ -166,6 +167,8 @@ pub struct Model {
     pub ideal_joints: Vec<usize>,
     pub drives: Vec<DriveLaw>,
     pub closed_form: Option<ClosedForm>,
+    /// Functions of the closed form, for evaluation at every instant.
+    pub functions: Tape,
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as specified in the scene.
     pub start_state: Vec<f64>,
@@ -309,6 +312,7 @@ impl Model {
             ideal_joints: Vec::new(),
             drives,
             closed_form: machine.closed_form.clone(),
+            functions: machine.closed_form.as_ref().map_or_else(Tape::default, ClosedForm::tape),
             start: machine.start,
             start_state: Vec::new(),
             scale: Vec::new(),
