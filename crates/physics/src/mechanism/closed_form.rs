@@ -1,7 +1,7 @@
 //! Evaluation of a motion in closed form, with exact first and second derivatives.
 
 use super::MechanismError;
-use crate::expression::Tape;
+use crate::expression::{Number, Tape};
 use crate::jet::Jet;
 use crate::machine::{ClosedForm, Mat3, Path, Vec3};
 
@@ -42,22 +42,22 @@ impl ClosedForm {
     }
 
     /// Number of values of [`Self::evaluate`].
-    pub(super) fn length(&self) -> usize {
+    fn length(&self) -> usize {
         1 + self.functions.len()
     }
 
-    /// The time and the functions at `t`, in the order of the programs' variables.
-    pub(super) fn evaluate(&self, t: f64, values: &mut [Jet]) {
-        values[0] = self.time(t);
+    /// The functions' `time` and the functions, in the order of the programs' variables.
+    fn evaluate<N: Number>(&self, time: N, values: &mut [N]) {
+        values[0] = time;
         for (i, function) in self.functions.iter().enumerate() {
             values[i + 1] = function.program.eval(values);
         }
     }
 
-    /// The same, in a vector of its own.
+    /// The same at `t`, in a vector of its own.
     pub(super) fn at(&self, t: f64) -> Vec<Jet> {
         let mut values = vec![Jet::default(); self.length()];
-        self.evaluate(t, &mut values);
+        self.evaluate(self.time(t), &mut values);
         values
     }
 
@@ -90,10 +90,7 @@ impl ClosedForm {
         for n in 0..=SAMPLES {
             let time = period * f64::from(n) / f64::from(SAMPLES);
             // Values alone, which are those of the jets.
-            values[0] = self.pace * time;
-            for (i, function) in self.functions.iter().enumerate() {
-                values[i + 1] = function.program.eval(&values);
-            }
+            self.evaluate(self.time(time).value, &mut values);
             for (function, value) in self.functions.iter().zip(&values[1..]) {
                 // Not a number, too, is not above 0.
                 if let Some(what) = &function.positive
