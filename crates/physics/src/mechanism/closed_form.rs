@@ -18,16 +18,18 @@ pub struct ClosedMotion {
 
 /// A motion that the machine cannot follow at some instant.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what} at t = {time:.4} s: {function} = {value:.4e} in SI units, and must be above 0")]
+#[error("{what} at t = {time:.4} s: {function} = {value:.4e} in SI units, and must be {wanted}")]
 pub struct Unreachable {
     /// What is wrong.
     pub what: String,
     /// Name of the function that shows it.
     pub function: String,
-    /// Instant at which its value is lowest, s.
+    /// Instant at which its value is lowest, or the first at which it is not finite, s.
     pub time: f64,
     /// Its value there, SI.
     pub value: f64,
+    /// What the value must be.
+    pub wanted: &'static str,
 }
 
 impl ClosedForm {
@@ -81,28 +83,36 @@ impl ClosedForm {
     /// Samples one period, or the start if the functions stand still, and reports the function that is the lowest below what it must be.
     ///
     /// # Errors
-    /// A function is not above 0 that must be.
+    /// A function is not above 0 that must be, or has no finite value.
     pub(super) fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
         let period = Some(self.repetition()).filter(|period| period.is_finite()).unwrap_or(0.0);
         let mut values = vec![0.0; self.length()];
-        let mut worst: Option<Unreachable> = None;
+        let (mut worst, mut infinite): (Option<Unreachable>, Option<Unreachable>) = (None, None);
         for n in 0..=SAMPLES {
             let time = period * f64::from(n) / f64::from(SAMPLES);
             // Values alone, which are those of the jets.
             self.evaluate(self.time(time).value, &mut values);
-            for (function, value) in self.functions.iter().zip(&values[1..]) {
-                // Not a number, too, is not above 0.
-                if let Some(what) = &function.positive
-                    && !(*value > 0.0)
-                    && worst.as_ref().is_none_or(|worst| !(*value >= worst.value))
-                {
-                    worst =
-                        Some(Unreachable { what: what.clone(), function: function.name.clone(), time, value: *value });
+            for (function, &value) in self.functions.iter().zip(&values[1..]) {
+                let fault = |what: &str, wanted| {
+                    let (what, function) = (what.to_owned(), function.name.clone());
+                    Some(Unreachable { what, function, time, value, wanted })
+                };
+                match &function.positive {
+                    // Not a number, too, is not above 0.
+                    Some(what) if !(value > 0.0) => {
+                        if worst.as_ref().is_none_or(|worst| !(value >= worst.value)) {
+                            worst = fault(what, "above 0");
+                        }
+                    }
+                    None if !value.is_finite() && infinite.is_none() => {
+                        infinite = fault("a function has no value", "finite");
+                    }
+                    Some(_) | None => {}
                 }
             }
         }
-        worst.map_or(Ok(()), |worst| Err(worst.into()))
+        worst.or(infinite).map_or(Ok(()), |fault| Err(fault.into()))
     }
 }
 
@@ -188,6 +198,13 @@ mod tests {
         };
         assert_eq!((error.function.as_str(), error.what.as_str()), ("root1", "slider 1: rod too short"));
         assert!(error.value < 0.0, "{error}");
+        let mut silent = paper(&[("spcmm.slider_plane", "0 m".to_owned())]);
+        silent.functions.iter_mut().for_each(|function| function.positive = None);
+        let Err(MechanismError::Unreachable(error)) = silent.check() else {
+            panic!("roots of negative numbers are values")
+        };
+        assert!(error.to_string().starts_with("a function has no value at t = 0."), "{error}");
+        assert!(error.function == "f1" && error.value.is_nan() && error.wanted == "finite", "{error}");
     }
 
     #[test]
