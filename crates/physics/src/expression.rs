@@ -65,11 +65,30 @@ pub trait Number: Copy {
     fn unary(self, operation: Unary) -> Self;
     /// The result of `operation` with `self` on the left, or as the first argument.
     fn binary(self, operation: Binary, other: Self) -> Self;
+
+    /// Sine and cosine.
+    fn sin_cos(self) -> (Self, Self) {
+        (self.unary(Unary::Sin), self.unary(Unary::Cos))
+    }
+
+    /// `self` times `factor`.
+    fn scaled(self, factor: f64) -> Self {
+        Self::constant(factor).binary(Binary::Multiply, self)
+    }
+
+    /// `self` plus `shift`.
+    fn shifted(self, shift: f64) -> Self {
+        Self::constant(shift).binary(Binary::Add, self)
+    }
 }
 
 impl Number for f64 {
     fn constant(value: f64) -> Self {
         value
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        libm::sincos(self)
     }
 
     fn unary(self, operation: Unary) -> Self {
@@ -103,6 +122,34 @@ impl Number for f64 {
             Binary::Min => self.min(other),
             Binary::Max => self.max(other),
         }
+    }
+}
+
+/// Several numbers at once, each as if alone.
+impl<N: Number, const COUNT: usize> Number for [N; COUNT] {
+    fn constant(value: f64) -> Self {
+        [N::constant(value); COUNT]
+    }
+
+    fn unary(self, operation: Unary) -> Self {
+        self.map(|x| x.unary(operation))
+    }
+
+    fn binary(self, operation: Binary, other: Self) -> Self {
+        std::array::from_fn(|i| self[i].binary(operation, other[i]))
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        let both = self.map(N::sin_cos);
+        (both.map(|(sine, _)| sine), both.map(|(_, cosine)| cosine))
+    }
+
+    fn scaled(self, factor: f64) -> Self {
+        self.map(|x| x.scaled(factor))
+    }
+
+    fn shifted(self, shift: f64) -> Self {
+        self.map(|x| x.shifted(shift))
     }
 }
 
@@ -170,6 +217,14 @@ pub struct Program {
 }
 
 impl Program {
+    /// Indices of the variables that it reads, some perhaps twice.
+    pub fn variables(&self) -> impl Iterator<Item = usize> + '_ {
+        self.steps.iter().filter_map(|step| match step {
+            Step::Variable(index) => Some(*index),
+            _ => None,
+        })
+    }
+
     /// Parses `text`. `variable` maps a name to the index of its value in [`Self::eval`]; `names` are candidates for the
     /// suggestions of an error.
     ///

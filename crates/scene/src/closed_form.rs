@@ -110,7 +110,8 @@ pub(super) fn read_closed_form(section: &Section<'_>) -> Result<ClosedForm, Scen
             .map_err(|error| within(&formula, formula.text().unwrap_or(""), error.at(), &error.to_string()))?;
         reading.add_function(name, value);
         let positive = entry.get("positive").map(|node| node.text()).transpose()?;
-        functions.push(Function { name: name.to_owned(), program, positive: positive.map(str::to_owned) });
+        let positive = positive.map(str::to_owned);
+        functions.push(Function { name: name.to_owned(), program, unit: value.unit(), positive });
     }
     Ok(ClosedForm { frequency: section.number("frequency")?, pace: 1.0, functions, path: read_path(section)? })
 }

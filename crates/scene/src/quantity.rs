@@ -50,6 +50,11 @@ impl Quantity {
         self.value
     }
 
+    /// Its unit in the base units; empty for a pure number, or where there is none.
+    pub fn unit(&self) -> String {
+        self.powers.map_or_else(|_| String::new(), unit_of)
+    }
+
     /// Whether it is a pure number.
     pub fn is_pure(&self) -> bool {
         matches!(self.powers, Ok([0, 0, 0, 0]))

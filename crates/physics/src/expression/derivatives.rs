@@ -8,6 +8,19 @@ impl Number for Jet {
         Self::constant(value)
     }
 
+    fn sin_cos(self) -> (Self, Self) {
+        Self::sin_cos(self)
+    }
+
+    fn scaled(self, factor: f64) -> Self {
+        factor * self
+    }
+
+    fn shifted(self, shift: f64) -> Self {
+        Self { value: shift + self.value, ..self }
+    }
+
+    #[inline(always)]
     fn unary(self, operation: Unary) -> Self {
         let x = self.value;
         // The value equals that in f64, bit for bit.
@@ -42,6 +55,7 @@ impl Number for Jet {
         self.chain(g, g1, g2)
     }
 
+    #[inline(always)]
     fn binary(self, operation: Binary, other: Self) -> Self {
         match operation {
             Binary::Add => self + other,

@@ -1,7 +1,6 @@
 //! Several programs as one list of operations on numbered values, for those that are evaluated at every instant.
 
-use super::{Binary, Number as _, Program, Step, Unary};
-use crate::jet::Jet;
+use super::{Binary, Number, Program, Step, Unary};
 
 /// Programs of which each may use the variables, of which there is one, and the results of the programs before it.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +21,8 @@ enum Operation {
     Shift(f64, usize),
     /// The value subtracted from the constant.
     From(f64, usize),
+    /// The sine, and the cosine as the value at the second index.
+    SinCos(usize, usize),
     Unary(Unary, usize),
     Binary(Binary, usize, usize),
     /// A constant on the left, or on the right.
@@ -48,7 +49,7 @@ impl Tape {
                     Step::Constant(value) => Operand::Constant(value),
                     Step::Variable(index) => Operand::Value(index),
                     Step::Unary(unary) => match stack.pop() {
-                        Some(Operand::Value(x)) => tape.push(Operation::Unary(unary, x)),
+                        Some(Operand::Value(x)) => tape.unary(unary, x),
                         Some(Operand::Constant(x)) => Operand::Constant(x.unary(unary)),
                         None => continue,
                     },
@@ -86,6 +87,23 @@ impl Tape {
         Operand::Value(self.length - 1)
     }
 
+    fn unary(&mut self, unary: Unary, x: usize) -> Operand {
+        let (Unary::Sin | Unary::Cos) = unary else {
+            return self.push(Operation::Unary(unary, x));
+        };
+        let known = self.operations.iter().find_map(|(to, own)| match own {
+            Operation::SinCos(angle, cosine) if *angle == x => Some((*to, *cosine)),
+            _ => None,
+        });
+        let (sine, cosine) = known.unwrap_or_else(|| {
+            let (cosine, sine) = (self.length, self.length + 1);
+            self.operations.push((sine, Operation::SinCos(x, cosine)));
+            self.length += 2;
+            (sine, cosine)
+        });
+        Operand::Value(if unary == Unary::Sin { sine } else { cosine })
+    }
+
     fn binary(&mut self, binary: Binary, x: Operand, y: Operand) -> Operand {
         use Operand::{Constant, Value};
         self.push(match (binary, x, y) {
@@ -114,25 +132,29 @@ impl Tape {
     ///
     /// # Panics
     /// If there are fewer than [`Self::length`].
-    pub fn run(&self, values: &mut [Jet]) {
+    pub fn run<N: Number>(&self, values: &mut [N]) {
         let values = &mut values[..self.length];
-        for (to, operation) in &self.operations {
-            values[*to] = match *operation {
-                Operation::Constant(c) => Jet::constant(c),
-                Operation::Copy(x) => values[x],
-                Operation::Sum(x, y) => values[x] + values[y],
-                Operation::Difference(x, y) => values[x] - values[y],
-                Operation::Product(x, y) => values[x] * values[y],
-                Operation::Scale(c, x) => c * values[x],
-                Operation::Shift(c, x) => Jet { value: c + values[x].value, ..values[x] },
-                Operation::From(c, x) => Jet::constant(c) - values[x],
-                Operation::Unary(Unary::Sin, x) => Jet::sin_cos(values[x]).0,
-                Operation::Unary(Unary::Cos, x) => Jet::sin_cos(values[x]).1,
-                Operation::Unary(unary, x) => values[x].unary(unary),
-                Operation::Binary(binary, x, y) => values[x].binary(binary, values[y]),
-                Operation::OfConstant(binary, c, x) => Jet::constant(c).binary(binary, values[x]),
-                Operation::ByConstant(binary, x, c) => values[x].binary(binary, Jet::constant(c)),
-            };
+        for &(to, operation) in &self.operations {
+            match operation {
+                Operation::Constant(c) => values[to] = N::constant(c),
+                Operation::Copy(x) => values[to] = values[x],
+                Operation::Sum(x, y) => values[to] = values[x].binary(Binary::Add, values[y]),
+                Operation::Difference(x, y) => values[to] = values[x].binary(Binary::Subtract, values[y]),
+                Operation::Product(x, y) => values[to] = values[x].binary(Binary::Multiply, values[y]),
+                Operation::Scale(c, x) => values[to] = values[x].scaled(c),
+                Operation::Shift(c, x) => values[to] = values[x].shifted(c),
+                Operation::From(c, x) => values[to] = N::constant(c).binary(Binary::Subtract, values[x]),
+                Operation::SinCos(x, cosine) => (values[to], values[cosine]) = values[x].sin_cos(),
+                // Inlined.
+                Operation::Unary(Unary::Sqrt, x) => values[to] = values[x].unary(Unary::Sqrt),
+                Operation::Unary(unary, x) => values[to] = values[x].unary(unary),
+                Operation::Binary(binary, x, y) => values[to] = values[x].binary(binary, values[y]),
+                Operation::OfConstant(Binary::Divide, c, x) => {
+                    values[to] = N::constant(c).binary(Binary::Divide, values[x])
+                }
+                Operation::OfConstant(binary, c, x) => values[to] = N::constant(c).binary(binary, values[x]),
+                Operation::ByConstant(binary, x, c) => values[to] = values[x].binary(binary, N::constant(c)),
+            }
         }
     }
 }
@@ -140,6 +162,7 @@ impl Tape {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jet::Jet;
 
     #[test]
     fn a_tape_computes_what_its_programs_do() {
@@ -152,6 +175,7 @@ mod tests {
             "-t + 4 - d",
             "5 - sqrt(t)*(t - 1)",
             "atan2(a, 3)",
+            "cos(b) + sin(b)",
         ];
         let names = ["t", "a", "b", "c", "d"];
         let parse = |text: &&str| Program::parse(text, |name| names.iter().position(|own| *own == name), &names);
@@ -166,6 +190,10 @@ mod tests {
                 one_by_one.push(program.eval(&one_by_one));
             }
             assert_eq!(one_by_one, by_tape[..one_by_one.len()]);
+            let mut plain = vec![0.0; tape.length()];
+            plain[0] = t;
+            tape.run(&mut plain);
+            assert!(by_tape.iter().zip(plain).all(|(jet, value)| jet.value == value), "{t}");
         }
     }
 }

@@ -106,6 +106,7 @@ impl Stepper for DormandPrince {
     ) -> f64 {
         let Self { k2, k3, k4, k5, k6, stage, raw_end, raw_k_end, kept } = self;
         *kept = 1.0;
+        system.announce(&C.map(|c| t + c * h));
         let [a2, a3, a4, a5, a6] = &A;
         combine(system.moving(), stage, y, h, [(a2[0], k)]);
         system.derivative(t + C[0] * h, stage, k2);

@@ -87,6 +87,9 @@ pub trait System {
     /// Components that steps advance, in order. All other components are frozen and must not be touched; their derivatives are
     /// zero.
     fn moving(&self) -> &[Range<usize>];
+    /// Announces instants for which [`Self::derivative`] will be asked, so that what depends on time alone can be computed for all
+    /// of them together.
+    fn announce(&mut self, _times: &[f64]) {}
     /// Writes f(t, y) to `dy`.
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
     /// Writes the position part of f alone to the first [`System::positions`] components of `dy`; evaluates no force.

@@ -272,6 +272,7 @@ impl Radau {
         self.contraction = 0.0;
         let mut before = 0.0;
         let mut renewed = false;
+        system.announce(&C.map(|c| t + c * h));
         for iteration in 0..MOST_ITERATIONS {
             for j in 0..3 {
                 add(system.moving(), &mut self.stage, y, &self.z[j]);

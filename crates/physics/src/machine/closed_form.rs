@@ -23,6 +23,8 @@ pub struct Function {
     pub name: String,
     /// The time, s, is variable 0, the function at index i is variable i + 1. The value is in SI units.
     pub program: Program,
+    /// Its unit in the base units, for messages; empty for a pure number.
+    pub unit: String,
     /// For a value that must be above 0, such as what is left of a rod's length: what is wrong where it is not.
     pub positive: Option<String>,
 }

@@ -1,9 +1,10 @@
 //! Evaluation of a motion in closed form, with exact first and second derivatives.
 
 use super::MechanismError;
-use crate::expression::{Number, Tape};
+use super::model::Model;
+use crate::expression::{Number, Program, Tape};
 use crate::jet::Jet;
-use crate::machine::{ClosedForm, Mat3, Path, Vec3};
+use crate::machine::{ClosedForm, Function, Mat3, Path, Vec3};
 
 /// Motion of the output body's frame in closed form at one instant.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +19,7 @@ pub struct ClosedMotion {
 
 /// A motion that the machine cannot follow at some instant.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what} at t = {time:.4} s: {function} = {value:.4e} in SI units, and must be {wanted}")]
+#[error("{what} at t = {time:.4} s: {function} = {value}, and must be {wanted}")]
 pub struct Unreachable {
     /// What is wrong.
     pub what: String,
@@ -26,8 +27,8 @@ pub struct Unreachable {
     pub function: String,
     /// Instant at which its value is lowest, or the first at which it is not finite, s.
     pub time: f64,
-    /// Its value there, SI.
-    pub value: f64,
+    /// Its value there, with its unit.
+    pub value: String,
     /// What the value must be.
     pub wanted: &'static str,
 }
@@ -86,37 +87,98 @@ impl ClosedForm {
     /// A function is not above 0 that must be, or has no finite value.
     pub(super) fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
+        const AT_ONCE: usize = 8;
         let period = Some(self.repetition()).filter(|period| period.is_finite()).unwrap_or(0.0);
-        let mut values = vec![0.0; self.length()];
-        let (mut worst, mut infinite): (Option<Unreachable>, Option<Unreachable>) = (None, None);
-        for n in 0..=SAMPLES {
-            let time = period * f64::from(n) / f64::from(SAMPLES);
+        let tape = self.tape();
+        let mut values = vec![[0.0; AT_ONCE]; tape.length()];
+        // Index of a function, instant and value.
+        let (mut lowest, mut infinite) = (None::<(usize, f64, f64)>, None::<(usize, f64, f64)>);
+        let samples = if period > 0.0 { SAMPLES } else { 0 };
+        for first in (0..=samples).step_by(AT_ONCE) {
+            let times =
+                std::array::from_fn(|n| period * f64::from((first + n as u32).min(samples)) / f64::from(SAMPLES));
             // Values alone, which are those of the jets.
-            self.evaluate(self.time(time).value, &mut values);
-            for (function, &value) in self.functions.iter().zip(&values[1..]) {
-                let fault = |what: &str, wanted| {
-                    let (what, function) = (what.to_owned(), function.name.clone());
-                    Some(Unreachable { what, function, time, value, wanted })
-                };
-                match &function.positive {
+            values[0] = times.map(|time| self.time(time).value);
+            tape.run(&mut values);
+            for (n, time) in times.into_iter().enumerate() {
+                for (i, function) in self.functions.iter().enumerate() {
+                    let value = values[i + 1][n];
                     // Not a number, too, is not above 0.
-                    Some(what) if !(value > 0.0) => {
-                        if worst.as_ref().is_none_or(|worst| !(value >= worst.value)) {
-                            worst = fault(what, "above 0");
+                    if function.positive.is_some() && !(value > 0.0) {
+                        if lowest.is_none_or(|(.., lowest)| !(value >= lowest)) {
+                            lowest = Some((i, time, value));
                         }
+                    } else if function.positive.is_none() && !value.is_finite() && infinite.is_none() {
+                        infinite = Some((i, time, value));
                     }
-                    None if !value.is_finite() && infinite.is_none() => {
-                        infinite = fault("a function has no value", "finite");
-                    }
-                    Some(_) | None => {}
                 }
             }
         }
-        worst.or(infinite).map_or(Ok(()), |fault| Err(fault.into()))
+        let fault = |(i, time, value): (usize, f64, f64), wanted| {
+            let Function { name, unit, positive, .. } = &self.functions[i];
+            let what = positive.clone().unwrap_or_else(|| "a function has no value".to_owned());
+            let value = format!("{value:.4e} {unit}").trim_end().to_owned();
+            MechanismError::from(Unreachable { what, function: name.clone(), time, value, wanted })
+        };
+        match (lowest, infinite) {
+            (Some(lowest), _) => Err(fault(lowest, "above 0")),
+            (None, Some(infinite)) => Err(fault(infinite, "finite")),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+/// Maximum number of instants announced at once: the stages of Dormand-Prince.
+const ANNOUNCED: usize = 5;
+
+/// Values of the functions at the latest instant, and at instants announced.
+pub struct Values {
+    /// As the tape leaves them, or only those in [`Model::read`] where they were announced; empty without a closed form.
+    pub latest: Vec<Jet>,
+    announced: Vec<[Jet; ANNOUNCED]>,
+}
+
+impl Values {
+    /// For `model`, at no instant.
+    pub(super) fn new(model: &Model) -> Self {
+        let never = Jet::constant(f64::NAN);
+        let length = model.functions.length();
+        Self { latest: vec![never; length], announced: vec![[never; ANNOUNCED]; length] }
+    }
+
+    /// Evaluates the functions at `times`, of which there are at most [`ANNOUNCED`].
+    pub(super) fn announce(&mut self, model: &Model, times: &[f64]) {
+        let (Some(form), Some(last)) = (&model.closed_form, times.len().checked_sub(1)) else {
+            return;
+        };
+        self.announced[0] = std::array::from_fn(|i| form.time(times[i.min(last)]));
+        model.functions.run(&mut self.announced);
+    }
+
+    /// Evaluates them at `t`, unless that is done.
+    pub(super) fn evaluate(&mut self, model: &Model, t: f64) {
+        let Some(form) = &model.closed_form else {
+            return;
+        };
+        let time = form.time(t);
+        if self.latest[0] == time {
+            return;
+        }
+        self.latest[0] = time;
+        match self.announced[0].iter().position(|announced| *announced == time) {
+            Some(instant) => model.read.iter().for_each(|&i| self.latest[i] = self.announced[i][instant]),
+            None => model.functions.run(&mut self.latest),
+        }
     }
 }
 
 impl Path {
+    /// Indices of the values that it reads, some perhaps twice.
+    pub(super) fn variables(&self) -> impl Iterator<Item = usize> + '_ {
+        let turns = self.turns.iter().map(|(_, angle)| angle);
+        self.position.iter().chain(turns).flat_map(Program::variables)
+    }
+
     /// The motion for these `values` of [`ClosedForm::evaluate`].
     pub(super) fn at(&self, values: &[Jet]) -> ClosedMotion {
         let mut rotation = Mat3::identity();
@@ -197,14 +259,14 @@ mod tests {
             panic!("the rod is long enough");
         };
         assert_eq!((error.function.as_str(), error.what.as_str()), ("root1", "slider 1: rod too short"));
-        assert!(error.value < 0.0, "{error}");
+        assert!(error.value.starts_with('-') && error.value.ends_with(" m^2"), "{error}");
         let mut silent = paper(&[("spcmm.slider_plane", "0 m".to_owned())]);
         silent.functions.iter_mut().for_each(|function| function.positive = None);
         let Err(MechanismError::Unreachable(error)) = silent.check() else {
             panic!("roots of negative numbers are values")
         };
         assert!(error.to_string().starts_with("a function has no value at t = 0."), "{error}");
-        assert!(error.function == "f1" && error.value.is_nan() && error.wanted == "finite", "{error}");
+        assert!(error.function == "f1" && error.value == "NaN m" && error.wanted == "finite", "{error}");
     }
 
     #[test]

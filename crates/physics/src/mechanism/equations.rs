@@ -33,6 +33,9 @@ pub(super) trait Equations: Send + Sync {
     /// Motion prescribed as a function of time.
     fn driven(&self) -> &Driven;
 
+    /// The same, to be told of later instants.
+    fn driven_mut(&mut self) -> &mut Driven;
+
     /// Coordinate and rate of the joint above body `b`, after an evaluation at `y`: m and m/s, or rad and rad/s; `None` if the
     /// joint neither slides nor turns.
     fn coordinate(&self, model: &Model, y: &[f64], b: BodyIndex) -> Option<[f64; 2]>;

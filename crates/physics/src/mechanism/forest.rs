@@ -80,6 +80,10 @@ impl Equations for Forest {
         &self.tree.driven
     }
 
+    fn driven_mut(&mut self) -> &mut Driven {
+        &mut self.tree.driven
+    }
+
     fn coordinate(&self, model: &Model, y: &[f64], b: BodyIndex) -> Option<[f64; 2]> {
         match model.bodies[b].motion {
             Motion::Driven { drive, .. } => Some(self.tree.driven.coordinate(drive)),

@@ -1,5 +1,6 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
+use super::closed_form::Values;
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
@@ -247,8 +248,8 @@ pub struct Driven {
     earlier: (Option<f64>, Vec<Jet>, Vec<Kinematics>, Vec<Jet>),
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
-    /// Values of the closed form; empty if there is none.
-    pub functions: Vec<Jet>,
+    /// Values of the closed form.
+    pub functions: Values,
     /// Bodies that depend on time alone, parents before children.
     bodies: Vec<usize>,
 }
@@ -258,10 +259,10 @@ impl Driven {
     pub fn new(model: &Model) -> Self {
         let bodies: Vec<usize> = model.order.iter().copied().filter(|&b| model.bodies[b].driven_only).collect();
         let coordinates = vec![Jet::default(); model.drives.len()];
-        let functions = vec![Jet::default(); model.functions.length()];
+        let functions = Values::new(model);
         Self {
             time: None,
-            earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()], functions.clone()),
+            earlier: (None, coordinates.clone(), vec![Kinematics::rest(); bodies.len()], functions.latest.clone()),
             coordinates,
             functions,
             bodies,
@@ -287,42 +288,39 @@ impl Driven {
             return;
         }
         if self.time.is_some() {
-            self.exchange(motion);
+            self.exchange(t, motion);
             if self.time == Some(t) {
                 return;
             }
         }
         self.time = Some(t);
-        self.evaluate_functions(model, t);
+        self.functions.evaluate(model, t);
         for i in 0..self.coordinates.len() {
-            self.coordinates[i] = model.drive(i, t, &self.functions);
+            self.coordinates[i] = model.drive(i, t, &self.functions.latest);
         }
         for &b in &self.bodies {
             self.move_body(model, b, motion);
         }
     }
 
-    /// Evaluates the closed form, if any, unless the instant is that of its values.
-    fn evaluate_functions(&mut self, model: &Model, t: f64) {
-        let Some(form) = &model.closed_form else {
-            return;
-        };
-        let time = form.time(t);
-        if self.functions[0] != time {
-            self.functions[0] = time;
-            model.functions.run(&mut self.functions);
-        }
-    }
-
-    /// Exchanges the latest instant with the one before.
-    fn exchange(&mut self, motion: &mut [Kinematics]) {
+    /// Exchanges the latest instant with the one before, or moves it there if `t` is not that one.
+    fn exchange(&mut self, t: f64, motion: &mut [Kinematics]) {
         let (time, coordinates, bodies, functions) = &mut self.earlier;
-        std::mem::swap(&mut self.functions, functions);
+        let returns = *time == Some(t);
+        std::mem::swap(&mut self.functions.latest, functions);
         std::mem::swap(&mut self.time, time);
         std::mem::swap(&mut self.coordinates, coordinates);
         for (&b, body) in self.bodies.iter().zip(bodies) {
-            std::mem::swap(&mut motion[b], body);
+            match returns {
+                true => std::mem::swap(&mut motion[b], body),
+                false => *body = motion[b],
+            }
         }
+    }
+
+    /// Prepares the motion at instants of which each will soon be the latest.
+    pub fn announce(&mut self, model: &Model, times: &[f64]) {
+        self.functions.announce(model, times);
     }
 
     /// The same for the bodies on `path` alone.
@@ -332,9 +330,9 @@ impl Driven {
         }
         // Only part of the coordinates now belong to this instant.
         self.time = None;
-        self.evaluate_functions(model, t);
+        self.functions.evaluate(model, t);
         for &i in &path.drives {
-            self.coordinates[i] = model.drive(i, t, &self.functions);
+            self.coordinates[i] = model.drive(i, t, &self.functions.latest);
         }
         for &b in &path.driven {
             self.move_body(model, b, motion);

@@ -347,6 +347,10 @@ impl Equations for Lagrange {
         &self.driven
     }
 
+    fn driven_mut(&mut self) -> &mut Driven {
+        &mut self.driven
+    }
+
     fn coordinate(&self, model: &Model, _: &[f64], b: BodyIndex) -> Option<[f64; 2]> {
         match model.bodies[b].motion {
             Motion::Driven { drive, .. } => Some(self.driven.coordinate(drive)),

@@ -544,7 +544,7 @@ impl Mechanism {
 
     /// Motion of the output body in closed form at the latest instant, if known.
     pub fn closed_motion(&self) -> Option<ClosedMotion> {
-        Some(self.model.path()?.1.at(&self.equations.driven().functions))
+        Some(self.model.path()?.1.at(&self.equations.driven().functions.latest))
     }
 
     /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` for a joint with clearance.

@@ -169,6 +169,8 @@ pub struct Model {
     pub closed_form: Option<ClosedForm>,
     /// Functions of the closed form, for evaluation at every instant.
     pub functions: Tape,
+    /// Values of the closed form that drives and the path of the output body read.
+    pub read: Vec<usize>,
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as specified in the scene.
     pub start_state: Vec<f64>,
@@ -296,6 +298,14 @@ impl Model {
         let swings = drives.iter().map(|driven| driven.trajectory.swing(machine));
         let shortest_period = swings.fold(f64::INFINITY, f64::min);
         let laws = drives.iter().filter_map(|driven| driven.trajectory.law());
+        let followed = drives.iter().filter_map(|driven| match driven.trajectory {
+            Trajectory::Function(function) => Some(function + 1),
+            Trajectory::Own(_) => None,
+        });
+        let path = machine.closed_form.as_ref().and_then(|form| form.path.as_ref());
+        let mut read: Vec<usize> = followed.chain(path.into_iter().flat_map(Path::variables)).collect();
+        read.sort_unstable();
+        read.dedup();
         let bounding = laws.filter(|law| law.bounds_steps()).cloned().collect();
         let mut model = Self {
             bodies,
@@ -312,6 +322,7 @@ impl Model {
             ideal_joints: Vec::new(),
             drives,
             closed_form: machine.closed_form.clone(),
+            read,
             functions: machine.closed_form.as_ref().map_or_else(Tape::default, ClosedForm::tape),
             start: machine.start,
             start_state: Vec::new(),

@@ -83,6 +83,11 @@ impl System for Evaluator<'_> {
         self.mechanism.positions()
     }
 
+    fn announce(&mut self, times: &[f64]) {
+        let Mechanism { model, equations, .. } = &mut *self.mechanism;
+        equations.driven_mut().announce(model, times);
+    }
+
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.counts.equations += 1;
         self.load(t, y);
