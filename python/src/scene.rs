@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use jointplay_analysis::assembly::StartReport;
-use jointplay_analysis::near_singular::near_singular;
+use jointplay_analysis::ideal_fault::ideal_fault;
 use jointplay_physics::simulate::{Frame, Listed, Simulation, channels_of};
 use jointplay_scene::{BENCHMARKS, BUILT_IN, Kind, LiveScene, Scene, SceneError, Texts, contact_parts};
 use pyo3::prelude::*;
@@ -187,7 +187,7 @@ impl PyScene {
         all.set_item("contacts", contents.contacts)?;
         all.set_item("ideal_joints", contents.ideal_joints)?;
         let warnings = detached(py, || {
-            let singular = near_singular(scene).map(|near| near.to_string());
+            let singular = ideal_fault(scene).map(|near| near.to_string());
             let start = StartReport::of(&mut live);
             (start.warnings_of(scene).into_iter().chain(singular).collect::<Vec<_>>(), start.not_unique())
         })?;

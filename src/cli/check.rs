@@ -8,7 +8,7 @@ use super::summary::count;
 use super::{Failure, load, print, start};
 use crate::analysis::assembly::StartReport;
 use crate::analysis::beginning::Beginning;
-use crate::analysis::near_singular::near_singular;
+use crate::analysis::ideal_fault::ideal_fault;
 use crate::contact::FrictionLaw;
 use crate::integrate::{Method, StepControl};
 use crate::machine::{BallJoint, Body, Element, Joint, JointKind};
@@ -137,7 +137,7 @@ fn report(
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
-    let singular = near_singular(scene).map(|near| near.to_string());
+    let singular = ideal_fault(scene).map(|near| near.to_string());
     begun.warnings_of(scene).iter().chain(&singular).for_each(|warning| line("Warning", warning));
     Ok(out)
 }

@@ -1,11 +1,17 @@
 //! A scene whose drive follows functions of `[closed_form]`: its path is that of the machine.
 
 use crate::common::parse;
+use jointplay::analysis::ideal_fault::{IdealFault, ideal_fault};
 use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay::simulate::{Frame, Simulation, StopFault};
 
 /// A crank of 30 mm that turns at 2 Hz and pushes a block through a rod of `length`: x = r cos + sqrt(L^2 - r^2 sin^2).
 fn slider_crank(length: &str) -> Scene {
+    off_by("0 mm", length)
+}
+
+/// The same with a path that is wrong by `fault` in x.
+fn off_by(fault: &str, length: &str) -> Scene {
     let text = format!(
         r#"
         start = "ideal"
@@ -25,7 +31,7 @@ fn slider_crank(length: &str) -> Scene {
         ball_joint = [{{ name = "S", socket = {{ body = "block" }}, ball = {{ body = "rod", at = ["l", 0, 0] }} }}]
         [closed_form]
         frequency = "2 Hz"
-        x = "r*cos(turn) + sqrt(left)"
+        x = "r*cos(turn) + sqrt(left) + ({fault})"
         y = "0 mm"
         z = "0 mm"
         functions = [
@@ -54,4 +60,39 @@ fn a_scene_of_its_own_follows_its_path() {
     assert!((travel.0 - 0.07).abs() < 1e-4 && (travel.1 - 0.13).abs() < 1e-4, "{travel:?}");
     let short = Simulation::new(&slider_crank("25 mm").machine).expect_err("cannot turn").to_string();
     assert!(short.starts_with("the rod is too short at t = 0.1250 s: left = -2.7500e-4"), "{short}");
+}
+
+#[test]
+fn a_path_that_is_not_that_of_the_machine_is_named() {
+    let refused =
+        Simulation::new(&off_by("5 mm", "100 mm").machine).expect_err("its tip error would be 5 mm").to_string();
+    assert!(
+        refused.starts_with("where the loops close at t = 0, body block is 5 mm off its path in [closed_form]"),
+        "{refused}"
+    );
+    // Right at the start.
+    for loose in [false, true] {
+        let mut scene = off_by("2 mm*sin(turn)", "100 mm");
+        if loose {
+            scene.set("contact.clearance", "0.1 mm").expect("may be loose");
+        }
+        let Some(IdealFault::OffPath(time, distance)) = ideal_fault(&scene) else {
+            panic!("the path is wrong");
+        };
+        let expected = 2e-3 * (2.0 * std::f64::consts::TAU * time).sin();
+        assert!(time < 0.05 && (distance - expected).abs() < 1e-9, "{distance} at {time}");
+    }
+    assert!(ideal_fault(&slider_crank("100 mm")).is_none());
+}
+
+#[test]
+fn a_run_without_play_stops_where_it_leaves_its_path() {
+    let right = "x = \"across + (slider_plane + driving_rod)\"";
+    let text = include_str!("../../assets/scenes/spcmm.toml");
+    assert!(text.contains(right));
+    let text = text.replace(right, "x = \"across + 0.001*amplitude_x*phase + (slider_plane + driving_rod)\"");
+    let scene = parse(&text, &[("contact.clearance", "0")]);
+    let mut simulation = Simulation::new(&scene.machine).expect("starts where it should");
+    let stopped = simulation.advance_to(0.5).expect_err("leaves the path");
+    assert!(matches!(stopped.fault, StopFault::OffPath { distance } if distance < 2e-5), "{stopped}");
 }

@@ -21,7 +21,7 @@ impl Scene {
             (format!("joint.{joint}"), keys)
         };
         let (title, keys) = match &error.0 {
-            MechanismError::Unreachable(_) | MechanismError::OtherBranch | MechanismError::Singular => {
+            MechanismError::Unreachable(_) | MechanismError::OffPath { .. } | MechanismError::Singular => {
                 ("closed_form".to_owned(), own.map(|own| own.key.to_owned()).collect())
             }
             MechanismError::Open { given: gap }

@@ -31,8 +31,8 @@ use super::workers::run_jobs;
 use super::{Failure, interrupt, print, progress, threads, warn};
 use crate::analysis::axis::Axis;
 use crate::analysis::design::{Arrangement, FOLLOW_BLOCK};
+use crate::analysis::ideal_fault::{IdealFault, ideal_fault};
 use crate::analysis::layout::Status;
-use crate::analysis::near_singular::{NearSingular, near_singular};
 use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Span};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
@@ -187,7 +187,7 @@ const MOST_WARNED: usize = 64;
 #[derive(PartialEq, Eq, Hash)]
 enum Kind {
     Scene(WarningKind),
-    Singular(std::mem::Discriminant<NearSingular>),
+    Singular(std::mem::Discriminant<IdealFault>),
 }
 
 /// Warnings about the scene along the ranges, each kind with its first point, and about the sweep itself.
@@ -202,7 +202,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         };
         let of_scene = scene.machine.warnings().into_iter();
         let of_scene = of_scene.map(|warning| (Kind::Scene(warning.kind()), warning.to_string()));
-        let singular = near_singular(&scene).map(|near| {
+        let singular = ideal_fault(&scene).map(|near| {
             let kind = Kind::Singular(std::mem::discriminant(&near));
             (kind, near.to_string())
         });

@@ -1,6 +1,6 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
-use super::closed_form::Values;
+use super::closed_form::{ClosedMotion, Values};
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
@@ -239,6 +239,14 @@ pub fn accelerate(child: &mut Kinematics, parent: &Kinematics, revolute: bool, r
         child.acceleration =
             parent.point_acceleration(&offset) + 2.0 * wp.cross(&(child.axis * rate)) + child.axis * acceleration;
     }
+}
+
+/// Distance of the probe's tip in `motion`, or of the output body's origin if there is no probe, from that of `ideal`, m.
+pub fn distance_from(ideal: &ClosedMotion, model: &Model, motion: &[Kinematics]) -> f64 {
+    let (origin, body) = (model.bodies[model.output_body].origin, &motion[model.output_body]);
+    let tip = model.probe.unwrap_or(origin);
+    let ideal_tip = Vec3::from_fn(|i, _| ideal.position[i].value) + ideal.rotation * (tip - origin);
+    (body.position + body.rotation * tip - ideal_tip).norm()
 }
 
 /// Motion prescribed by time alone, computed once per instant.

@@ -55,6 +55,7 @@ pub use held::{HeldError, HeldMachine, drive_positions};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
 pub use reachable::{Farthest, TipFreedoms};
+pub use start::OFF_PATH;
 pub use summary::Summary;
 pub use systems::Evaluator;
 
@@ -122,9 +123,18 @@ pub enum MechanismError {
         /// c, m.
         clearance: f64,
     },
-    /// Loops that close on a different branch from the drives' closed form.
-    #[error("the loops close in an assembly mode other than that of the drives: the start poses are too far off")]
-    OtherBranch,
+    /// Loops that close where the closed form does not have the output body.
+    #[error(
+        "where the loops close at t = 0, body {body} is {} off its path in [closed_form]: the path does not fit the drives, or \
+         the loops close in another assembly mode because the start poses are too far off",
+        length(*.distance)
+    )]
+    OffPath {
+        /// Name of the output body.
+        body: String,
+        /// Of the probe's tip, or of the body's origin if there is no probe, m.
+        distance: f64,
+    },
     /// A start pose in which the ideal joints do not determine the velocities.
     #[error(
         "the mechanism starts in a singular pose, in which its drives do not fix its velocities: \
@@ -318,6 +328,7 @@ pub struct Mechanism {
     pub gravity: Vec3,
     /// Names of the cut joints: ball joints, then other joints that close loops.
     joint_names: Vec<String>,
+    output_name: String,
     /// Linearisation, allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
     sources: power::Sources,
@@ -390,6 +401,7 @@ impl Mechanism {
             equations,
             contacts,
             gravity: machine.gravity,
+            output_name: machine.bodies[machine.output.body].name.clone(),
             joint_names: machine.cut_joints().map(str::to_owned).collect(),
             stiff: None,
             discrete: None,
@@ -455,16 +467,11 @@ impl Mechanism {
         !self.is_kinematic() || self.equations.is_determinant_positive(&self.model)
     }
 
-    /// Distance of the output body from its closed-form motion at the latest evaluation, m, if the motion is a function of time
-    /// alone and known in closed form; otherwise 0.
-    pub fn distance_from_ideal(&self) -> f64 {
-        let Some(ideal) = self.closed_motion().filter(|_| self.is_kinematic()) else {
-            return 0.0;
-        };
-        let body = &self.model.bodies[self.model.output_body];
-        let m = &self.motion()[self.model.output_body];
-        let origin = m.position + m.rotation * body.origin;
-        (origin - Vec3::from_fn(|i, _| ideal.position[i].value)).norm()
+    /// Distance of the probe's tip, or of the output body's origin if there is no probe, from its motion in closed form at the
+    /// latest evaluation, m, if the motion is a function of time alone and known in closed form; otherwise 0.
+    pub fn distance_from_path(&self) -> f64 {
+        let ideal = self.closed_motion().filter(|_| self.is_kinematic());
+        ideal.map_or(0.0, |ideal| kinematics::distance_from(&ideal, &self.model, self.motion()))
     }
 
     /// Predicts the state after a step `h`, s, to second order in positions, if the motion is a function of time alone.

@@ -19,6 +19,8 @@ pub(super) const HELD: f64 = 1e-8;
 /// Displacement to the neighbouring poses at which the rank is checked, as a time at the scales' speeds, s: a tenth of the length
 /// scale, 0.01 rad.
 const BESIDE: f64 = 0.01;
+/// Distance of a motion without play from its closed form, m, beyond which the two differ.
+pub const OFF_PATH: f64 = 1e-6;
 /// Assembly has converged once it moves by less than this fraction of the scales.
 const AT_REST: f64 = 1e-9;
 
@@ -101,6 +103,13 @@ impl Mechanism {
         let rank = self.rank_of_closed_joints(&mut tree, &y)?;
         if rank.is_some() {
             self.check_speeds(&mut tree, &y)?;
+        }
+        // Otherwise the play may let it.
+        if let Some((form, path)) = model.path().filter(|_| assembled || self.is_kinematic()) {
+            let distance = kinematics::distance_from(&path.at(&form.at(T)), model, &tree.motion);
+            if distance > OFF_PATH {
+                return Err(MechanismError::OffPath { body: self.output_name.clone(), distance });
+            }
         }
         let settled = model.settled.as_ref().map(|settled| settled.assembly.clone());
         // A second call would find the same.

@@ -53,8 +53,6 @@ const LONGEST_STEP: f64 = 10e-3;
 const SHORTEST_STEP: f64 = 1e-14;
 /// A step that would end within this fraction of its length of a limit ends at the limit.
 const NEARLY: f64 = 1e-6;
-/// Distance of an ideal motion from its closed form, m, beyond which it has switched to another branch.
-const OTHER_BRANCH: f64 = 1e-6;
 /// Shortest retry of a kinematic step, s: how closely it approaches a pose that it cannot pass.
 const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
 /// First step after a contact begins, before a workable one is known, s: a tenth of a typical impact.

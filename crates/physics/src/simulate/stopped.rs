@@ -22,6 +22,15 @@ pub enum StopFault {
     /// An ideal motion at a pose beyond which its loops could close on another branch.
     #[error("the loops through the ideal ball joints pass a singular pose")]
     SingularLoops,
+    /// An ideal motion that is not where the closed form has the output body.
+    #[error(
+        "the output body is {distance:.1e} m off its path in [closed_form]: the path does not fit the drives here, or the loops \
+         have closed on another branch"
+    )]
+    OffPath {
+        /// Of the probe's tip, or of the body's origin if there is no probe, m.
+        distance: f64,
+    },
     /// Loops left open by projection.
     #[error("the loops through the ideal ball joints came apart by {open:.1e} m")]
     OpenLoops {
@@ -93,6 +102,9 @@ pub enum StopAdvice {
     /// Closed loops cannot stay closed here.
     #[error("the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance")]
     Dependent,
+    /// The path in closed form is wrong, or left.
+    #[error("correct its functions, or leave out x, y and z; or keep clear of singular poses")]
+    FittingPath,
     /// Adaptive steps are already as short as needed: the motion itself is beyond the model.
     #[error("try slower drives, a stiffer contact, or a tighter solver.tolerance (now {tolerance:e})")]
     GentlerMotion {

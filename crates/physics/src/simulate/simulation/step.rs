@@ -3,12 +3,12 @@
 use super::discrete::discrete_size;
 use super::flights::{clear_flights, put_flights};
 use super::{
-    Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, OTHER_BRANCH, Run, SHORTEST_KINEMATIC_STEP, State, StepEnd,
-    Workspace, store_gaps,
+    Attempt, LONGEST_STEP, Model, NEARLY, OPEN_LOOP, Run, SHORTEST_KINEMATIC_STEP, State, StepEnd, Workspace,
+    store_gaps,
 };
 use crate::integrate::{Method, StepControl, System as _};
 use crate::machine::Machine;
-use crate::mechanism::{ActiveSet, Counts, Mechanism, MechanismError};
+use crate::mechanism::{ActiveSet, Counts, Mechanism, OFF_PATH};
 use crate::simulate::peaks::Recent;
 use crate::simulate::{Frame, Indeterminate, StartError, StopAdvice, StopFault, Stopped};
 
@@ -76,9 +76,6 @@ impl Run<'_> {
         self.choose_first_member();
         self.refresh();
         self.state.record.determinant_positive = self.mechanism.is_determinant_positive();
-        if self.mechanism.distance_from_ideal() > OTHER_BRANCH {
-            return Err(MechanismError::OtherBranch.into());
-        }
         self.track_peaks(0.0);
         self.track_reactions();
         self.start_ledger();
@@ -263,13 +260,21 @@ impl Run<'_> {
         }
         self.state.record.statistics.count(self.attempt.counts);
         // Past a singular pose the loops may close again on another branch.
-        let passed = self.mechanism.is_determinant_positive() != self.state.record.determinant_positive
-            || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
-        let fault = if passed { Some(StopFault::SingularLoops) } else { self.divergence(open, h) };
+        let passed = self.mechanism.is_determinant_positive() != self.state.record.determinant_positive;
+        let distance = self.mechanism.distance_from_path();
+        let fault = if passed {
+            Some(StopFault::SingularLoops)
+        } else if distance > OFF_PATH {
+            Some(StopFault::OffPath { distance })
+        } else {
+            self.divergence(open, h)
+        };
         if let Some(fault) = fault {
             let solver = &self.state.conditions.solver;
             let advice = if passed || open.is_nan() || open > OPEN_LOOP {
                 StopAdvice::Dependent
+            } else if matches!(fault, StopFault::OffPath { .. }) {
+                StopAdvice::FittingPath
             } else {
                 match solver.method.control() {
                     StepControl::Error => StopAdvice::GentlerMotion { tolerance: solver.tolerance },

@@ -1,0 +1,111 @@
+//! The motion without play of a machine with a closed form: whether it comes near a singular pose, where the reactions of ideal
+//! joints explode even if all rods reach, and whether it is the path that tip errors are measured from.
+
+use jointplay_physics::machine::{Formulation, Machine, Output};
+use jointplay_physics::mechanism::OFF_PATH;
+use jointplay_physics::simulate::{Frame, Simulation, StopFault, closed};
+use jointplay_physics::units::format_quantity_digits;
+use jointplay_scene::Scene;
+
+/// Instants per drive period at which the ideal mechanism is examined.
+const INSTANTS: u32 = 400;
+
+/// Number of instants at which a simulated motion is compared with its path.
+const COMPARED: u32 = 40;
+
+/// Most time for which it is simulated, s.
+const LONGEST: f64 = 10.0;
+
+/// Drive frequency of this check, Hz, as in the paper.
+const SLOW: f64 = 0.5;
+
+/// Reactions above this many times the weight of all bodies indicate a mechanism about to lose its stiffness.
+const MOST_WEIGHTS: f64 = 5.0;
+
+/// What is wrong with the motion without play.
+pub enum IdealFault {
+    /// It gets stuck at this time, s.
+    Stuck(f64),
+    /// Largest reaction, N, and its time, s.
+    Loaded(f64, f64),
+    /// At this time, s, it is this far from the path in closed form, m.
+    OffPath(f64, f64),
+}
+
+impl std::fmt::Display for IdealFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stuck(time) => write!(f, "the ideal mechanism has a singular pose near t = {time:.3} s"),
+            Self::Loaded(largest, when) => write!(
+                f,
+                "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} at \
+                 t = {when:.3} s, more than {MOST_WEIGHTS} times the weight of all bodies",
+                format_quantity_digits(*largest, "N", 4)
+            ),
+            Self::OffPath(time, distance) => write!(
+                f,
+                "at t = {time:.3} s the mechanism without play is {} off the path of its output body in [closed_form], from \
+                 which tip errors are measured",
+                format_quantity_digits(*distance, "mm", 4)
+            ),
+        }
+    }
+}
+
+/// Examines the motion without play of a scene whose drives prescribe it: whether it is its path in closed form, and whether it
+/// comes near a singular pose.
+pub fn ideal_fault(scene: &Scene) -> Option<IdealFault> {
+    let mut rigid = scene.clone();
+    rigid.machine.formulation = Formulation::Tree;
+    rigid.machine.elements.clear();
+    let form = rigid.machine.closed_form.as_mut()?;
+    // Drives at rest have a single pose.
+    let instants = if form.frequency > 0.0 { INSTANTS } else { 0 };
+    // At a low frequency only weight loads the joints; the poses do not depend on it.
+    form.pace = if form.frequency > 0.0 { SLOW / form.frequency } else { 1.0 };
+    let (pace, period) = (form.pace, 1.0 / SLOW);
+    for joint in &mut rigid.machine.ball_joints {
+        joint.contact.clearance = 0.0;
+    }
+    let limit = MOST_WEIGHTS * 9.81 * rigid.machine.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let mut simulation = Simulation::new(&rigid.machine).ok()?;
+    // The loads of any other motion would need a simulation of arbitrary length.
+    if !simulation.mechanism().is_kinematic() {
+        return off_path(&scene.machine);
+    }
+    let mut frame = Frame::default();
+    let (mut largest, mut when) = (0.0, 0.0);
+    for k in 0..=instants {
+        let time = period * f64::from(k) / f64::from(INSTANTS);
+        if let Err(stopped) = simulation.advance_to(time) {
+            return Some(match stopped.fault {
+                StopFault::OffPath { distance } => IdealFault::OffPath(pace * stopped.time, distance),
+                _ => IdealFault::Stuck(stopped.time),
+            });
+        }
+        simulation.sample(time, &mut frame);
+        for joint in &frame.joints {
+            if joint.normal_force.norm() > largest {
+                (largest, when) = (joint.normal_force.norm(), time);
+            }
+        }
+    }
+    (largest > limit).then_some(IdealFault::Loaded(largest, when))
+}
+
+/// Simulates the motion without play, and compares the probe's tip with its path for one period, or for [`LONGEST`].
+fn off_path(machine: &Machine) -> Option<IdealFault> {
+    let form = machine.closed_form.as_ref().filter(|form| form.path.is_some() && form.frequency > 0.0)?;
+    let end = f64::min(1.0 / (form.frequency * form.pace), LONGEST);
+    let ideal = closed(machine);
+    let output = Output { probe: machine.output.probe, ..ideal.output };
+    let mut simulation = Simulation::new(&Machine { output, ..ideal }).ok()?;
+    let mut frame = Frame::default();
+    (1..=COMPARED).find_map(|k| {
+        let time = end * f64::from(k) / f64::from(COMPARED);
+        simulation.advance_to(time).ok()?;
+        simulation.sample(time, &mut frame);
+        let distance = frame.probe_error?.norm();
+        (distance > OFF_PATH).then_some(IdealFault::OffPath(time, distance))
+    })
+}
