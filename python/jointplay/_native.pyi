@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 _Array = NDArray[np.float64]
 _Impacts = tuple[list[str], list[str], _Array]
-_Origin = tuple[str, str | None, dict[str, str], list[tuple[str, str]]]
+_Changes = list[tuple[str, str]]
+_Origin = tuple[str, str | None, dict[str, str], _Changes]
 
 def scenes() -> tuple[list[str], list[str]]: ...
 def run(
@@ -46,6 +47,10 @@ class Scene:
     def channels(self) -> list[tuple[str, str, str, str, bool]]: ...
 
 class State:
+    def __new__(cls, text: str, changes: list[_Changes]) -> Self: ...
+    def __reduce__(self) -> tuple[type[State], tuple[str, list[_Changes]]]: ...
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: Any) -> Self: ...
     @property
     def time(self) -> float:
         """Simulated time, s."""

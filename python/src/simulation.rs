@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use jointplay_physics::machine::{Mat3, Vec3};
 use jointplay_physics::simulate::{Effect, Frame, Listed, Stopped, matching};
-use jointplay_scene::{LiveScene, Scene, SceneSnapshot};
+use jointplay_scene::{LiveScene, SavedState, Scene, SceneError, SceneSnapshot};
 use numpy::ndarray::{Array1, Array2, Array3};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyType};
 
 use crate::errors::{exception, option_error, scene_error, set_error, stopped};
 use crate::interpreter::{STEPS_BETWEEN_LOOKS, detached, guarded};
@@ -17,8 +17,19 @@ use crate::quantity::{duration, written};
 use crate::report;
 use crate::scene::{PyScene, channels_at_start};
 
-/// The channels of a running machine.
+/// Name and version of the program, as it writes them into its state files.
+const PROGRAM: [&str; 2] = ["jointplay", env!("CARGO_PKG_VERSION")];
+
+/// Changed parameters of a scene, in order: key and value.
+type Changes = Vec<(String, String)>;
+
+/// What a pickle holds: the text of a state file, and the changes of the scene as it was given, at the start, and in effect.
+type Pickled<'a> = (String, [&'a Changes; 3]);
+
+/// A machine as it started.
 struct Layout {
+    /// The changes of its scene at the start.
+    changes: Changes,
     channels: Vec<Listed>,
     /// Index of each channel by name and by column.
     places: HashMap<String, usize>,
@@ -34,7 +45,7 @@ impl Layout {
         let names = channels.iter().map(|channel| &channel.name);
         let both = channels.iter().map(|channel| &channel.column).zip(0..).chain(names.zip(0..));
         let places = both.map(|(name, place)| (name.clone(), place)).collect();
-        Self { places, channels, start }
+        Self { changes: live.running().changes.clone(), places, channels, start }
     }
 }
 
@@ -48,6 +59,50 @@ pub struct PyState {
 
 #[pymethods]
 impl PyState {
+    /// The state that [`Self::reduce`] describes.
+    #[new]
+    fn new(py: Python<'_>, text: &str, changes: [Changes; 3]) -> PyResult<Self> {
+        let refused = |why: String| option_error(py, &format!("state: {why}"));
+        let saved = detached(py, || SavedState::read(PROGRAM, text.as_bytes()))?;
+        let saved = saved.map_err(|why| refused(why.to_string()))?;
+        let read = || {
+            let pending = saved.scene()?;
+            let source = &pending.source;
+            let with = |changes: &Changes| -> Result<Scene, SceneError> {
+                Scene::parse_with(&source.text, source.file.as_deref(), &source.beside, changes)
+            };
+            let [scene, began, running] = [with(&changes[0])?, with(&changes[1])?, with(&changes[2])?];
+            let live = LiveScene::new(&began).map_err(|error| began.locate(&error))?;
+            Ok((scene, live, running, pending))
+        };
+        let read = detached(py, read)?.map_err(|error: SceneError| scene_error(py, None, &error))?;
+        let (scene, mut live, running, pending) = read;
+        let layout = detached(py, || Layout::of(&mut live))?;
+        let resumed = detached(py, || live.resume_changed(&saved.state, running, pending))?;
+        resumed.map_err(|mismatch| refused(mismatch.to_string()))?;
+        Ok(Self { scene: Arc::new(scene), snapshot: live.snapshot(), layout: Arc::new(layout) })
+    }
+
+    /// What a pickle makes it from again.
+    #[pyo3(name = "__reduce__")]
+    fn reduce<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyType>, Pickled<'_>)> {
+        let snapshot = &self.snapshot;
+        let text = detached(py, || SavedState::write(PROGRAM, snapshot.pending(), snapshot, snapshot.time()))?;
+        let text = text.map_err(|why| option_error(py, &format!("state: {why}")))?;
+        let changes = [&self.scene.changes, &self.layout.changes, &snapshot.running().changes];
+        Ok((py.get_type::<Self>(), (text, changes)))
+    }
+
+    /// Itself, since it never changes.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    /// The same.
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
     /// Simulated time, s.
     #[getter]
     fn time(&self) -> f64 {

@@ -1,7 +1,9 @@
 """Simulations: stepped, changed, restored, in threads."""
 
 import _thread
+import copy
 import gc
+import pickle
 import threading
 
 import numpy as np
@@ -9,6 +11,7 @@ import psutil
 import pytest
 
 import jointplay as jp
+from jointplay import _native
 
 
 def test_the_end_of_a_run_is_that_of_the_program(summary):
@@ -45,6 +48,77 @@ def test_a_state_is_returned_to_with_the_same_bits():
     assert ends == [other.hash] * 2
     with pytest.raises(jp.OptionError, match="`four-bar`.*`pendulum`"):
         jp.Simulation(jp.Scene.load("pendulum")).restore(state)
+
+
+@pytest.mark.parametrize("name", ["four-bar", "slider-crank", "falling"])
+def test_a_pickled_or_copied_state_continues_with_the_same_bits(name, falling):
+    scene = jp.Scene.from_toml(falling) if name == "falling" else jp.Scene.load(name).set(friction=0.12)
+    simulation = jp.Simulation(scene)
+    simulation.run_until("5 ms")
+    assert simulation.set("contact.friction", 0.3) == "now"
+    assert simulation.set("contact.clearance", "0 mm") == "at reset"
+    simulation.step(20)
+    state = simulation.state
+    again = pickle.loads(pickle.dumps(state))
+    ends = []
+    for one in [state, again, pickle.loads(pickle.dumps(again)), copy.copy(state), copy.deepcopy(state)]:
+        assert (one.time, one.hash) == (state.time, state.hash)
+        other = jp.Simulation(scene)
+        other.restore(one)
+        other.step(500)
+        stepped = (other.hash, other.ledger, other.statistics, other.take_impacts().tolist())
+        # Without play: the change that waited.
+        other.reset()
+        other.run_until("5 ms")
+        ends.append((stepped, other.hash))
+    assert ends == [ends[0]] * 5
+    with pytest.raises(jp.OptionError, match=f"`{scene.name}`.*`pendulum`"):
+        jp.Simulation(jp.Scene.load("pendulum")).restore(again)
+    with pytest.raises(jp.OptionError, match="state: one of the scene"):
+        jp.Simulation(scene.set(friction=0.2)).restore(again)
+
+
+def test_a_pickled_state_has_the_machine_of_its_last_reset():
+    scene = jp.Scene.load("chain").set({"chain.links": 2})
+    simulation = jp.Simulation(scene)
+    simulation.set("chain.links", 5)
+    simulation.reset()
+    simulation.set("chain.links", 3)
+    simulation.run_until("10 ms")
+    other = jp.Simulation(scene)
+    other.restore(pickle.loads(pickle.dumps(simulation.state)))
+    assert other.channels == simulation.channels and other.frame().positions.shape == (5, 3)
+    for one in [simulation, other]:
+        one.step(100)
+    assert other.hash == simulation.hash
+    other.reset()
+    assert other.frame().positions.shape == (3, 3)
+
+
+def test_a_pickle_has_the_text_of_a_state_file(summary, tmp_path):
+    simulation = jp.Simulation(jp.Scene.load("four-bar"))
+    simulation.run_until("5 ms")
+    _, (text, changes) = simulation.state.__reduce__()
+    file = tmp_path / "state"
+    file.write_text(text)
+    simulation.run_until("20 ms")
+    told = summary("run", "four-bar", "--duration", "20ms", "--from-state", file)
+    assert told["state_hash"] == simulation.hash
+    summary("run", "four-bar", "--duration", "5ms", "--save-state", tmp_path / "own")
+    other = jp.Simulation(jp.Scene.load("four-bar"))
+    other.restore(_native.State((tmp_path / "own").read_text(), changes))
+    other.run_until("20 ms")
+    assert other.hash == summary("run", "four-bar", "--duration", "20ms")["state_hash"]
+    for damaged, said in [
+        (text.replace('"time_s":0.005', '"time_s":0.006'), "state: damaged: the checksum"),
+        (text.replace('"version":"', '"version":"9'), "state: written by version 9"),
+        (text[:-2], "state: not a state that `run --save-state` wrote, or a damaged one"),
+        ("{}", "state: not a state"),
+    ]:
+        with pytest.raises(jp.OptionError, match=said):
+            _native.State(damaged, changes)
+    with pytest.raises(jp.OptionError, match="do not describe a state of this scene"):
+        _native.State(text, [[], [], [("contact.friction", "0.3")]])
 
 
 def test_a_reset_may_change_what_there_is():

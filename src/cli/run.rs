@@ -11,14 +11,13 @@ use super::args::{RunArguments, SummaryForm};
 use super::impacts::ImpactsFile;
 use super::link::Way;
 use super::output::{RowError, RowsFile, Table, check_distinct, check_size, significant};
-use super::state::{self, Checkpoint, StateFile};
+use super::state::{self, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::analysis::assembly::StartReport;
 use crate::analysis::row_times::RowTimes;
 use crate::files::{FileError, publish};
-use crate::scene::LiveScene;
-use crate::scene::Scene;
+use crate::scene::{LiveScene, SavedState, Scene, insert_texts};
 use crate::simulate::Frame;
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
@@ -171,7 +170,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     meta.shift_remove("ratio");
     meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
-    super::provenance::insert_texts(&mut meta, &scene);
+    insert_texts(&mut meta, &scene);
     let mut files = Vec::new();
     if let (Some(file), Some(times)) = (file, times) {
         let path = file.target().path().to_owned();
@@ -238,7 +237,7 @@ fn way(_arguments: &RunArguments) -> Result<Option<Way>, Failure> {
 /// # Errors
 /// As [`state::read`]; a `duration`, s, before the saved time; a state that does not fit the simulation.
 fn go_on(simulation: &mut LiveScene, path: &Path, scene: &Scene, duration: f64) -> Result<f64, Failure> {
-    let Checkpoint { state, time } = state::read(path, scene)?;
+    let SavedState { state, time, .. } = state::read(path, scene)?;
     if duration < time {
         return Err(Failure::usage(format!(
             "--duration {duration} s lies before the {time} s of --from-state {}: it counts from the start of the run",

@@ -53,11 +53,13 @@ mod parameters;
 mod pattern;
 mod placement;
 mod points;
+mod provenance;
 mod quantity;
 mod read;
 mod read_bodies;
 mod read_joints;
 mod reading;
+mod saved;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -79,7 +81,9 @@ pub use model::*;
 pub use numbers::OWN_GROUP;
 
 pub use parameters::*;
+pub use provenance::{insert_texts, provenance};
 pub use quantity::{DimensionError, Quantity, evaluate};
+pub use saved::{SavedState, SavedStateError};
 pub use table::{find, reference_page, table};
 pub use value::Value;
 pub use visible::{visible, visible_line};

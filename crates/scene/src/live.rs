@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use super::{Scene, SceneError, Value};
-use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, StartError, State};
+use jointplay_physics::simulate::{ChangeError, Effect, Model, Simulation, StartError, State, StateMismatch};
 
 /// Why a parameter of a running scene was not changed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,6 +33,18 @@ pub struct SceneSnapshot {
     running: Arc<Scene>,
     model: Arc<Model>,
     state: State,
+}
+
+impl SceneSnapshot {
+    /// The scene with every change, including those that wait for a reset.
+    pub fn pending(&self) -> &Scene {
+        &self.pending
+    }
+
+    /// The scene in effect, without the changes that wait for a reset.
+    pub fn running(&self) -> &Scene {
+        &self.running
+    }
 }
 
 impl Deref for SceneSnapshot {
@@ -117,6 +129,23 @@ impl LiveScene {
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation = Simulation::new(&self.pending.machine)?;
         self.running = self.pending.clone();
+        Ok(())
+    }
+
+    /// Continues from a state that was read, of a run that began as this one. `running` and `pending` are the scenes in effect
+    /// and with all changes at that time.
+    ///
+    /// # Errors
+    /// A state that cannot belong to this scene, or that has other conditions than `running`; `self` is then unchanged.
+    pub fn resume_changed(&mut self, state: &State, running: Scene, pending: Scene) -> Result<(), StateMismatch> {
+        let machine = self.simulation.machine();
+        if !machine.differs_in_conditions_alone(&running.machine) || *state.conditions() != running.machine.conditions()
+        {
+            return Err(StateMismatch);
+        }
+        self.simulation.resume(state)?;
+        self.running = Arc::new(running);
+        self.pending = Arc::new(pending);
         Ok(())
     }
 

@@ -6,7 +6,7 @@ use crate::analysis::axis::Axis;
 use crate::analysis::map::{MapPoint, PointFault, WorkspaceMap};
 use crate::cli::provenance;
 use crate::machine::Vec3;
-use crate::scene::Kind;
+use crate::scene::{Kind, insert_texts};
 use crate::units::si_unit;
 
 /// Label of everything that is computed from the reachable set.
@@ -134,7 +134,7 @@ impl Results {
     pub fn meta(&self) -> Map<String, Json> {
         let scene = self.map.scene();
         let mut meta = provenance::meta(scene);
-        provenance::insert_texts(&mut meta, scene);
+        insert_texts(&mut meta, scene);
         let axes = self.map.design().axes().iter();
         let axes = axes.map(|axis| {
             json!({"key": axis.key(), "count": axis.count(), "spacing": axis.spacing(), "unit": self.unit(axis),

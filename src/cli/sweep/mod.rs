@@ -37,7 +37,7 @@ use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Span};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
 use crate::machine::WarningKind;
-use crate::scene::Scene;
+use crate::scene::{Scene, insert_texts};
 use crate::simulate::Doubt;
 
 /// Steps between two checks for Ctrl-C.
@@ -104,7 +104,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     let scene = sweep.scene();
     let (design, protocol) = (sweep.design(), sweep.protocol());
     let mut meta = super::provenance::meta(scene);
-    super::provenance::insert_texts(&mut meta, scene);
+    insert_texts(&mut meta, scene);
     let mut add = |key: &str, value: Json| meta.insert(key.to_owned(), value);
     add("scene_crc32", json!(format!("{:08x}", crc32fast::hash(scene.source.text.as_bytes()))));
     add("vary", design.axes().iter().map(|axis| axis_meta(scene, axis)).collect());
