@@ -189,6 +189,14 @@ fn what_cannot_be_computed_is_refused_before_it_runs() {
         ("--over joint.J1.clearance --output peak-force --rows 4", "--rows 4: allowed at least 8, or 0"),
         ("--over contact.friction=0.1..-2", "--over contact.friction=0.1..-2"),
         ("--over contact.friction=-1..2", "out of range"),
+        (
+            "--over body.link1.mass=-1kg..2kg --output peak-force",
+            "--over body.link1.mass=-1kg..2kg: body.link1.mass: -1kg: out of range; allowed above 0 up to 1e9 kg; units kg,",
+        ),
+        (
+            "--over body.link1.mass=normal(1kg,1kg) --output peak-force",
+            "body.link1.mass: -0.959964 kg: out of range; allowed above 0 up to 1e9 kg; units kg,",
+        ),
         ("--over contact.friction_law=coulomb", "contact.friction_law"),
         ("--over contact.friction=normal(0.1)", "normal"),
         ("--over contact.friction=H7/g6", "a fit gives a clearance"),

@@ -88,6 +88,14 @@ pub enum StudyError {
         /// What is allowed.
         error: ValueError,
     },
+    /// An end of a distribution that the scene does not accept.
+    #[error("{value}: {why}")]
+    NoEnd {
+        /// The end, with its unit.
+        value: String,
+        /// What is wrong and what is allowed.
+        why: String,
+    },
     /// More parameters than a study varies.
     #[error("{found} uncertain parameters; at most {most} are possible")]
     TooMany {

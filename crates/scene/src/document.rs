@@ -4,7 +4,7 @@ use super::assets::AssetResolver;
 use super::error::place_of;
 use super::given::{FileNumber, Place};
 use super::instance::Instance;
-use super::key::{ABOVE_ZERO, DefaultRule, FileKey, FileTable, ListLimit, MAX_SI, ValueType, Variants};
+use super::key::{ABOVE_ZERO, ANY, DefaultRule, FileKey, FileTable, ListLimit, MAX_SI, UNCHECKED, ValueType, Variants};
 use super::parameters::{Kind, ValueFault};
 use super::reading::Reading;
 use super::visible::visible_line;
@@ -324,8 +324,13 @@ impl<'d> Node<'d> {
 
     /// A finite quantity, SI: a number with its unit, or an expression. It is recorded as a number of the scene under this key.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
+        self.recorded(dimension, UNCHECKED)
+    }
+
+    /// The same, recorded with the range that its reader allows.
+    fn recorded(&self, dimension: Dimension, range: (f64, f64)) -> Result<f64, SceneError> {
         let place = self.place_of(Place::Value);
-        self.evaluated(self.scalar()?, dimension, place)
+        self.evaluated(self.scalar()?, dimension, range, place)
     }
 
     /// Location of this value in the scene's text.
@@ -337,32 +342,27 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// Evaluates and records the quantity `text` at `place`, like [`Self::quantity`].
-    fn evaluated(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
+    /// Evaluates and records the quantity `text` at `place`, like [`Self::recorded`].
+    fn evaluated(
+        &self,
+        text: &str,
+        dimension: Dimension,
+        (least, most): (f64, f64),
+        place: Place,
+    ) -> Result<f64, SceneError> {
         let reading = self.document.reading;
         let value =
             reading.evaluate(text, dimension, self.document.instance).map_err(|error| self.error(error.to_string()))?;
         self.limit(value, dimension)?;
-        reading.record(&self.key, FileNumber::new(value, dimension, place, text));
+        let any = if is_of_motion(dimension) { ANY } else { UNCHECKED };
+        let range = (least.max(any.0), most.min(any.1));
+        reading.record(&self.key, FileNumber::new(value, dimension, range, place, text));
         Ok(value)
     }
 
     /// Rejects values beyond any mechanism, before their squares overflow in the equations of motion.
     fn limit(&self, value: f64, dimension: Dimension) -> Result<(), SceneError> {
-        let moves = !matches!(
-            dimension,
-            Dimension::Mass
-                | Dimension::Density
-                | Dimension::Inertia
-                | Dimension::Stress
-                | Dimension::Force
-                | Dimension::Torque
-                | Dimension::Stiffness
-                | Dimension::Damping
-                | Dimension::TurningStiffness
-                | Dimension::TurningDamping
-        );
-        if moves && value.abs() > MAX_SI {
+        if is_of_motion(dimension) && value.abs() > MAX_SI {
             let limit = format_quantity(MAX_SI, si_unit(dimension));
             return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
         }
@@ -376,7 +376,7 @@ impl<'d> Node<'d> {
 
     /// A quantity in a closed range, SI.
     pub fn within(&self, dimension: Dimension, (least, most): (f64, f64)) -> Result<f64, SceneError> {
-        let value = self.quantity(dimension)?;
+        let value = self.recorded(dimension, (least, most))?;
         if (least..=most).contains(&value) {
             return Ok(value);
         }
@@ -549,11 +549,8 @@ impl<'d> Node<'d> {
                 let part = Node::new(self.document, key(index), self.row, Some(self.value));
                 let part = part.expect("there is a value");
                 let place = self.place_of(Place::Part);
-                *value = if part.changed {
-                    part.evaluated(part.scalar()?, dimension, place)?
-                } else {
-                    part.evaluated(&format!("{number} {unit}"), dimension, place)?
-                };
+                let text = if part.changed { part.scalar()?.to_owned() } else { format!("{number} {unit}") };
+                *value = part.evaluated(&text, dimension, self.row.range(), place)?;
             }
             return Ok(values);
         }
@@ -563,7 +560,7 @@ impl<'d> Node<'d> {
         }
         for (index, (value, element)) in values.iter_mut().zip(&elements).enumerate() {
             let part = Node::new(self.document, key(index), self.row, Some(element.value));
-            *value = part.expect("there is a value").quantity(dimension)?;
+            *value = part.expect("there is a value").recorded(dimension, self.row.range())?;
         }
         Ok(values)
     }
@@ -666,6 +663,23 @@ pub(super) fn lists<'d>(files: &[Section<'d>], name: &str, more: Vec<Node<'d>>) 
             nodes.len()
         ))),
     }
+}
+
+/// Whether values of this dimension enter the equations of motion squared, and so are limited by [`MAX_SI`].
+fn is_of_motion(dimension: Dimension) -> bool {
+    !matches!(
+        dimension,
+        Dimension::Mass
+            | Dimension::Density
+            | Dimension::Inertia
+            | Dimension::Stress
+            | Dimension::Force
+            | Dimension::Torque
+            | Dimension::Stiffness
+            | Dimension::Damping
+            | Dimension::TurningStiffness
+            | Dimension::TurningDamping
+    )
 }
 
 fn article(value: &DeValue<'_>) -> &'static str {

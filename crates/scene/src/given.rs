@@ -11,6 +11,8 @@ pub struct FileNumber {
     pub value: f64,
     /// Physical dimension.
     pub dimension: Dimension,
+    /// Closed range that the reader allows whatever the other numbers are, SI; infinite for no limit of its own.
+    pub(super) range: (f64, f64),
     pub(super) place: Place,
     /// Unit used in the file, or the SI unit if the text names none.
     pub(super) unit: &'static str,
@@ -30,8 +32,8 @@ pub(super) enum Place {
 }
 
 impl FileNumber {
-    /// A number written as `text` at `place`.
-    pub(super) fn new(value: f64, dimension: Dimension, place: Place, text: &str) -> Self {
-        Self { value, dimension, place, unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)) }
+    /// A number in `range`, written as `text` at `place`.
+    pub(super) fn new(value: f64, dimension: Dimension, range: (f64, f64), place: Place, text: &str) -> Self {
+        Self { value, dimension, range, place, unit: unit_within(text, dimension).unwrap_or(si_unit(dimension)) }
     }
 }

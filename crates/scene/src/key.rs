@@ -10,7 +10,7 @@ pub const ABOVE_ZERO: f64 = f64::MIN_POSITIVE;
 /// Range of a number limited only by [`MAX_SI`].
 pub(super) const ANY: (f64, f64) = (-MAX_SI, MAX_SI);
 /// Range of numbers that are not checked one by one.
-const UNCHECKED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+pub(super) const UNCHECKED: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 /// A section of the file, or a table within one.
 #[derive(Debug)]

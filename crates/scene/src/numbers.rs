@@ -8,18 +8,18 @@ use super::given::FileNumber;
 use super::parameters::{Kind, Parameter, Scope};
 use super::value::Value;
 
-/// Larger than any number in a scene file: the reader enforces the actual limits.
+/// Larger than any number in a scene file.
 pub(super) const LARGEST: f64 = 1e13;
 
 /// Group of the parameters of a file that names none; a window shows them first.
 pub const OWN_GROUP: &str = "Machine";
 
-/// Row of a number of the file. The reader checks the allowed range when the scene is read again.
+/// Row of a number of the file. What depends on other numbers, the reader checks when the scene is read again.
 pub(super) fn row_of_number(key: &str, number: &FileNumber) -> &'static Parameter {
     let kind = Kind::Number {
         dimension: number.dimension,
-        min: -LARGEST,
-        max: LARGEST,
+        min: number.range.0.max(-LARGEST),
+        max: number.range.1.min(LARGEST),
         display: number.unit,
         slider: (-1.0, 1.0),
         logarithmic: false,

@@ -1,6 +1,7 @@
 //! Rows of the parameter table, and checks of their values.
 
 use super::field::Access;
+use super::key::ABOVE_ZERO;
 use super::value::Value;
 use jointplay_physics::suggest::{did_you_mean, nearest_name};
 use jointplay_physics::units::{Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
@@ -159,6 +160,9 @@ impl Parameter {
             // The table's upper end is the largest ball radius; the actual limit is this joint's ball radius.
             Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
                 format!("{} to below the ball radius", format_quantity(min, display))
+            }
+            Kind::Number { min, max, display, .. } if min == ABOVE_ZERO => {
+                format!("above 0 up to {}", format_quantity(max, display))
             }
             Kind::Number { min, max, display, .. } => {
                 format!("{} to {}", format_quantity(min, display), format_quantity(max, display))

@@ -61,7 +61,7 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
         return Ok((read_solid(&section, &node, name, shapes)?, section));
     }
     let mass_node = section.require("mass")?;
-    let only_connects = mass_node.within(Dimension::Mass, (0.0, 0.0)).is_ok() && has_no_inertia(&section)?;
+    let only_connects = mass_node.within(Dimension::Mass, (0.0, MAX_MASS)) == Ok(0.0) && has_no_inertia(&section)?;
     let (mass, inertia) = if only_connects {
         (0.0, Mat3::zeros())
     } else {

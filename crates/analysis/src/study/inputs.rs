@@ -6,7 +6,7 @@ use crate::iso286::{Fit, FitError};
 use jointplay_physics::simulate::matches_pattern;
 use jointplay_physics::suggest::nearest;
 use jointplay_physics::units::{QuantityError, parse_quantity, si_unit};
-use jointplay_scene::{Kind, Parameter, Scene, Value, ValueError, ValueFault, contact_parts};
+use jointplay_scene::{Kind, Parameter, Scene, SceneError, Value, ValueError, ValueFault, contact_parts};
 
 /// Range of an input without one of its own, over its value in the scene.
 const DEFAULT_RANGE: [f64; 2] = [0.5, 1.5];
@@ -93,6 +93,13 @@ pub(super) fn check_end(parameter: &Parameter, end: f64) -> Result<(), StudyErro
     parameter.check(&value).map_err(|error| StudyError::End { value: parameter.show(&value), error })
 }
 
+/// Requires an end, SI, that `scene` accepts with its other values: such as a moment of inertia that a body can have.
+fn try_end(scene: &Scene, key: &str, parameter: &Parameter, end: f64) -> Result<(), StudyError> {
+    let value = Value::Number(end);
+    let refused = |error: SceneError| StudyError::NoEnd { value: parameter.show(&value), why: error.message };
+    scene.clone().set_value(key, &value).map(|_| ()).map_err(refused)
+}
+
 /// Keys of the numeric parameters that match `pattern`, or, where there are none, of the numbers of the file; at least one.
 ///
 /// # Errors
@@ -124,9 +131,10 @@ impl Input {
     /// An unknown key, a word in place of a number, or a distribution that the parameter does not accept.
     pub fn new(scene: &Scene, key: &str, text: Option<&str>) -> Result<Self, StudyError> {
         let (parameter, nominal) = real_parameter(scene, key)?;
-        let number = |text: &str| match parameter.read(text)? {
-            Value::Number(value) => Ok(value),
-            Value::Count(_) | Value::Choice(_) | Value::Unset => Err(StudyError::NotReal),
+        let number = |text: &str| match parameter.read(text) {
+            Ok(Value::Number(value)) => Ok(value),
+            Ok(Value::Count(_) | Value::Choice(_) | Value::Unset) => Err(StudyError::NotReal),
+            Err(error) => Err(StudyError::End { value: text.to_owned(), error }),
         };
         let distribution = match text {
             None => {
@@ -151,8 +159,11 @@ impl Input {
         }?;
         let (low, high) = distribution.support();
         // Of a distribution without limits, its middle.
-        for end in [low, distribution.quantile(0.5), high].into_iter().filter(|end| end.is_finite()) {
+        for end in [low, high, distribution.quantile(0.5)].into_iter().filter(|end| end.is_finite()) {
             check_end(parameter, end)?;
+            if text.is_some() {
+                try_end(scene, key, parameter, end)?;
+            }
         }
         let si_unit = match parameter.kind {
             Kind::Number { dimension, .. } => si_unit(dimension),
@@ -240,6 +251,25 @@ mod tests {
             let said = of(text).expect_err(text).to_string();
             assert!(said.contains(expected), "{text}: {said}");
         }
+    }
+
+    #[test]
+    fn an_end_that_a_number_of_the_file_does_not_allow_is_refused() {
+        let scene = Scene::load("four-bar", &[]).expect("built in");
+        let mass = "out of range; allowed above 0 up to 1e9 kg; units kg, g, mg, t";
+        for (key, text, expected) in [
+            ("body.coupler.mass", "-1 kg..2 kg", format!("-1 kg: {mass}")),
+            ("body.coupler.mass", "0 g..2 kg", format!("0 g: {mass}")),
+            ("body.coupler.mass", "1 kg..2e9 kg", format!("2e9 kg: {mass}")),
+            ("body.coupler.mass", "normal(-1 kg, 1 g)", format!("-1 kg: {mass}")),
+            ("body.coupler.mass", "normal(1 kg, 1 kg, -1 kg..2 kg)", format!("-1 kg: {mass}")),
+            ("body.coupler.inertia.x", "-1 kg m^2..1 kg m^2", "-1 kg m^2: no body has this inertia".to_owned()),
+            ("contact.clearance", "0 mm..10 mm", "10 mm: clearance 10 mm must be below the ball radius".to_owned()),
+        ] {
+            let said = Input::new(&scene, key, Some(text)).expect_err(text).to_string();
+            assert!(said.starts_with(&expected), "{key}={text}: {said}");
+        }
+        assert!(Input::new(&scene, "body.coupler.mass", Some("1 g..2 kg")).is_ok());
     }
 
     #[test]
