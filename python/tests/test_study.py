@@ -170,7 +170,7 @@ def test_a_study_is_a_function_of_its_parameters():
             lambda scene: jp.Study(scene, ["body.coupler.mass"], duration="1 ms").run([[-1.0]]),
             "^body.coupler.mass: -1 kg: out of range; allowed above 0 up to 1e9 kg",
         ),
-        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, "tip-eror"), "tip-error"),
+        (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, "tip-eror"), "^output: tip-eror: expected CHANNEL"),
         (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, rows=4), "^rows = 4: allowed at least 8, or 0"),
         (lambda scene: jp.sensitivity(scene, {"contact.clearance": None}, target="5 kg"), "target of tip-error"),
         (lambda scene: jp.sensitivity(scene, {}), "at least one"),

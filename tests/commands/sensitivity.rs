@@ -201,7 +201,11 @@ fn what_cannot_be_computed_is_refused_before_it_runs() {
         ("--over contact.friction=normal(0.1)", "normal"),
         ("--over contact.friction=H7/g6", "a fit gives a clearance"),
         ("--over joint.J1.clearance=H7/q6", "H7/q6"),
-        ("--over joint.J1.clearance --output nothing", "outputs by name: tip-error"),
+        (
+            "--over joint.J1.clearance --output nothing",
+            "--output nothing: expected CHANNEL:STATISTIC, e.g. S1.normal:max; statistics: max, min, mean, rms, std, range, end; \
+             outputs by name: tip-error",
+        ),
         ("--over joint.J1.clearance --output peak-force --target 1mm", "--target 1mm"),
         ("--over joint.J1.clearance --output peak-force --from 1ms", "--duration"),
         ("--over joint.J1.clearance --output peak-force --duration 1ms --from 2ms", "before the end"),

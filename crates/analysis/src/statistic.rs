@@ -69,6 +69,16 @@ pub enum StatisticError {
     Start(#[from] StartError),
 }
 
+impl StatisticError {
+    /// The entry at fault, as written; `None` if it is not at fault.
+    pub(crate) fn text(&self) -> Option<&str> {
+        match self {
+            Self::Form { text } | Self::Unknown { text, .. } | Self::Channel { text, .. } => Some(text),
+            Self::Start(_) => None,
+        }
+    }
+}
+
 /// A statistic of one channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChannelStatistic {

@@ -105,7 +105,7 @@ pub enum StudyError {
         most: usize,
     },
     /// An unknown output, channel or statistic.
-    #[error("{entry}: {error}; outputs by name: {}", NAMED.map(|named| named.name).join(", "))]
+    #[error(fmt = of_output)]
     Output {
         /// As written.
         entry: String,
@@ -185,6 +185,14 @@ pub enum StudyError {
 fn at(place: &str, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
     write!(f, "{place}: ")?;
     error.fmt(f)
+}
+
+fn of_output(entry: &str, error: &StatisticError, f: &mut Formatter<'_>) -> std::fmt::Result {
+    // An error about the entry itself begins with it; one about what its name stands for does not.
+    if error.text() != Some(entry) {
+        write!(f, "{entry}: ")?;
+    }
+    write!(f, "{error}; outputs by name: {}", NAMED.map(|named| named.name).join(", "))
 }
 
 fn of_argument(argument: &Argument, value: &usize, error: &StudyError, f: &mut Formatter<'_>) -> std::fmt::Result {
