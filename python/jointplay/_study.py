@@ -68,6 +68,11 @@ class Study:
         return {key: unit for key, _, unit in self._native.inputs}
 
     @property
+    def assumed_ranges(self) -> dict[str, tuple[float, float]]:
+        """Ends, SI, of each range that was not given: half to one and a half of the value, within what is allowed."""
+        return dict(self._native.assumed_ranges)
+
+    @property
     def outputs(self) -> dict[str, str]:
         """Unit of each output."""
         return dict(self._native.outputs)
@@ -144,6 +149,8 @@ class Sensitivity:
     """Value in the scene, SI, of each parameter."""
     units: dict[str, str]
     """SI unit of each parameter and output."""
+    assumed_ranges: dict[str, tuple[float, float]]
+    """Ends, SI, of each range that was not given: half to one and a half of the value, within what is allowed."""
     nominal: dict[str, float]
     """Each output with the values of the scene, SI."""
     alone: dict[str, dict[str, Ends]]
@@ -213,6 +220,7 @@ def sensitivity(
     return Sensitivity(
         inputs=study.inputs,
         units=study.units | study.outputs,
+        assumed_ranges=study.assumed_ranges,
         nominal=dict(zip(outputs, found["nominal"], strict=True)),
         alone={
             name: {
@@ -316,6 +324,8 @@ class Tolerance:
     """What distinguishes the rejects, by parameter; None if all units or none are accepted."""
     fits: Fits | None
     """The cheapest fits; None without `cost`."""
+    assumed_ranges: dict[str, tuple[float, float]]
+    """Ends, SI, of each range that was not given: half to one and a half of the value, within what is allowed."""
     accepted: NDArray[np.bool_] = field(repr=False)
     """Whether each unit holds all limits."""
     values: NDArray[np.float64] = field(repr=False)
@@ -362,6 +372,7 @@ def tolerance(
         qualities={name: _quality(own) for name, own in zip(study.outputs, found["qualities"], strict=True)},
         drivers=None if drivers is None else {key: RejectDriver(*own) for key, own in zip(study.inputs, drivers, strict=True)},
         fits=found["fits"] and _fits(found["fits"]),
+        assumed_ranges=study.assumed_ranges,
         accepted=np.array(found["accepted"]),
         values=found["values"],
         results=found["results"],

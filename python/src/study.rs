@@ -219,6 +219,12 @@ impl PyStudy {
         self.inputs.iter().map(|input| (&input.key[..], input.nominal, input.si_unit)).collect()
     }
 
+    /// Key and ends, SI, of each range that was assumed because none was given.
+    #[getter]
+    fn assumed_ranges(&self) -> Vec<(&str, (f64, f64))> {
+        self.inputs.iter().filter_map(|input| Some((&input.key[..], input.assumed_range()?))).collect()
+    }
+
     /// Name and unit of each output.
     #[getter]
     fn outputs(&self) -> Vec<(&str, &str)> {

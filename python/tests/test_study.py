@@ -74,6 +74,8 @@ def test_effects_alone_screening_and_target_are_those_of_the_program(program, tm
     )
     assert easy.target is not None and easy.indices == {} and len(easy.values) == 0
     assert easy.target.single or easy.target.together is not None
+    assert easy.assumed_ranges == {f"joint.{name}.clearance": (0.5 * 1e-4, 1.5 * 1e-4) for name in "AB"}
+    assert found.assumed_ranges == {}
 
 
 def test_the_cheapest_fits_are_those_of_the_program(program, tmp_path):
@@ -147,6 +149,7 @@ def test_yields_are_those_of_the_program(program, tmp_path):
 def test_a_study_is_a_function_of_its_parameters():
     scene = jp.Scene.load("four-bar")
     study = jp.Study(scene, ["contact.clearance"], "A.normal:max", duration="5 ms")
+    assert study.assumed_ranges == {"contact.clearance": (0.5 * 1e-4, 1.5 * 1e-4)}
     assert study.inputs == {"contact.clearance": 1e-4} and study.outputs == {"A.normal:max": "N"}
     results = study.run(np.array([[1e-4], [2e-4]]))
     for clearance, (force,) in zip([1e-4, 2e-4], results):

@@ -224,6 +224,25 @@ fn what_cannot_be_computed_is_refused_before_it_runs() {
     assert!((low - 3.5e-6).abs() < 1e-9 && (high - 20.5e-6).abs() < 1e-9, "{low} {high}");
 }
 
+#[test]
+fn a_range_that_nobody_gave_is_stated() {
+    let folder = folder();
+    let options = "four-bar --over contact.restitution --over contact.friction=0.1..0.2 --duration 1ms --quiet";
+    let said = "Range not given   contact.restitution: 0.45 to 1, half to one and a half of its value, within what is allowed\n";
+    for (command, name) in [("sensitivity", "--rows 0"), ("tolerance", "--runs 8 --limit peak-force=1000N")] {
+        let line = format!("{command} {options} {name} --out {command}");
+        let run = jointplay(folder.path(), &line).expect(0);
+        assert_eq!(run.stdout.matches("Range not given").count(), 1, "{}", run.stdout);
+        assert!(run.stdout.contains(said), "{}", run.stdout);
+        for file in [format!("{command}.json"), "manifest.json".to_owned()] {
+            let text = fs::read_to_string(folder.path().join(command).join(&file)).unwrap();
+            let json: Json = serde_json::from_str(&text).unwrap();
+            let meta = json.get("meta").unwrap_or(&json);
+            assert_eq!(meta["assumed_ranges"], serde_json::json!({"contact.restitution": [0.45, 1.0]}), "{file}");
+        }
+    }
+}
+
 /// Where a mass rests on a spring: -m g / k, from a number of the file and a parameter of the scene's own.
 #[test]
 fn numbers_of_the_file_vary_as_parameters_do() {

@@ -50,9 +50,10 @@ fn interval(estimate: Option<&Estimate>) -> String {
 /// For a terminal.
 pub fn text(study: &Study, found: &Sensitivity, out: &Path) -> String {
     let mut text = format!(
-        "Scene             {}: runs of {}\nRuns              {}\n",
+        "Scene             {}: runs of {}\n{}Runs              {}\n",
         study.scene().name,
         study.describe(),
+        study.assumed(),
         study.counted(),
     );
     if let Some(screening) = &found.screening {

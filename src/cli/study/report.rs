@@ -77,7 +77,22 @@ impl Study {
         meta.insert("duration_s".into(), json!(duration));
         meta.insert("from_s".into(), json!(from));
         meta.insert("seed".into(), json!(self.seed));
+        let assumed = self.inputs().iter().filter_map(|input| Some((input.key.clone(), json!(input.assumed_range()?))));
+        meta.insert("assumed_ranges".into(), Json::Object(assumed.collect()));
         meta
+    }
+
+    /// A line for each parameter whose range was not given, for people.
+    pub fn assumed(&self) -> String {
+        let line = |input: &Input| {
+            let (low, high) = input.assumed_range()?;
+            let [low, high] = [low, high].map(|end| value_of(input, end));
+            Some(format!(
+                "Range not given   {}: {low} to {high}, half to one and a half of its value, within what is allowed\n",
+                input.key
+            ))
+        };
+        self.inputs().iter().filter_map(line).collect()
     }
 
     /// Writes results, table, charts and runs into `folder`, all but the runs under the name `name`.

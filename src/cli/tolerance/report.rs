@@ -71,10 +71,11 @@ pub fn text(study: &Study, limits: &[Limit], found: &Tolerance, arguments: &Tole
     let units = found.lot.accepted.len();
     let rejects = found.lot.accepted.iter().filter(|accepted| !**accepted).count();
     let mut text = format!(
-        "Scene             {}: runs of {}\nRuns              {}\nLot               {}, {} rejected\n\
+        "Scene             {}: runs of {}\n{}Runs              {}\nLot               {}, {} rejected\n\
          Yield             {}, interval of 95 %\n",
         study.scene().name,
         study.describe(),
+        study.assumed(),
         study.counted(),
         count(units as u64, "unit"),
         rejects,

@@ -39,6 +39,8 @@ pub struct Input {
     pub nominal: f64,
     /// Distribution, SI.
     pub distribution: Distribution,
+    /// Whether it was given; else it is uniform, from half to one and a half of the value, within what is allowed.
+    pub is_given: bool,
 }
 
 impl Uncertainty {
@@ -169,7 +171,19 @@ impl Input {
             Kind::Number { dimension, .. } => si_unit(dimension),
             _ => "",
         };
-        Ok(Self { key: key.to_owned(), unit: parameter.display_unit(), si_unit, nominal, distribution })
+        Ok(Self {
+            key: key.to_owned(),
+            unit: parameter.display_unit(),
+            si_unit,
+            nominal,
+            distribution,
+            is_given: text.is_some(),
+        })
+    }
+
+    /// The range, SI, that was assumed because none was given.
+    pub fn assumed_range(&self) -> Option<(f64, f64)> {
+        (!self.is_given).then(|| self.distribution.support())
     }
 
     /// Its value at the fraction `u` of all values, 0 < u < 1.
@@ -219,10 +233,12 @@ mod tests {
     #[test]
     fn a_range_that_nobody_gave_is_one_that_the_parameter_allows() {
         let scene = Scene::load("four-bar", &[]).expect("built in");
-        let ends = |key: &str| Input::new(&scene, key, None).expect("a range").distribution.support();
-        assert_eq!(ends("contact.restitution"), (0.45, 1.0));
+        let ends = |key: &str| Input::new(&scene, key, None).expect("a range").assumed_range();
+        assert_eq!(ends("contact.restitution"), Some((0.45, 1.0)));
         let nominal = scene.machine.ball_joints[0].contact.clearance;
-        assert_eq!(ends("joint.A.clearance"), (0.5 * nominal, 1.5 * nominal));
+        assert_eq!(ends("joint.A.clearance"), Some((0.5 * nominal, 1.5 * nominal)));
+        let given = Input::new(&scene, "contact.restitution", Some("0.45..1")).expect("a range");
+        assert_eq!(given.assumed_range(), None);
     }
 
     #[test]
