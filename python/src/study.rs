@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::option_error;
-use crate::interpreter::guarded;
+use crate::interpreter::{guarded, look};
 use crate::quantity::duration;
 use crate::report::constant;
 use crate::scene::PyScene;
@@ -101,6 +101,7 @@ impl StudyRunner for Runner<'_, '_> {
     }
 
     fn run(&mut self, stage: &str, rows: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, Ended> {
+        look(self.py, self.progress.as_ref(), 0.0).map_err(Ended::Raised)?;
         let PyStudy { scene, inputs, outputs, span } = self.study;
         let keys: Vec<String> = inputs.iter().map(|input| input.key.clone()).collect();
         let runs = StudyRuns::new(scene, &keys, outputs, *span, &rows)?;
@@ -193,11 +194,12 @@ impl PyStudy {
         });
         let requested: Vec<Uncertainty> = requested.collect();
         let wrong = |error: &dyn std::fmt::Display| option_error(py, &format!("{error:#}"));
-        let inputs = inputs(&scene, &requested).map_err(|error| wrong(&error))?;
+        let inputs = guarded(py, || inputs(&scene, &requested))?.map_err(|error| wrong(&error))?;
         if inputs.is_empty() {
             return Err(wrong(&"over: give at least one parameter"));
         }
-        let outputs = outputs(&scene, output).map_err(|error| wrong(&format!("output: {error}")))?;
+        let outputs = guarded(py, || outputs(&scene, output))?;
+        let outputs = outputs.map_err(|error| wrong(&format!("output: {error}")))?;
         let from = start_after.map(|value| duration("start_after", &value)).transpose()?;
         let span = match (length.map(|value| duration("duration", &value)).transpose()?, from) {
             (None, None) => RunSpan::of(&scene),
@@ -251,7 +253,8 @@ impl PyStudy {
             let message = format!("values[{i}]: {} numbers are given for {inputs} parameters", row.len());
             return Err(option_error(py, &message));
         }
-        let results = Runner::new(self, py, threads, progress).run("values", rows);
+        let mut runner = Runner::new(self, py, threads, progress);
+        let results = guarded(py, || runner.run("values", rows))?;
         array(py, &results.map_err(|ended| ended.raise(py))?, self.outputs.len())
     }
 
@@ -352,11 +355,12 @@ impl PyStudy {
             };
             cost.into_iter().map(of_one).collect::<Vec<_>>()
         });
-        let fits = requested.map(|requested| {
-            let candidates = candidates(&self.scene, &self.inputs, &requested)?;
+        let fits = requested.map(|requested| -> PyResult<FitOptions> {
+            let candidates = guarded(py, || candidates(&self.scene, &self.inputs, &requested))?;
+            let candidates = candidates.map_err(|error| wrong(&format!("{error:#}")))?;
             Ok(FitOptions { candidates, required_yield, evaluations })
         });
-        let fits = fits.transpose().map_err(|error: StudyError| wrong(&format!("{error:#}")))?;
+        let fits = fits.transpose()?;
         let mut runner = Runner::new(self, py, threads, progress);
         let options = ToleranceOptions { units, sampling, seed, fits };
         let found = guarded(py, || tolerance(&mut runner, &ends, options))?.map_err(|ended| ended.raise(py))?;

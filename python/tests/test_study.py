@@ -159,6 +159,30 @@ def test_a_study_is_a_function_of_its_parameters():
         study.run([[1e-4, 2e-4]])
 
 
+@pytest.mark.parametrize("calls", [0, 1])
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda scene, progress: jp.sensitivity(scene, OVER, "peak-force", rows=8, duration="1 ms", progress=progress),
+        lambda scene, progress: jp.tolerance(scene, OVER, {"peak-force": 1.0}, units=8, duration="1 ms", progress=progress),
+        lambda scene, progress: jp.Study(scene, ["contact.friction"], duration="1 ms").run([[0.1], [0.2]], progress=progress),
+    ],
+)
+def test_a_panic_within_a_study_is_an_internal_error(work, calls):
+    # PyO3 panics in Rust where it calls a function that raises this: at first where a stage begins, then between its runs.
+    panic = next(kind for kind in BaseException.__subclasses__() if kind.__name__ == "PanicException")
+    seen = []
+
+    def progress(part):
+        seen.append(part)
+        if len(seen) > calls:
+            raise panic("no such thing")
+
+    with pytest.raises(jp.InternalError, match=r"^internal error in jointplay [0-9.]+: no such thing\. This is a bug"):
+        work(jp.Scene.load("four-bar"), progress)
+    assert seen[0] == 0.0 and len(seen) == calls + 1
+
+
 @pytest.mark.parametrize(
     "work, said",
     [
