@@ -21,7 +21,7 @@ pub enum Filling {
     Convex,
     /// What it encloses.
     Exact,
-    /// The pyramids between its triangles and their common centroid, those that the surface faces away from as well.
+    /// The pyramids between its triangles and a point among them, those that the surface faces away from as well.
     Legacy,
     /// Its surface.
     Shell,
@@ -88,8 +88,12 @@ pub fn solid(mesh: &Mesh, place: impl Fn(Vec3) -> Vec3, mirrored: bool, filling:
     let solid = match filling {
         Filling::Shell => surface,
         Filling::Convex | Filling::Exact => about(surface.centre, false),
-        // The centroid of the first pyramids is the tip of those that count.
-        Filling::Legacy => about(about(surface.centre, true).centre, true),
+        // The centroid of the first pyramids is the tip of those that have mass, and the centre of mass, though it is not their
+        // centroid: `ComputeVolume` and `ComputeInertia` of MuJoCo's user_mesh.cc.
+        Filling::Legacy => {
+            let tip = about(surface.centre, true).centre;
+            about(tip, true).about(tip)
+        }
     };
     let regular = solid.volume > 0.0 && solid.inertia().symmetric_eigenvalues().min() > 0.0;
     if regular { Ok(solid) } else { Err("it encloses no volume".to_owned()) }
@@ -215,16 +219,45 @@ mod tests {
         // Three squares and a triangle with its centroid a third of its edges from the inner corner.
         let x = (3e-3 * centre.x + 0.5e-3 * (0.1 + 0.1 / 3.0)) / 3.5e-3;
         assert!((hull.centre - Vec3::new(x, x, 0.05)).amax() < 1e-6, "{}", hull.centre);
-        // The centroid sees the whole surface from inside; that of a deep channel lies outside, so that pyramids overlap.
+        // The centroid sees the whole surface from inside.
         assert!((found(&mesh, Filling::Legacy).volume / exact.volume - 1.0).abs() < 1e-9);
+        let mirrored =
+            solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, Filling::Exact).unwrap();
+        assert!((mirrored.volume / exact.volume - 1.0).abs() < 1e-12 && (mirrored.centre.x + centre.x).abs() < 1e-6);
+    }
+
+    /// A U of three plates, whose centroid lies outside.
+    #[test]
+    fn the_pyramids_of_a_deep_channel_overlap() {
         let channel =
             [[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.25, 0.3], [0.25, 0.05], [0.05, 0.05], [0.05, 0.3], [0.0, 0.3]];
         let channel = prism(&channel, &[[0, 1, 4], [0, 4, 5], [1, 2, 4], [2, 3, 4], [0, 5, 6], [0, 6, 7]], 0.1);
         assert!((found(&channel, Filling::Exact).volume / 4e-3 - 1.0).abs() < 1e-6);
-        assert!(found(&channel, Filling::Legacy).volume > 2.0 * 4e-3);
-        let mirrored =
-            solid(&mesh, |point| Vec3::new(-point.x, point.y, point.z) * 1e-3, true, Filling::Exact).unwrap();
-        assert!((mirrored.volume / exact.volume - 1.0).abs() < 1e-12 && (mirrored.centre.x + centre.x).abs() < 1e-6);
+        let pyramids = found(&channel, Filling::Legacy);
+        // The surface has its centroid at y = 0.125 m. The bases of the pyramids from there have theirs at 0.132 m, each counted by its
+        // pyramid, and the pyramids a quarter of the way back.
+        let y = 0.75 * 0.132 + 0.25 * 0.125;
+        let strip = |edge: f64| edge * edge / 12.0;
+        let floor = [strip(0.3), strip(0.05) + (0.025 - y) * (0.025 - y)];
+        let arm = [strip(0.05) + 0.125 * 0.125, strip(0.25) + (0.175 - y) * (0.175 - y)];
+        // The floor is 3/8 of a cap.
+        let cap = [0, 1].map(|i| 0.375 * floor[i] + 0.625 * arm[i]);
+        // Faces, m^2, their distances from there, m, and mean squares of x, y and z over them, m^2.
+        let faces = [
+            (0.03, y, [strip(0.3), y * y, strip(0.1)]),
+            (0.06, 0.15, [0.15 * 0.15, strip(0.3) + (0.15 - y) * (0.15 - y), strip(0.1)]),
+            (0.01, 0.3 - y, [strip(0.05) + 0.125 * 0.125, (0.3 - y) * (0.3 - y), strip(0.1)]),
+            (0.05, 0.1, [0.1 * 0.1, arm[1], strip(0.1)]),
+            (0.02, y - 0.05, [strip(0.2), (y - 0.05) * (y - 0.05), strip(0.1)]),
+            (0.08, 0.05, [cap[0], cap[1], 0.05 * 0.05]),
+        ];
+        let volume: f64 = faces.iter().map(|(area, distance, _)| area * distance / 3.0).sum();
+        // Over a pyramid, a mean square about its tip is 3/5 of that over its base.
+        let second =
+            [0, 1, 2].map(|i| faces.iter().map(|(area, distance, mean)| area * distance / 5.0 * mean[i]).sum::<f64>());
+        let moments = [second[1] + second[2], second[0] + second[2], second[0] + second[1]];
+        is(&pyramids, volume, [0.15, y, 0.05], moments);
+        assert!(volume > 2.0 * 4e-3, "{volume}");
     }
 
     /// Points of a ball and inside it, in an order without pattern; the hull of the inscribed polyhedron.

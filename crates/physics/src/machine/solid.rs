@@ -111,6 +111,12 @@ impl Solid {
         Self { centre: self.centre + by, ..self }
     }
 
+    /// The same volume with its second moments about `point`, m, which takes the place of the centroid.
+    pub fn about(self, point: Vec3) -> Self {
+        let off = point - self.centre;
+        Self::new(self.volume, point, self.second + off * off.transpose() * self.volume)
+    }
+
     /// Tetrahedra between the origin and each of these triangles, m, with signed volumes: for the triangles of a closed surface, seen
     /// counter-clockwise from outside, what it encloses, by the divergence theorem.
     pub fn of_tetrahedra(triangles: impl Iterator<Item = [Vec3; 3]>) -> Self {
