@@ -144,7 +144,7 @@ impl Tape {
                 Operation::Scale(c, x) => values[to] = values[x].scaled(c),
                 Operation::Shift(c, x) => values[to] = values[x].shifted(c),
                 Operation::From(c, x) => values[to] = N::constant(c).binary(Binary::Subtract, values[x]),
-                Operation::SinCos(x, cosine) => (values[to], values[cosine]) = values[x].sin_cos(),
+                Operation::SinCos(x, cosine) => (values[to], values[cosine]) = N::sin_cos(values[x]),
                 // Inlined.
                 Operation::Unary(Unary::Sqrt, x) => values[to] = values[x].unary(Unary::Sqrt),
                 Operation::Unary(unary, x) => values[to] = values[x].unary(unary),
