@@ -2,6 +2,7 @@
 
 use crate::common::parse;
 use jointplay::analysis::ideal_fault::{IdealFault, ideal_fault};
+use jointplay::machine::StartRule;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation, StopFault};
 
@@ -70,6 +71,10 @@ fn a_path_that_is_not_that_of_the_machine_is_named() {
         refused.starts_with("where the loops close at t = 0, body block is 5 mm off its path in [closed_form]"),
         "{refused}"
     );
+    let mut settled = off_by("5 mm", "100 mm");
+    settled.set("contact.clearance", "0.1 mm").expect("may be loose");
+    settled.machine.start = StartRule::Settled;
+    assert_eq!(Simulation::new(&settled.machine).expect_err("is no nearer to it").to_string(), refused);
     // Right at the start.
     for loose in [false, true] {
         let mut scene = off_by("2 mm*sin(turn)", "100 mm");

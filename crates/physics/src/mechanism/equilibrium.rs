@@ -84,7 +84,7 @@ pub(super) fn rest_near(machine: &Machine, mut state: Vec<f64>) -> Result<Vec<f6
     }
     state[nq..].fill(0.0);
     let mut mechanism = Mechanism::near(machine, Some(&state))?;
-    let state = mechanism.start()?;
+    let state = mechanism.start_off_path()?;
     let found = Search::new(&mut mechanism).find(state);
     found.map_err(|moves| MechanismError::NoRest {
         body: machine.bodies[moves.body].name.clone(),

@@ -66,7 +66,8 @@ impl HeldMachine {
     /// It does not start, its drives do not get there, the pose is singular, or it comes to rest nowhere.
     pub fn new(machine: &Machine, held: &[Option<f64>]) -> Result<Self, HeldError> {
         let mut mechanism = Mechanism::new(&without_play(machine))?;
-        let mut y = mechanism.start()?;
+        // The pose is assembled from the joints; a path in closed form is no more than a first guess.
+        let mut y = mechanism.start_off_path()?;
         let rank = mechanism.model.assembled.get().and_then(|assembled| assembled.rank);
         let mut moving = at_start(&without_play(machine));
         let mut still = moving.clone();

@@ -18,7 +18,8 @@ const ROUNDS: usize = 4;
 pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled, MechanismError> {
     let mut twin = without_play(machine);
     let mut mechanism = Mechanism::near(&twin, near)?;
-    let mut state = mechanism.start()?;
+    // Held elsewhere than at t = 0, it is off its path, too.
+    let mut state = if near.is_some() { mechanism.start_off_path() } else { mechanism.start() }?;
     let assembly = mechanism.assembly().clone();
     for _ in 0..ROUNDS {
         let mut rate = vec![0.0; state.len()];
@@ -39,7 +40,7 @@ pub(super) fn settle(machine: &Machine, near: Option<&[f64]>) -> Result<Settled,
             twin.ball_joints[j].ball.point = joint.ball.point - turned_back;
         }
         mechanism = Mechanism::near(&twin, near)?;
-        state = mechanism.start()?;
+        state = mechanism.start_off_path()?;
     }
     Ok(Settled { state, assembly })
 }

@@ -35,8 +35,21 @@ impl Mechanism {
     /// State at t = 0: positions, then velocities.
     ///
     /// # Errors
-    /// Joints that do not close, or a singular start pose.
+    /// Joints that do not close, a singular start pose, or a path in closed form that does not pass through that pose.
     pub fn start(&mut self) -> Result<Vec<f64>, MechanismError> {
+        self.start_checked(true)
+    }
+
+    /// The same for a machine that need not be on its path in closed form, because its balls or drives were moved.
+    ///
+    /// # Errors
+    /// Joints that do not close, or a singular start pose.
+    pub(super) fn start_off_path(&mut self) -> Result<Vec<f64>, MechanismError> {
+        self.start_checked(false)
+    }
+
+    /// State at t = 0; `on_path`: the path in closed form, if there is one, must pass through it.
+    fn start_checked(&mut self, on_path: bool) -> Result<Vec<f64>, MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
         let assembled = model.start == StartRule::Ideal;
@@ -105,7 +118,7 @@ impl Mechanism {
             self.check_speeds(&mut tree, &y)?;
         }
         // Otherwise the play may let it.
-        if let Some((form, path)) = model.path().filter(|_| assembled || self.is_kinematic()) {
+        if let Some((form, path)) = model.path().filter(|_| on_path && (assembled || self.is_kinematic())) {
             let distance = kinematics::distance_from(&path.at(&form.at(T)), model, &tree.motion);
             if distance > OFF_PATH {
                 return Err(MechanismError::OffPath { body: self.output_name.clone(), distance });
